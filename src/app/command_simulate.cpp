@@ -6,12 +6,12 @@
 #include <system_error>
 #include <vector>
 
+#include "command_run.hpp"
 #include "commands.hpp"
 #include "load.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
-#include "run_loop.hpp"
 #include "simulated_panels.hpp"
 
 namespace panelgate::app {

@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-#include "held.hpp"
+#include "setting.hpp"
 
 namespace panelgate::app {
 namespace {

@@ -10,10 +10,10 @@
 #include <variant>
 
 #include "build_info.hpp"
+#include "load.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/rt/log.hpp"
 #include "plant.hpp"
-#include "prepare.hpp"
 #include "reloader.hpp"
 #include "running_line.hpp"
 

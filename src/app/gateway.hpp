@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "discoveries.hpp"
+#include "http_door.hpp"
 #include "northbound.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus.hpp"
@@ -21,9 +22,8 @@
 #include "panelgate/web/api/server.hpp"
 #include "panelgate/web/http/event_hub.hpp"
 #include "running_line.hpp"
-#include "scene.hpp"
-#include "scrapes.hpp"
 #include "servers.hpp"
+#include "snapshot.hpp"
 
 namespace panelgate::app {
 

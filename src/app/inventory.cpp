@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "panelgate/config/deadlines.hpp"
-#include "panelgate/profile/translate.hpp"
+#include "panelgate/profile/judge.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::app {

@@ -7,8 +7,8 @@
 #include <set>
 #include <string_view>
 
-#include "held.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "setting.hpp"
 
 namespace panelgate::app {
 namespace {

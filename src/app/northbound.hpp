@@ -12,12 +12,12 @@
 
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/mqtt/client.hpp"
-#include "panelgate/mqtt/counters.hpp"
 #include "panelgate/mqtt/publisher.hpp"
+#include "panelgate/mqtt/counters.hpp"
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/web/api/point_order.hpp"
-#include "scene.hpp"
+#include "snapshot.hpp"
 
 namespace panelgate::app {
 

@@ -13,7 +13,6 @@
 #include "moved_units.hpp"
 #include "panelgate/config/weaker.hpp"
 #include "panelgate/rt/log.hpp"
-#include "prepare.hpp"
 #include "servers.hpp"
 
 namespace panelgate::app {

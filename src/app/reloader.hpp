@@ -13,7 +13,7 @@
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/counters.hpp"
 #include "panelgate/rt/clock.hpp"
-#include "panelgate/rt/worker.hpp"
+#include "panelgate/rt/process.hpp"
 #include "panelgate/web/api/sources.hpp"
 
 namespace panelgate::app {

@@ -16,7 +16,6 @@
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/profile/judge.hpp"
-#include "panelgate/profile/translate.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/sim/misbehaviour.hpp"
 #include "panelgate/sim/station.hpp"

@@ -14,7 +14,6 @@
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/config/config.hpp"
-#include "panelgate/points/heard_values.hpp"
 #include "panelgate/points/poller.hpp"
 #include "panelgate/points/relays.hpp"
 #include "panelgate/points/settings.hpp"

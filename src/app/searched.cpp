@@ -20,11 +20,8 @@
 #include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/scan/options.hpp"
-#include "panelgate/scan/progress.hpp"
 #include "panelgate/scan/report.hpp"
-#include "panelgate/scan/result.hpp"
 #include "panelgate/scan/scanner.hpp"
-#include "panelgate/scan/settings.hpp"
 
 namespace panelgate::app {
 

@@ -5,7 +5,7 @@
 
 #include "commands.hpp"
 #include "panelgate/profile/load_profile.hpp"
-#include "panelgate/scan/result.hpp"
+#include "panelgate/scan/report.hpp"
 
 namespace panelgate::app {
 

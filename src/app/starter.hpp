@@ -3,7 +3,7 @@
 #include <string>
 
 #include "panelgate/profile/load_profile.hpp"
-#include "panelgate/scan/result.hpp"
+#include "panelgate/scan/report.hpp"
 
 namespace panelgate::app {
 

@@ -6,9 +6,8 @@
 #include <cstdlib>
 #include <utility>
 
-#include "explain.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "rules.hpp"
+#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 

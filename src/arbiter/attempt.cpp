@@ -7,7 +7,7 @@
 #include "panelgate/arbiter/job_queue.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "rules.hpp"
+#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 

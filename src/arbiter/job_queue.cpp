@@ -4,7 +4,7 @@
 #include <iterator>
 #include <utility>
 
-#include "rules.hpp"
+#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 

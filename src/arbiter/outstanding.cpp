@@ -7,7 +7,7 @@
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "rules.hpp"
+#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 

@@ -1,12 +1,14 @@
 #include "panelgate/arbiter/read_cache.hpp"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 #include <vector>
 
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
-#include "rules.hpp"
+#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 
@@ -58,6 +60,101 @@ void ReadCache::on_write(TimePoint now, std::uint8_t station, const modbus::Requ
         return (station == kBroadcast || entry.span.station == station) &&
                modbus::may_change(items, entry.span.items);
     });
+}
+
+bool WaitingReads::WiderFirst::operator()(const ReadSpan& a, const ReadSpan& b) const {
+    return std::tuple(place(a), b.items.count) < std::tuple(place(b), a.items.count);
+}
+
+bool WaitingReads::carries(const ReadSpan& span) const {
+    const auto behind = widest_.upper_bound(place(span));
+    return behind != widest_.begin() && std::prev(behind)->second.contains(span);
+}
+
+bool WaitingReads::is_widest(const ReadSpan& span) const {
+    const auto found = widest_.find(place(span));
+    return found != widest_.end() && found->second == span;
+}
+
+void WaitingReads::make_widest(Spans::const_iterator it, const Count& count) {
+    const ReadSpan& span = it->first;
+    auto inside = widest_.lower_bound(place(span));
+    while (inside != widest_.end() && span.contains(inside->second)) {
+        count(spans_.find(inside->second)->second.begin()->second, -1);
+        inside = widest_.erase(inside);
+    }
+    widest_.emplace(place(span), span);
+    count(it->second.begin()->second, 1);
+}
+
+void WaitingReads::add(const Job& job, const ReadSpan& span, const Count& count) {
+    const auto [it, first] = spans_.try_emplace(span);
+    Equals& equals = it->second;
+    if (first) {
+        equals.emplace(job.ticket, job.client);
+        if (!carries(span)) make_widest(it, count);
+        return;
+    }
+    const Client before = equals.begin()->second;
+    equals.emplace(job.ticket, job.client);
+    if (equals.begin()->first != job.ticket || !is_widest(span)) return;
+    count(before, -1);
+    count(job.client, 1);
+}
+
+void WaitingReads::remove(const Job& job, const ReadSpan& span, const Count& count) {
+    const auto it = spans_.find(span);
+    Equals& equals = it->second;
+    const bool counted = counts(job.ticket, span);
+    equals.erase(job.ticket);
+    if (counted) count(job.client, -1);
+    if (equals.empty()) {
+        drop_span(it, count);
+    } else if (counted) {
+        count(equals.begin()->second, 1);
+    }
+}
+
+/// Spans that only this one contained become widest. Of two that begin together the wider comes
+/// first, so that none is contained in a later one.
+void WaitingReads::drop_span(Spans::iterator it, const Count& count) {
+    const ReadSpan gone = it->first;
+    auto next = spans_.erase(it);
+    if (!is_widest(gone)) return;
+    widest_.erase(place(gone));
+    for (; next != spans_.end(); ++next) {
+        if (!next->first.same_table(gone) || next->first.items.first >= gone.items.end()) return;
+        if (!carries(next->first)) make_widest(next, count);
+    }
+}
+
+bool WaitingReads::counts(Ticket ticket, const ReadSpan& span) const {
+    return is_widest(span) && spans_.find(span)->second.begin()->first == ticket;
+}
+
+bool WaitingReads::frees(Ticket ticket, const ReadSpan& span) const {
+    if (!counts(ticket, span)) return false;
+    auto it = spans_.find(span);
+    if (it->second.size() > 1) return false;
+    for (++it; it != spans_.end(); ++it) {
+        if (!it->first.same_table(span) || it->first.items.first >= span.items.end()) break;
+        if (span.contains(it->first)) return false;
+    }
+    return true;
+}
+
+bool WaitingReads::consistent() const {
+    std::size_t widest = 0;
+    for (const auto& [span, equals] : spans_) {
+        const auto table =
+            spans_.lower_bound({span.station, {span.items.table, 0, modbus::kTableItems}});
+        const bool contained = std::any_of(table, spans_.find(span), [&inner = span](auto& wider) {
+            return wider.first.contains(inner);
+        });
+        if (equals.empty() || contained == is_widest(span)) return false;
+        if (!contained) ++widest;
+    }
+    return widest == widest_.size();
 }
 
 }  // namespace panelgate::arbiter

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "panelgate/modbus/function.hpp"
-#include "rules.hpp"
+#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 

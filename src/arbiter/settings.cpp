@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "rules.hpp"
+#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 

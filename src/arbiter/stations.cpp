@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "panelgate/modbus/request.hpp"
-#include "rules.hpp"
+#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 
@@ -143,7 +143,6 @@ void Stations::on_failed(TimePoint now, const Group& group, Verdict verdict, Dur
     } else if (verdict == Verdict::silent) {
         // Several stations may have failed together: for five times what this one took, the others
         // are not waited for longer than they have ever needed.
-        urgent_for_ = group.station;
         urgent_until_ =
             now + std::min<Duration>(static_cast<int>(1 / ProbeBudget::kFailing) * cost, kUrgent);
     }

@@ -11,6 +11,7 @@
 
 #include "accounts.hpp"
 #include "answers.hpp"
+#include "health_events.hpp"
 #include "line_doctor.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/base/pool.hpp"
@@ -19,7 +20,6 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/rt/log.hpp"
-#include "health_events.hpp"
 #include "trace_book.hpp"
 #include "write_log.hpp"
 

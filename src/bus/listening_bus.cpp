@@ -9,6 +9,7 @@
 
 #include "accounts.hpp"
 #include "answers.hpp"
+#include "health_events.hpp"
 #include "line_doctor.hpp"
 #include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/counters.hpp"
@@ -23,7 +24,6 @@
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tap/heard.hpp"
 #include "panelgate/tap/matcher.hpp"
-#include "health_events.hpp"
 #include "trace_book.hpp"
 
 namespace panelgate::bus {
@@ -278,7 +278,8 @@ struct ListeningBus::State final : public line::Line::Events {
     void act(tap::Frame& frame);
     void act(const tap::Transaction& made);
     void tell_health(std::uint8_t station) {
-        if (up && settings.stations.contains(station)) health_events.tell(station, heard.health(station));
+        if (up && settings.stations.contains(station))
+            health_events.tell(station, heard.health(station));
     }
     void refuse(Request request, AnswerHandler handler);
     Refusal refusal(std::uint8_t station) const;

@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/config/config.hpp"
 #include "panelgate/config/deadlines.hpp"
 #include "panelgate/config/endpoint.hpp"
-#include "panelgate/config/settings.hpp"
 
 namespace panelgate::config {
 
@@ -156,8 +156,8 @@ std::string in_networks(const std::vector<Network>& allow) {
         return " in the " + std::to_string(allow.size()) + " networks of allow";
     std::string text;
     for (const Network& network : allow)
-        text += (text.empty() ? " in " : ", ") + network.address + '/' +
-                std::to_string(network.prefix);
+        text +=
+            (text.empty() ? " in " : ", ") + network.address + '/' + std::to_string(network.prefix);
     return text;
 }
 

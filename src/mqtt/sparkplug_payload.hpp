@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/points/point.hpp"
 #include "panelgate/points/station_polls.hpp"
-#include "panelgate/points/value.hpp"
 
 namespace panelgate::mqtt {
 

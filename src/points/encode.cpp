@@ -9,7 +9,7 @@
 #include "panelgate/base/decimal.hpp"
 #include "panelgate/base/text.hpp"
 #include "panelgate/modbus/request.hpp"
-#include "panelgate/points/value.hpp"
+#include "panelgate/points/point.hpp"
 #include "registers.hpp"
 
 namespace panelgate::points {

@@ -5,11 +5,132 @@
 #include <limits>
 #include <map>
 #include <string_view>
+#include <utility>
 
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+#include "panelgate/points/point.hpp"
 #include "panelgate/points/station_polls.hpp"
-#include "panelgate/points/value.hpp"
 
 namespace panelgate::points {
+
+namespace {
+
+using Items = std::vector<std::uint16_t>;
+
+Items bits_in(ByteView packed, std::size_t count) {
+    Items items(std::min(count, packed.size() * 8));
+    for (std::size_t i = 0; i < items.size(); ++i)
+        items[i] = static_cast<std::uint16_t>(packed[i / 8] >> (i % 8) & 1);
+    return items;
+}
+
+Items words_in(ByteView data) {
+    Items items;
+    for (Reader in(data); in.left() >= 2;) items.push_back(in.u16());
+    return items;
+}
+
+/// Returns the items that a write contains; empty if only the panel knows the result.
+Items items_written(ByteView request, std::uint32_t count) {
+    constexpr std::size_t kOne = 3;   // function and address
+    constexpr std::size_t kMany = 6;  // ... quantity and byte count
+    switch (request[0]) {
+        case modbus::kWriteSingleCoil:
+            return {static_cast<std::uint16_t>(request[kOne] == 0xFF ? 1 : 0)};
+        case modbus::kWriteSingleRegister:
+            return words_in(request.subspan(kOne));
+        case modbus::kWriteMultipleCoils:
+            return bits_in(request.subspan(kMany), count);
+        case modbus::kWriteMultipleRegisters:
+            return words_in(request.subspan(kMany));
+        default:
+            return {};
+    }
+}
+
+Items items_read(const modbus::Span& span, ByteView reply) {
+    if (!modbus::is_bit_table(span.table)) return modbus::registers_of(reply);
+    const std::vector<bool> bits = modbus::bits_of(reply, span.count);
+    return {bits.begin(), bits.end()};
+}
+
+/// False only if the panel refused the write.
+bool may_have_written(const tap::Transaction& heard) {
+    return heard.doubtful || !modbus::exception_of(heard.reply);
+}
+
+}  // namespace
+
+HeardValues::HeardValues(const std::vector<Want>& wants, SharedMemory memory)
+    : wants_(wants), memory_(std::move(memory)), readings_(wants_.size()) {}
+
+std::vector<std::size_t> HeardValues::on_heard(const tap::Transaction& heard) {
+    changed_.clear();
+    if (!modbus::check_request(heard.request, modbus::QuantityCheck::wide)) return {};
+    const modbus::Access access = modbus::access_of(heard.request);
+    if (access.write && may_have_written(heard)) apply_write(access.write, heard);
+    const bool plain = access.read && heard.request[0] != modbus::kReadFifoQueue;
+    if (plain && !heard.doubtful && !apply_read(*access.read, heard))
+        apply_failure(*access.read, modbus::exception_of(heard.reply));
+    std::ranges::sort(changed_);
+    const auto twice = std::ranges::unique(changed_);
+    changed_.erase(twice.begin(), twice.end());
+    return std::exchange(changed_, {});
+}
+
+/// Returns false if the read failed.
+bool HeardValues::apply_read(const modbus::Span& span, const tap::Transaction& heard) {
+    if (heard.end != tap::End::answered || modbus::exception_of(heard.reply)) return false;
+    const Items items = items_read(span, heard.reply);
+    if (items.size() < span.count) return false;
+    // 17h reads after its own write (AP 6.17).
+    const bool writes = heard.request[0] == modbus::kReadWriteMultipleRegisters;
+    const TimePoint sampled = writes ? heard.sent : heard.sampled;
+    for (std::size_t i = 0; i < wants_.size(); ++i) {
+        if (span.contains(wants_[i].span)) set(i, span, items, sampled);
+    }
+    return true;
+}
+
+void HeardValues::apply_write(const std::optional<modbus::Span>& span,
+                              const tap::Transaction& heard) {
+    for (std::size_t i = 0; i < wants_.size(); ++i) {
+        if (!may_change(memory_, span, wants_[i].span)) continue;
+        readings_[i].written = heard.sent;
+        changed_.push_back(i);
+    }
+    if (heard.doubtful || heard.end != tap::End::answered) return;
+    const Items items = items_written(heard.request, span->count);
+    if (items.size() < span->count) return;
+    for (std::size_t i = 0; i < wants_.size(); ++i) {
+        if (span->contains(wants_[i].span)) set(i, *span, items, heard.sent);
+    }
+}
+
+void HeardValues::apply_failure(const modbus::Span& span, std::optional<std::uint8_t> exception) {
+    for (std::size_t i = 0; i < wants_.size(); ++i) {
+        if (!span.contains(wants_[i].span)) continue;
+        readings_[i].failing = true;
+        readings_[i].exception = exception;
+        ++readings_[i].failed;
+        changed_.push_back(i);
+    }
+}
+
+void HeardValues::set(std::size_t want, const modbus::Span& span, const Items& items,
+                      TimePoint sampled) {
+    const modbus::Span& wanted = wants_[want].span;
+    const auto first = items.begin() + static_cast<std::ptrdiff_t>(wanted.first - span.first);
+    Reading& reading = readings_[want];
+    reading.values.assign(first, first + static_cast<std::ptrdiff_t>(wanted.count));
+    reading.sampled = sampled;
+    reading.failing = false;
+    reading.exception.reset();
+    ++reading.good;
+    changed_.push_back(want);
+}
 
 std::vector<Want> wants_of(const std::vector<Point>& points, const std::vector<Poll>& polls) {
     std::vector<Want> wants;

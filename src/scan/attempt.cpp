@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
+#include <numeric>
 #include <optional>
+#include <set>
 
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
@@ -11,6 +14,186 @@
 #include "panelgate/modbus/rtu_framer.hpp"
 
 namespace panelgate::scan {
+
+using profile::allows;
+
+namespace {
+
+constexpr int kUsualRates[] = {9600, 19200, 38400, 115200, 57600, 4800, 2400};
+constexpr int kAsciiRates[] = {9600, 19200, 38400, 115200};  // others only if requested
+constexpr Parity kParities[] = {Parity::none, Parity::even, Parity::odd};
+constexpr std::size_t kRounds[] = {4, 8};  // stations in each format; the third round has the rest
+constexpr std::uint8_t kUsualLast = 31;    // of panels: their settings screens end there
+
+/// Returns the profiles' default formats, the most frequent first, then by profile name.
+std::vector<SerialFormat> profile_formats(const profile::Catalogue& profiles) {
+    std::vector<SerialFormat> all;
+    for (const auto& [name, profile] : profiles.all()) {
+        if (!profile.serial.source.empty()) all.push_back(profile.serial.default_format);
+    }
+    std::map<std::ptrdiff_t, std::vector<SerialFormat>, std::greater<>> by_count;
+    for (const SerialFormat& format : all)
+        append_new(by_count[std::ranges::count(all, format)], format);
+    std::vector<SerialFormat> ordered;
+    for (const auto& [count, formats] : by_count)
+        ordered.insert(ordered.end(), formats.begin(), formats.end());
+    return ordered;
+}
+
+std::vector<int> with_wanted(std::vector<int> rates, const Settings& settings) {
+    for (const int rate : settings.baud) append_new(rates, rate);
+    return rates;
+}
+
+void keep_allowed(std::vector<SerialFormat>& formats, const Settings& settings) {
+    std::erase_if(formats, [&](const SerialFormat& format) {
+        return !allows(settings.baud, format.baud) || !allows(settings.parity, format.parity);
+    });
+}
+
+}  // namespace
+
+std::vector<SerialFormat> likely_formats(const profile::Catalogue& profiles,
+                                         const Settings& settings) {
+    if (settings.remote) return {SerialFormat{}};
+    std::vector<SerialFormat> all = profile_formats(profiles);
+    append_new(all, SerialFormat{});
+    for (const int rate : with_wanted({std::begin(kUsualRates), std::end(kUsualRates)}, settings)) {
+        for (const Parity parity : kParities) append_new(all, SerialFormat{rate, 8, parity, 1});
+    }
+    keep_allowed(all, settings);
+    return all;
+}
+
+std::vector<SerialFormat> ascii_formats(const Settings& settings) {
+    constexpr auto kAscii = SerialMode::ascii;
+    SerialFormat standard;
+    standard.data_bits = 7;
+    standard.mode = kAscii;
+    if (settings.remote) return {standard};
+    std::vector<SerialFormat> all;
+    for (const SerialFormat& format :
+         {SerialFormat{0, 7, Parity::even, 1, kAscii}, SerialFormat{0, 8, Parity::none, 1, kAscii},
+          SerialFormat{0, 7, Parity::odd, 1, kAscii},
+          SerialFormat{0, 7, Parity::none, 2, kAscii}}) {
+        for (const int rate :
+             with_wanted({std::begin(kAsciiRates), std::end(kAsciiRates)}, settings)) {
+            all.push_back(format);
+            all.back().baud = rate;
+        }
+    }
+    keep_allowed(all, settings);
+    return all;
+}
+
+std::vector<std::uint8_t> likely_stations(const profile::Catalogue& profiles,
+                                          const Settings& settings) {
+    std::vector<std::uint8_t> wanted = settings.stations;
+    if (wanted.empty()) {
+        wanted.resize(kUsualLast);
+        std::iota(wanted.begin(), wanted.end(), std::uint8_t{1});
+    }
+    std::set<std::uint8_t> ends;
+    for (const auto& [name, profile] : profiles.all()) {
+        ends.insert(profile.first_station);
+        ends.insert(profile.last_station);
+    }
+    std::vector<std::uint8_t> ordered;
+    for (const std::uint8_t station : ends) {
+        if (allows(wanted, station)) ordered.push_back(station);
+    }
+    for (const std::uint8_t station : wanted) append_new(ordered, station);
+    return ordered;
+}
+
+bool offers(const profile::PanelProfile& panel, const SerialFormat& format) {
+    return format.mode == SerialMode::ascii ||
+           (allows(panel.serial.baud, format.baud) && allows(panel.serial.parity, format.parity) &&
+            allows(panel.serial.stop_bits, format.stop_bits));
+}
+
+bool may_be_high_first(const profile::Catalogue& profiles, std::uint8_t station,
+                       const std::optional<SerialFormat>& format) {
+    if (format && format->mode == SerialMode::ascii) return false;
+    return std::ranges::any_of(profiles.all(), [&](const auto& entry) {
+        const profile::PanelProfile& panel = entry.second;
+        return panel.crc_order == modbus::CrcOrder::high_first && station >= panel.first_station &&
+               station <= panel.last_station && (!format || offers(panel, *format));
+    });
+}
+
+std::optional<SerialFormat> common_format(const profile::Catalogue& profiles,
+                                          const std::vector<const profile::PanelProfile*>& panels) {
+    for (const SerialFormat& format : likely_formats(profiles, {})) {
+        const auto fits = [&](const auto* panel) { return offers(*panel, format); };
+        if (std::ranges::all_of(panels, fits)) return format;
+    }
+    return std::nullopt;
+}
+
+SearchPlan::SearchPlan(const std::vector<SerialFormat>& formats,
+                       const std::vector<std::uint8_t>& stations) {
+    add(formats, stations);
+}
+
+void SearchPlan::add(const std::vector<SerialFormat>& formats,
+                     const std::vector<std::uint8_t>& stations) {
+    std::size_t from = 0;
+    for (std::size_t round = 0; from < stations.size(); ++round) {
+        const std::size_t left = stations.size() - from;
+        const std::size_t count =
+            round < std::size(kRounds) ? std::min(kRounds[round], left) : left;
+        for (const SerialFormat& format : formats) {
+            for (std::size_t i = from; i < from + count; ++i)
+                cells_.push_back({.format = format, .station = stations[i]});
+        }
+        from += count;
+    }
+}
+
+void SearchPlan::add_high_first(const profile::Catalogue& profiles, const Settings& settings,
+                                const std::vector<SerialFormat>& formats,
+                                const std::vector<std::uint8_t>& stations) {
+    for (const SerialFormat& format : formats) {
+        const auto known = settings.remote ? std::nullopt : std::optional(format);
+        for (const std::uint8_t station : stations) {
+            if (may_be_high_first(profiles, station, known))
+                cells_.push_back({format, station, modbus::CrcOrder::high_first});
+        }
+    }
+}
+
+std::optional<Cell> SearchPlan::next() {
+    if (at_ == cells_.size()) return std::nullopt;
+    return cells_[at_++];
+}
+
+bool SearchPlan::is_last_of_format() const {
+    return at_ == cells_.size() || (at_ > 0 && cells_[at_].format != cells_[at_ - 1].format);
+}
+
+void SearchPlan::hint(const Cell& cell) {
+    std::array<std::vector<Cell>, 3> by_distance;
+    for (std::size_t i = at_; i < cells_.size(); ++i) {
+        const bool same_rate = cells_[i].format.baud == cell.format.baud;
+        const std::size_t distance = cells_[i].station != cell.station ? 2 : same_rate ? 0 : 1;
+        by_distance[distance].push_back(cells_[i]);
+    }
+    cells_.resize(at_);
+    for (const std::vector<Cell>& cells : by_distance)
+        cells_.insert(cells_.end(), cells.begin(), cells.end());
+}
+
+Duration SearchPlan::cost(const Settings& settings) const {
+    Duration total{};
+    for (std::size_t i = at_; i < cells_.size(); ++i) {
+        total += settings.search_timeout + frame_time(cells_[i].format, modbus::kReadRequestAdu);
+        const bool changes = i + 1 == cells_.size() || cells_[i + 1].format != cells_[i].format;
+        if (changes)
+            total += settings.leave_timeout - settings.search_timeout + settings.after_format;
+    }
+    return total;
+}
 
 namespace {
 

@@ -6,10 +6,11 @@
 #include <set>
 #include <utility>
 
+#include "attempt.hpp"
 #include "panelgate/modbus/function.hpp"
-#include "plan.hpp"
 
 namespace panelgate::scan {
+
 namespace {
 
 constexpr int kSlowest = 50;  // the configuration accepts the same

@@ -5,11 +5,11 @@
 #include <string>
 #include <utility>
 
+#include "attempt.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/profile/judge.hpp"
-#include "plan.hpp"
 
 namespace panelgate::scan {
 

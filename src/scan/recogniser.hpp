@@ -9,8 +9,8 @@
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/profile/load_profile.hpp"
-#include "panelgate/scan/result.hpp"
-#include "panelgate/scan/settings.hpp"
+#include "panelgate/scan/options.hpp"
+#include "panelgate/scan/report.hpp"
 
 namespace panelgate::scan {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "attempt.hpp"
 #include "panelgate/modbus/response.hpp"
-#include "plan.hpp"
 #include "state.hpp"
 
 namespace panelgate::scan {

@@ -10,9 +10,8 @@
 
 #include "attempt.hpp"
 #include "panelgate/modbus/ascii.hpp"
-#include "panelgate/scan/result.hpp"
+#include "panelgate/scan/report.hpp"
 #include "panelgate/scan/scanner.hpp"
-#include "plan.hpp"
 #include "recogniser.hpp"
 
 namespace panelgate::scan {

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "encoding.hpp"
-#include "scan.hpp"
 #include "source.hpp"
 
 namespace panelgate::yaml {

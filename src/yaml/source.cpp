@@ -1,9 +1,12 @@
 #include "source.hpp"
 
 #include <algorithm>
+#include <array>
+#include <string>
 #include <utility>
 
 #include "encoding.hpp"
+#include "panelgate/yaml/settings.hpp"
 
 namespace panelgate::yaml {
 
@@ -139,6 +142,290 @@ std::string Source::excerpt(Mark mark) const {
     const std::string right = end < shown.size() ? "..." : "";
     return "  " + left + std::string(shown.substr(0, end)) + right + "\n  " +
            blanks_for(left + std::string(shown.substr(0, caret))) + "^\n";
+}
+
+namespace {
+
+using Kind = Token::Kind;
+using State = Token::State;
+
+bool is_blank(char c) { return c == ' ' || c == '\t'; }
+bool is_bracket(char c) { return c == ',' || c == '[' || c == ']' || c == '{' || c == '}'; }
+bool is_space(char c) { return is_blank(c) || c == '\n' || c == '\r'; }
+
+/// A value has at most a dash, a key, a colon and a comma.
+constexpr std::size_t kMaxTokens = 8 * kMaxNodes;
+
+class Scanner {
+  public:
+    explicit Scanner(std::string_view text) : text_(text) {}
+
+    std::vector<Token> scan() {
+        while (tokens_.size() < kMaxTokens) {
+            skip();
+            if (at_ >= text_.size()) break;
+            begin_ = at_;
+            if (first_ && !open_.empty() && ends_brackets()) forget_brackets();
+            step();
+            first_ = false;
+        }
+        forget_brackets();
+        return std::move(tokens_);
+    }
+
+  private:
+    char peek(std::size_t ahead = 0) const {
+        return at_ + ahead < text_.size() ? text_[at_ + ahead] : '\n';
+    }
+    bool blank(std::size_t ahead) const { return is_space(peek(ahead)); }
+    std::size_t line_end(std::size_t from) const {
+        return std::min(text_.find('\n', from), text_.size());
+    }
+
+    /// Skips blanks, line ends, comments and directives.
+    void skip() {
+        for (; at_ < text_.size(); ++at_) {
+            const char c = text_[at_];
+            const bool comment =
+                c == '#' || (c == '%' && first_ && tokens_.empty() && at_ == line_);
+            if (comment) at_ = line_end(at_);
+            if (at_ >= text_.size()) return;
+            if (text_[at_] == '\n') {
+                first_ = true;
+                line_ = at_ + 1;
+                key_ = at_ + 1;
+            } else if (text_[at_] != '\r' && !is_blank(text_[at_])) {
+                return;
+            }
+        }
+    }
+
+    void add(Kind kind, std::size_t end, State state = State::fine) {
+        tokens_.push_back({kind, state, first_, open_.size(), begin_, end});
+        at_ = std::max(end, at_ + 1);
+    }
+
+    void step() {
+        const bool inside = !open_.empty();
+        const char c = peek();
+        const bool marker = at_ == line_ && blank(3) &&
+                            (text_.substr(at_, 3) == "---" || text_.substr(at_, 3) == "...");
+        if (marker) return add(Kind::document, at_ + 3);
+        if (is_conflict()) return add(Kind::plain, content_end());
+        if (c == '-' && blank(1)) return add_parent(Kind::dash, 1);
+        if (const std::size_t dash = wrong_dash()) return add_parent(Kind::dash, dash);
+        if (c == ':' && (blank(1) || (inside && (is_bracket(peek(1)) || follows_quote()))))
+            return add(Kind::colon, at_ + 1);
+        if (c == '[' || c == '{') return open();
+        if (c == ']' || c == '}') return close(c);
+        if (c == ',' && inside) return add(Kind::comma, at_ + 1);
+        if (c == '"' || c == '\'') return quoted(c);
+        if ((c == '|' || c == '>') && !inside) return block();
+        word(c);
+    }
+
+    /// True for <<<<<<<, |||||||, ======= or >>>>>>> of a merge.
+    bool is_conflict() const {
+        constexpr std::size_t kLength = 7;
+        const char c = peek();
+        return at_ == line_ && std::string_view("<|=>").find(c) != std::string_view::npos &&
+               text_.substr(at_, kLength) == std::string(kLength, c) && blank(kLength);
+    }
+    /// Returns the end of the line without trailing blanks.
+    std::size_t content_end() const {
+        std::size_t end = line_end(at_);
+        while (end > at_ && is_space(text_[end - 1])) --end;
+        return end;
+    }
+
+    void word(char c) {
+        if (c == '*') return add(Kind::alias, name_end());
+        if (c == '&') return add(Kind::anchor, name_end());
+        if (c == '!') return add(Kind::tag, name_end());
+        const std::size_t end = plain_end();
+        if (c == '%' || c == '@' || c == '`' || c == ',') return add(Kind::odd, end);
+        if (first_ || tokens_.empty() || tokens_.back().kind == Kind::dash) key_ = begin_;
+        add(Kind::plain, end);
+    }
+
+    void add_parent(Kind kind, std::size_t length) {
+        key_ = at_;
+        add(kind, at_ + length, text_[at_] == '-' ? State::fine : State::stray);
+    }
+
+    /// Returns the length of a list mark that YAML does not know, such as a longer dash or a dot; 0
+    /// if none.
+    std::size_t wrong_dash() const {
+        static constexpr std::array<std::string_view, 9> kDashes{
+            "*", "\u2010", "\u2011", "\u2012", "\u2013", "\u2014", "\u2022", "\u2212", "\u00B7"};
+        const bool begins = first_ || tokens_.empty() || tokens_.back().kind == Kind::dash;
+        if (!open_.empty() || !begins) return 0;
+        for (const std::string_view dash : kDashes) {
+            if (text_.substr(at_).starts_with(dash) && blank(dash.size())) return dash.size();
+        }
+        return 0;
+    }
+
+    bool follows_quote() const {
+        return !tokens_.empty() && tokens_.back().kind == Kind::quoted && tokens_.back().end == at_;
+    }
+
+    std::size_t name_end() const {
+        const std::string_view end = open_.empty() ? " \t\r\n" : " \t\r\n,[]{}";
+        return std::min(text_.find_first_of(end, at_), text_.size());
+    }
+
+    /// Ends at ": ", " #", a bracket or comma inside brackets, or the end of the line; without
+    /// trailing blanks.
+    std::size_t plain_end() const {
+        std::size_t end = at_;
+        for (std::size_t i = at_; i < text_.size(); ++i) {
+            const char c = text_[i];
+            const char next = i + 1 < text_.size() ? text_[i + 1] : '\n';
+            const bool spaced = is_space(next);
+            const bool inside = !open_.empty();
+            if (c == '\n' || c == '\r') break;
+            if (c == ':' && (spaced || (inside && is_bracket(next)))) break;
+            if (inside && is_bracket(c) && i > at_) break;
+            if (is_blank(c)) {
+                if (next == '#') break;
+                continue;
+            }
+            end = i + 1;
+        }
+        return end;
+    }
+
+    void open() {
+        if (open_.empty()) outermost_ = key_ - line_;
+        add(Kind::open, at_ + 1);
+        open_.push_back(tokens_.size() - 1);
+    }
+
+    void close(char c) {
+        const char opening = c == ']' ? '[' : '{';
+        const auto match = std::find_if(open_.rbegin(), open_.rend(), [&](std::size_t token) {
+            return text_[tokens_[token].begin] == opening;
+        });
+        if (match == open_.rend()) return add(Kind::close, at_ + 1, State::stray);
+        while (text_[tokens_[open_.back()].begin] != opening) {
+            tokens_[open_.back()].state = State::unclosed;
+            open_.pop_back();
+        }
+        add(Kind::close, at_ + 1);
+        open_.pop_back();
+    }
+
+    /// True for a line that cannot be inside the brackets: an item, or a key no deeper than the
+    /// line that opened them.
+    bool ends_brackets() const {
+        if ((peek() == '-' && blank(1)) || is_conflict()) return true;
+        const std::size_t indent = at_ - line_;
+        if (indent > outermost_) return false;
+        const std::size_t end = text_.find_first_of(":\n,[]{}\"'", at_);
+        return end != std::string_view::npos && end > at_ && text_[end] == ':' &&
+               (end + 1 >= text_.size() || text_[end + 1] == ' ' || text_[end + 1] == '\n' ||
+                text_[end + 1] == '\r');
+    }
+
+    void forget_brackets() {
+        for (const std::size_t token : open_) tokens_[token].state = State::unclosed;
+        open_.clear();
+    }
+
+    void quoted(char quote) {
+        if (first_ || tokens_.back().kind == Kind::dash) key_ = begin_;
+        const std::size_t end = quote_end(quote);
+        if (end == std::string_view::npos || leaves_its_key(end) || opens_next_text(end))
+            return add(Kind::quoted, forgotten_end(), State::unclosed);
+        add(Kind::quoted, end);
+        const std::size_t last = text_.substr(begin_, end - begin_).rfind('\n');
+        if (last != std::string_view::npos) line_ = key_ = begin_ + last + 1;
+    }
+    std::size_t quote_end(char quote) const {
+        for (std::size_t i = at_ + 1; i < text_.size(); ++i) {
+            if (quote == '"' && text_[i] == '\\') {
+                ++i;
+            } else if (text_[i] == quote) {
+                if (quote == '"' || i + 1 >= text_.size() || text_[i + 1] != quote) return i + 1;
+                ++i;
+            }
+        }
+        return std::string_view::npos;
+    }
+    /// True if a line of the text is not deeper than its key (YAML 1.2, 7.4): then its quote was
+    /// forgotten, and this one opens the next text.
+    bool leaves_its_key(std::size_t end) const {
+        const std::string_view text = text_.substr(0, end);
+        const std::size_t parent = key_ - line_;
+        std::size_t begin = text.find('\n', at_);
+        while (begin < end) {
+            const std::size_t content = text.find_first_not_of(" \t\r", ++begin);
+            const bool closes = content + 1 >= end;  // a closing quote alone may be in any column
+            if (!closes && text[content] != '\n' && content - begin <= parent) return true;
+            begin = text.find('\n', begin);
+        }
+        return false;
+    }
+
+    /// True if the quote opens the next text: text follows it, and this text cannot end there as it
+    /// has a line end, or ends with a separator.
+    bool opens_next_text(std::size_t end) const {
+        if (end >= text_.size() || is_space(text_[end])) return false;
+        if (std::string_view(",:]}").find(text_[end]) != std::string_view::npos) return false;
+        const std::string_view inside = text_.substr(at_ + 1, end - at_ - 2);
+        const std::size_t last = inside.find_last_not_of(" \t\r\n");
+        return inside.find('\n') != std::string_view::npos ||
+               (last != std::string_view::npos &&
+                std::string_view(",:[{").find(inside[last]) != std::string_view::npos);
+    }
+    /// Returns where a user would have closed the quote: after the key, the item in brackets, or at
+    /// the end of the line.
+    std::size_t forgotten_end() const {
+        const bool is_value = !first_ && tokens_.back().kind == Kind::colon;
+        std::size_t end = at_ + 1;
+        for (std::size_t i = end; i < text_.size() && text_[i] != '\n'; ++i) {
+            const char c = text_[i];
+            const char next = i + 1 < text_.size() ? text_[i + 1] : '\n';
+            const bool item = !open_.empty() && (c == ',' || c == ']' || c == '}');
+            const bool key = !is_value && c == ':' && is_space(next);
+            if (item || key || (c == '#' && is_blank(text_[i - 1]))) break;
+            if (!is_space(c)) end = i + 1;
+        }
+        return end;
+    }
+
+    /// Takes all lines deeper than the key, or the dash, that they belong to.
+    void block() {
+        const std::size_t parent = key_ - line_;
+        std::size_t end = line_end(at_);
+        while (end < text_.size()) {
+            const std::size_t content = text_.find_first_not_of(" \r", end + 1);
+            const bool empty = content < text_.size() && text_[content] == '\n';
+            if (!empty && (content >= text_.size() || content - (end + 1) <= parent)) break;
+            end = line_end(end + 1);
+        }
+        add(Kind::block, end);
+    }
+
+    std::string_view text_;
+    std::vector<Token> tokens_;
+    std::vector<std::size_t> open_;  ///< tokens
+    std::size_t outermost_ = 0;      ///< column of the first one's key or dash
+    std::size_t at_ = 0;
+    std::size_t begin_ = 0;  ///< of the current token
+    std::size_t line_ = 0;   ///< start of its line
+    std::size_t key_ = 0;    ///< the last key or dash in block style on that line
+    bool first_ = true;
+};
+
+}  // namespace
+
+std::vector<Token> scan(std::string_view text) { return Scanner(text).scan(); }
+
+std::size_t line_begin(std::string_view text, std::size_t offset) {
+    const std::size_t before = offset == 0 ? std::string_view::npos : text.rfind('\n', offset - 1);
+    return before == std::string_view::npos ? 0 : before + 1;
 }
 
 }  // namespace panelgate::yaml

@@ -10,7 +10,6 @@
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/read_cache.hpp"
 #include "panelgate/arbiter/settings.hpp"
-#include "panelgate/arbiter/waiting_reads.hpp"
 #include "panelgate/base/inline_function.hpp"
 #include "panelgate/base/pool.hpp"
 

@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "panelgate/arbiter/attempt.hpp"
-#include "panelgate/arbiter/copy_guard.hpp"
 #include "panelgate/arbiter/outstanding.hpp"
 #include "panelgate/arbiter/reply_times.hpp"
 #include "panelgate/arbiter/settings.hpp"

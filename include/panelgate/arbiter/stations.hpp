@@ -62,10 +62,6 @@ class Stations {
         slowest_.add(*waited);
         quickest_.add(*waited);
     }
-    /// This station has answered: if its silence made waits shorter, nothing has failed.
-    void on_answered(std::uint8_t id) {
-        if (id == urgent_for_) urgent_until_ = {};
-    }
     /// Shortest recent time that any station of the line has needed.
     const Quickest& quickest() const { return quickest_; }
 
@@ -154,9 +150,8 @@ class Stations {
     ProbeBudget asked_unheard_{ProbeBudget::kUnheard};  ///< except the first at each
     Slowest slowest_;
     Quickest quickest_;
-    TimePoint heard_{};            ///< any of them
-    TimePoint urgent_until_{};     ///< one just timed out: shorter waits for others
-    std::uint8_t urgent_for_ = 0;  ///< that one
+    TimePoint heard_{};         ///< any of them
+    TimePoint urgent_until_{};  ///< one just timed out: shorter waits for others
 };
 
 }  // namespace panelgate::arbiter

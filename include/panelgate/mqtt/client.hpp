@@ -6,8 +6,8 @@
 #include <string>
 
 #include "panelgate/base/time.hpp"
-#include "panelgate/mqtt/counters.hpp"
 #include "panelgate/mqtt/publisher.hpp"
+#include "panelgate/mqtt/counters.hpp"
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/rt/clock.hpp"
 

@@ -12,7 +12,6 @@
 #include "panelgate/base/time.hpp"
 #include "panelgate/points/point.hpp"
 #include "panelgate/points/station_polls.hpp"
-#include "panelgate/points/value.hpp"
 
 namespace panelgate::mqtt {
 

@@ -14,7 +14,7 @@
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/profile/load_profile.hpp"
-#include "panelgate/scan/result.hpp"
+#include "panelgate/scan/report.hpp"
 
 namespace panelgate::scan {
 

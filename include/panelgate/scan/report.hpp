@@ -1,11 +1,94 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
-#include "panelgate/scan/result.hpp"
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::scan {
+
+/// A profile that matches a station's answers.
+struct Candidate {
+    std::string profile;
+    std::string why;
+};
+
+/// Results of the requests to one station.
+struct Evidence {
+    unsigned asked = 0;
+    unsigned good = 0;
+    unsigned damaged = 0;  ///< bytes without a complete reply
+    unsigned twice = 0;    ///< a second good reply, duplicated
+    unsigned late = 0;     ///< replies after the timeout
+    bool mixed = false;    ///< the same read was both refused and granted
+};
+
+struct StationFinding {
+    std::uint8_t station = 0;
+    std::vector<Candidate> candidates;  ///< best first; empty if no reply was readable
+    Evidence evidence;
+    bool duplicate = false;  ///< two stations seem to share this address
+    modbus::CrcOrder crc_order = modbus::CrcOrder::low_first;
+};
+
+/// Frames that answer no request of this scan: function codes by station.
+using Talk = std::map<std::uint8_t, std::set<std::uint8_t>>;
+
+struct Result {
+    enum class Ending : std::uint8_t {
+        running,         ///< so far
+        finished,        ///< everything was asked
+        another_master,  ///< heard before the first request; nothing was sent
+    };
+    Ending ending = Ending::running;
+    /// Format in which stations answered or another master was heard. For a remote device: a format
+    /// that its panels support.
+    std::optional<SerialFormat> format;
+    bool remote = false;
+    std::vector<StationFinding> stations;  ///< by address
+    Talk talk;
+    unsigned noise = 0;  ///< bytes heard before the first request, unreadable in every format
+    bool noisy = false;  ///< damage on the whole line, not at one address
+    /// Formats in which a station gave only damaged replies, while nothing was readable.
+    std::vector<SerialFormat> damaged_formats;
+};
+
+/// A request that changes nothing. make() is the only way to create one, and a scan can send
+/// nothing else: it is read-only by construction, whatever a profile asks for.
+class ReadRequest {
+  public:
+    /// Returns nullopt unless the station is 1 to 247 and the PDU is well-formed and a pure read.
+    static std::optional<ReadRequest> make(std::uint8_t station, ByteView pdu,
+                                           modbus::CrcOrder order = modbus::CrcOrder::low_first);
+
+    std::uint8_t station() const { return adu_.front(); }
+    ByteView pdu() const { return modbus::pdu_of(adu_); }
+    const Bytes& adu() const { return adu_; }
+    modbus::CrcOrder crc_order() const { return order_; }
+
+  private:
+    ReadRequest(Bytes adu, modbus::CrcOrder order) : adu_(std::move(adu)), order_(order) {}
+    Bytes adu_;
+    modbus::CrcOrder order_;
+};
+
+struct Progress {
+    double share = 0;      ///< 0 to 1
+    Duration remaining{};  ///< an estimate; an upper bound until a station has answered
+    std::string what;      ///< "38400 8N1, station 17"
+    std::size_t found = 0;
+};
+
+/// Returns one line without line end, at most `width` characters.
+std::string format_progress(const Progress& progress, std::size_t width);
 
 /// Returns the table: "DEVICE: 38400 8N1, 6 stations", then a row per station. A non-empty `ending`
 /// is added to the first line in parentheses.

@@ -9,9 +9,8 @@
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/profile/load_profile.hpp"
-#include "panelgate/scan/progress.hpp"
-#include "panelgate/scan/result.hpp"
-#include "panelgate/scan/settings.hpp"
+#include "panelgate/scan/options.hpp"
+#include "panelgate/scan/report.hpp"
 
 namespace panelgate::scan {
 

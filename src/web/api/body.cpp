@@ -25,7 +25,7 @@
 
 #include "panelgate/base/decimal.hpp"
 #include "panelgate/base/text.hpp"
-#include "panelgate/web/api/value_json.hpp"
+#include "panelgate/web/api/point_order.hpp"
 #include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::web {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "panelgate/modbus/function.hpp"
-#include "panelgate/points/value.hpp"
+#include "panelgate/points/point.hpp"
 #include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::web {

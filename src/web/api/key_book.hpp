@@ -13,7 +13,7 @@
 #include <variant>
 
 #include "panelgate/base/time.hpp"
-#include "panelgate/web/api/settings.hpp"
+#include "panelgate/web/api/server.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/problem.hpp"
 

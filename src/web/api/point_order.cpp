@@ -3,11 +3,11 @@
 #include <utility>
 
 #include "answer.hpp"
-#include "panelgate/web/api/value_json.hpp"
 #include "reading.hpp"
 #include "station_path.hpp"
 
 namespace panelgate::web {
+
 namespace json = boost::json;
 namespace {
 

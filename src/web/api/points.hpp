@@ -3,7 +3,7 @@
 #include <boost/json/object.hpp>
 
 #include "panelgate/points/station_points.hpp"
-#include "panelgate/web/api/value_json.hpp"
+#include "panelgate/web/api/point_order.hpp"
 
 namespace panelgate::web {
 

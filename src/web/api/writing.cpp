@@ -15,7 +15,6 @@
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/web/api/point_order.hpp"
-#include "panelgate/web/api/value_json.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "reading.hpp"
 #include "station_path.hpp"

@@ -16,7 +16,7 @@
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
-#include "panelgate/points/value.hpp"
+#include "panelgate/points/point.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/problem.hpp"

@@ -1,15 +1,64 @@
 #pragma once
 
+#include <boost/asio/ip/address.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/web/http/message.hpp"
+#include "panelgate/web/http/problem.hpp"
 #include "panelgate/web/http/settings.hpp"
 
 namespace panelgate::web {
+
+/// ASCII only, as is all that HTTP compares case-insensitively.
+inline std::string to_lower(std::string_view text) {
+    std::string lower(text);
+    for (char& c : lower) {
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    }
+    return lower;
+}
+
+/// Returns the host of "NAME", "NAME:PORT", "[ADDRESS]:PORT" in lower case, without brackets or a
+/// trailing dot; nullopt if malformed.
+std::optional<std::string> host_of_authority(std::string_view authority);
+/// Returns its port, "" if there is none.
+std::string port_of_authority(std::string_view authority);
+
+/// Returns this machine's own names, without a DNS query.
+std::vector<std::string> machine_names();
+
+/// The names under which the server may be addressed: protects against DNS rebinding, since a
+/// rebound page sends its own name and browsers let no page choose another. Pure.
+class HostNames {
+  public:
+    HostNames(const Settings& settings, const std::vector<std::string>& machine);
+
+    /// True for a name of ours. `host` comes from host_of_authority(), `local` is the connection's
+    /// local address. That address, the listen address and the loopback (address and name) are
+    /// always accepted.
+    bool knows(const std::string& host, const boost::asio::ip::address& local) const;
+    /// True for a configured name, where a proxy may use another port.
+    bool is_configured(const std::string& host) const { return configured_.contains(host); }
+
+  private:
+    std::set<std::string> names_;
+    std::set<std::string> configured_;
+    std::set<boost::asio::ip::address> addresses_;
+};
+
+/// Checks a request for anything not public. 421 if it is for another host (`request.host`;
+/// HTTP/1.0 may have none). 403 if the browser reports a page of another site, unless the user
+/// follows a link to one of our pages; and for a foreign Origin, except with OPTIONS.
+std::optional<Problem> check_origin(const HttpRequest& request, const HostNames& names,
+                                    const boost::asio::ip::address& local);
 
 /// Slows down token guessing, per address. The reply to a wrong token is delayed, a right one's is
 /// not; since that difference already shows, an address that guesses has its requests checked one

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-#include "origin.hpp"
+#include "admission.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/text.hpp"
 

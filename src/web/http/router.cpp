@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "origin.hpp"
+#include "admission.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/problem.hpp"

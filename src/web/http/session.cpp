@@ -21,7 +21,7 @@
 #include <string_view>
 #include <utility>
 
-#include "origin.hpp"
+#include "admission.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/web/http/problem.hpp"
 #include "router.hpp"

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "admission.hpp"
-#include "origin.hpp"
 #include "panelgate/web/http/counters.hpp"
 #include "panelgate/web/http/message.hpp"
 

@@ -3,24 +3,18 @@
 #include <gmock/gmock.h>
 
 #include <string>
+#include <vector>
 
-#include "panelgate/config/real_files.hpp"
-#include "panelgate/yaml/document.hpp"
+#include "panelgate/config/config.hpp"
+#include "unit/config/memory_files.hpp"
 
 namespace panelgate::app::capacity_test {
 namespace {
 
+using config::load_valid;
 using testing::HasSubstr;
-using testing::IsEmpty;
 using testing::Not;
 using testing::SizeIs;
-
-config::Config load(const std::string& text) {
-    yaml::Problems problems("plan.yaml");
-    auto config = config::load(text, config::RealFiles(), problems);
-    EXPECT_TRUE(config) << problems.text();
-    return std::move(config).value();
-}
 
 constexpr const char* kTwoLines = R"(lines:
   - name: a
@@ -47,25 +41,28 @@ constexpr const char* kResting = R"(lines:
   - {name: a, device: sim, quarantine: line, timing: {late_window: 5s}, stations: [{id: 1, name: x}]}
   - {name: b, device: sim, quarantine: line, timing: {response_timeout: 300ms}, stations: [{id: 2, name: y}]}
   - {name: c, device: sim, stations: [{id: 3, name: z}]}
-  - {name: d, device: /dev/ttyS0, mode: listen, stations: [{id: 4, name: t}]}
+  - {name: d, device: /dev/ttyS0, mode: listen, stations: [{id: 4, name: t, points: [{name: p, at: "400001"}]}]}
 http: {listen: "127.0.0.1:8080"}
 )";
 
 TEST(Capacity, P4CountsTheRestOfAWholeLine) {
-    const std::vector<Capacity> all = capacities(load(kResting));
+    const config::Config config = load_valid(kResting);
+    const std::vector<Capacity> all = capacities(config);
     EXPECT_EQ(all[0].line.stations[0].line_rest, Duration(5s));
     EXPECT_EQ(all[1].line.stations[0].line_rest, Duration(300ms));
     EXPECT_EQ(all[2].line.stations[0].line_rest, Duration(0));
 }
 
-TEST(Capacity, OfALineThatListensItSaysOnlyThat) {
-    const std::vector<Capacity> all = capacities(load(kResting));
+TEST(Capacity, ALineThatListensCarriesNothingOfOursAndSaysOnlyThat) {
+    const config::Config config = load_valid(kResting);
+    const std::vector<Capacity> all = capacities(config);
+    EXPECT_EQ(all[3].plan.load, 0);
     EXPECT_THAT(plan_text(all[3]), HasSubstr("it only listens"));
     EXPECT_THAT(plan_text(all[3]), Not(HasSubstr("left for clients")));
 }
 
 TEST(Capacity, TakesFromAConfigurationWhatLoadsEachLine) {
-    const config::Config config = load(kTwoLines);
+    const config::Config config = load_valid(kTwoLines);
     const std::vector<Capacity> all = capacities(config);
     ASSERT_THAT(all, SizeIs(2));
     const plan::LinePlan& a = all[0].plan;
@@ -79,24 +76,15 @@ TEST(Capacity, TakesFromAConfigurationWhatLoadsEachLine) {
     EXPECT_EQ(all[1].plan.relays[0].station, "meter");
 }
 
-TEST(Capacity, ALineThatIsOnlyListenedToCarriesNothingOfOurs) {
-    const config::Config config = load(
-        "lines:\n  - name: a\n    device: /dev/ttyUSB0\n    mode: listen\n    stations: [{id: 1, "
-        "name: x, profile: generic, points: [{name: p, at: 400001}]}]\n"
-        "http: {listen: \"127.0.0.1:8080\"}\n");
-    EXPECT_EQ(capacities(config).at(0).plan.load, 0);
-}
-
 TEST(Capacity, TellsWhatIsTooMuchAndWhatWouldHelp) {
     std::string text = kTwoLines;
     text.replace(text.find("every: 1s"), 9, "every: 100ms");
-    const config::Config config = load(text);
+    const config::Config config = load_valid(text);
     const std::vector<Capacity> all = capacities(config);
-    const Capacity& a = all[0];
-    EXPECT_EQ(plan::verdict(a.plan), plan::Verdict::high);
-    EXPECT_THAT(overload_text(a), HasSubstr("line a is planned to be busy for "));
-    EXPECT_THAT(overload_text(a), HasSubstr("serial: {baud: 19200}"));
-    EXPECT_THAT(plan_text(a), HasSubstr("  advice: serial: {baud: 19200}"));
+    EXPECT_EQ(plan::verdict(all[0].plan), plan::Verdict::high);
+    EXPECT_THAT(overload_text(all[0]), HasSubstr("line a is planned to be busy for "));
+    EXPECT_THAT(overload_text(all[0]), HasSubstr("serial: {baud: 19200}"));
+    EXPECT_THAT(plan_text(all[0]), HasSubstr("  advice: serial: {baud: 19200}"));
     EXPECT_THAT(plan_text(all[1]), Not(HasSubstr("advice")));
 }
 

@@ -5,8 +5,10 @@
 #include <boost/json/serialize.hpp>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "panelgate/config/config.hpp"
 #include "unit/config/memory_files.hpp"
 
 namespace panelgate::app::difference_test {
@@ -16,10 +18,7 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 
 config::Config load(const std::string& text, std::map<std::string, std::string> files = {}) {
-    yaml::Problems problems("x.yaml");
-    auto config = config::load(text, config::MemoryFiles(std::move(files)), problems);
-    EXPECT_TRUE(config) << problems.text();
-    return std::move(config).value();
+    return config::load_valid(text, config::MemoryFiles(std::move(files)));
 }
 
 std::vector<std::string> told(const config::Config& before, const config::Config& after) {
@@ -40,12 +39,9 @@ std::string plant(const std::string& of_line, const std::string& stations) {
 
 const std::string kPress = "{id: 31, name: press, poll: [{read: '400001', every: 1s}]}";
 
-TEST(Difference, IsNoneOfWhatMeansTheSame) {
+TEST(Difference, SaysWhichSettingOfWhatHasAnotherValueAndNothingOfWhatMeansTheSame) {
     EXPECT_THAT(told(plant("", kPress), plant("retries: 1, ", kPress) + "log: {level: info}\n"),
                 IsEmpty());
-}
-
-TEST(Difference, SaysWhichSettingOfWhatHasAnotherValue) {
     EXPECT_THAT(told(plant("", kPress),
                      plant("queue: {deadline: 3s}, ",
                            "{id: 32, name: press, poll: [{read: '400001', every: 2s}]}")),
@@ -83,9 +79,8 @@ TEST(Difference, TellsWhatALineHandsDownToItsStationsOnce) {
 
 TEST(Difference, OfAUnitOrALabelIsAddedOrRemovedWithItsValue) {
     const auto listener = [](const std::string& units) {
-        return "lines: [{name: a, device: sim, stations: [{id: 1}, {id: 2}]}]\nmodbus_tcp: "
-               "[{listen: "
-               "'127.0.0.1:502', units: {" +
+        return "lines: [{name: a, device: sim, stations: [{id: 1}, {id: 2}]}]\n"
+               "modbus_tcp: [{listen: '127.0.0.1:502', units: {" +
                units + "}}]\n";
     };
     EXPECT_THAT(told(listener("101: a/1, 102: a/1"), listener("102: a/2, 103: a/1")),
@@ -107,13 +102,12 @@ TEST(Difference, OfASecretIsToldAndNeverShown) {
 
 TEST(Difference, OfAProfileIsTold) {
     const std::string text =
-        "profiles_dir: /p\nlines: [{name: a, device: sim}]\nmodbus_tcp: [{listen: "
-        "'127.0.0.1:502'}]\n";
+        "profiles_dir: /p\nlines: [{name: a, device: sim}]\n"
+        "modbus_tcp: [{listen: '127.0.0.1:502'}]\n";
     const auto profile = [](const std::string& last) {
         return "description: d\nmanual: m\nstations: {first: 1, last: " + last +
                "}\nfunctions: [{code: 3}]\nareas: [{name: R, description: r, notation: {prefix: "
-               "R}, table: "
-               "holding-registers, readable: [0, 9], source: s}]\n";
+               "R}, table: holding-registers, readable: [0, 9], source: s}]\n";
     };
     const config::Config before =
         load(text, {{"/p/one.yaml", profile("9")}, {"/p/two.yaml", profile("9")}});
@@ -136,34 +130,6 @@ TEST(Difference, AsJsonHasPathKindAndBothValues) {
     const auto changes = differences(load(plant("", kPress)), load(plant("retries: 2, ", kPress)));
     EXPECT_EQ(boost::json::serialize(to_json(changes)),
               R"([{"path":"lines/floor1/retries","kind":"changed","before":"1","after":"2"}])");
-}
-
-std::string two_lines(const std::string& of_a, const std::string& listener) {
-    return "lines:\n  - {name: a, device: sim, " + of_a +
-           "stations: [{id: 1, name: one}]}\n"
-           "  - {name: b, device: sim, stations: [{id: 2, name: two}]}\n"
-           "modbus_tcp: [{listen: '127.0.0.1:1502', " +
-           listener + "}]\n";
-}
-
-TEST(MovedUnits, TellsThatUnitsOfARemovedLineNowReachTheOneThatIsLeft) {
-    const config::Config both = load(two_lines("", "lines: [a, b]"));
-    EXPECT_THAT(moved_units(both, load(two_lines("", "lines: [a]"))),
-                ElementsAre("unit 2 of 127.0.0.1:1502 was 'two' of line b and now goes to line a: "
-                            "a write to it may reach another panel; set unlisted_stations: refuse "
-                            "there, or inform its clients first"));
-    const std::string one =
-        "lines: [{name: a, device: sim, stations: [{id: 1, name: one}]}]\n"
-        "modbus_tcp: [{listen: '127.0.0.1:1502'}]\n";
-    EXPECT_EQ(moved_units(both, load(one)).size(), 1u) << "the line is gone altogether";
-}
-
-TEST(MovedUnits, IsSilentWhereTheyReachNobodyOrAreNamed) {
-    const config::Config both = load(two_lines("", "lines: [a, b]"));
-    EXPECT_THAT(moved_units(both, both), IsEmpty());
-    EXPECT_THAT(moved_units(both, load(two_lines("unlisted_stations: refuse, ", "lines: [a]"))),
-                IsEmpty());
-    EXPECT_THAT(moved_units(both, load(two_lines("", "lines: [a], units: {2: b/2}"))), IsEmpty());
 }
 
 }  // namespace

@@ -83,6 +83,8 @@ TEST_F(DiscoveriesTest, FindsAnUnlistedPanelAndSaysWhatToPaste) {
     EXPECT_EQ(told.state, State::done);
     EXPECT_EQ(told.asked, 13u);
     EXPECT_EQ(told.of, 13u);
+    EXPECT_EQ(told.asked_stations, "18-30");
+    EXPECT_EQ(told.silent_stations, "18-19,21-30");
     ASSERT_EQ(told.stations.size(), 1u);
     EXPECT_EQ(told.stations[0].id, 20);
     EXPECT_THAT(told.stations[0].profiles, ElementsAre("panasonic-gt"));

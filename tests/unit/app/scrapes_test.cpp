@@ -1,9 +1,10 @@
-#include "scrapes.hpp"
+#include "http_door.hpp"
 
 #include <gmock/gmock.h>
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -21,9 +22,11 @@ class ScrapesTest : public testing::Test {
     struct Client {
         std::optional<web::SharedText> got;
         std::string text() const { return got && *got ? **got : ""; }
+        bool is_refused() const { return got && *got == nullptr; }
     };
 
-    Scrapes& with(Scrapes::Settings settings) {
+    ScrapesTest() { with({}); }
+    void with(Scrapes::Settings settings) {
         const auto begin = [this] {
             ++copies;
             return [this, left = 4](metrics::Snapshot& into) mutable {
@@ -33,7 +36,6 @@ class ScrapesTest : public testing::Test {
             };
         };
         scrapes = std::make_unique<Scrapes>(io.get_executor(), begin, settings);
-        return *scrapes;
     }
     Client& ask(std::uint64_t caller, bool gzip = false) {
         clients.push_back(std::make_unique<Client>());
@@ -45,14 +47,17 @@ class ScrapesTest : public testing::Test {
         EXPECT_FALSE(client.got) << "answered from inside the call";
         return client;
     }
-    void run() {
-        io.restart();
-        io.run();
-    }
-    void run_until_copied(int count) {
+    /// The same, and some pieces are copied.
+    Client& ask_and_copy(std::uint64_t caller, int count) {
+        Client& client = ask(caller);
         io.restart();
         while (pieces < count && io.run_one() > 0) {
         }
+        return client;
+    }
+    void run() {
+        io.restart();
+        io.run();
     }
 
     boost::asio::io_context io{1};
@@ -63,7 +68,6 @@ class ScrapesTest : public testing::Test {
 };
 
 TEST_F(ScrapesTest, HandsOutTheTextOfAllFigures) {
-    with({});
     const Client& client = ask(1);
     run();
     EXPECT_EQ(pieces, 4);
@@ -72,7 +76,6 @@ TEST_F(ScrapesTest, HandsOutTheTextOfAllFigures) {
 }
 
 TEST_F(ScrapesTest, OthersHaveTheirTurnBetweenPieces) {
-    with({});
     ask(1);
     io.restart();
     std::vector<int> seen;
@@ -85,66 +88,40 @@ TEST_F(ScrapesTest, OthersHaveTheirTurnBetweenPieces) {
     run();
 }
 
-TEST_F(ScrapesTest, NobodyGetsFiguresThatAreOlderThanItsRequest) {
-    with({});
-    const Client& first = ask(1);
-    run_until_copied(1);
-    const Client& second = ask(2);
-    run();
-    EXPECT_THAT(first.text(), HasSubstr("copy1"));
-    EXPECT_THAT(second.text(), HasSubstr("copy2"));
-}
-
-TEST_F(ScrapesTest, ThoseWhoWaitShareTheNextText) {
-    with({});
-    ask(1);
-    run_until_copied(1);
+TEST_F(ScrapesTest, NobodyGetsFiguresOlderThanItsRequestAndThoseWhoWaitShareTheNextText) {
+    const Client& first = ask_and_copy(1, 1);
     const Client& second = ask(2);
     const Client& third = ask(3);
+    const Client& packed = ask(4, true);
     run();
     EXPECT_EQ(copies, 2);
+    EXPECT_THAT(first.text(), HasSubstr("copy1"));
+    EXPECT_THAT(second.text(), HasSubstr("copy2"));
     ASSERT_TRUE(second.got && third.got);
-    EXPECT_NE(*second.got, nullptr);
     EXPECT_EQ(*second.got, *third.got);
-}
-
-TEST_F(ScrapesTest, PacksTheTextForThoseWhoTakeIt) {
-    with({});
-    ask(1);
-    run_until_copied(1);
-    const Client& plain = ask(2);
-    const Client& packed = ask(3, true);
-    run();
-    EXPECT_EQ(copies, 2);
     EXPECT_THAT(packed.text(), testing::StartsWith("\x1f\x8b"));
-    EXPECT_LT(packed.text().size(), plain.text().size() / 2);
+    EXPECT_LT(packed.text().size(), second.text().size() / 2);
 }
 
 TEST_F(ScrapesTest, WhoLeavesIsHandedNothingAndNothingMoreIsMadeForIt) {
-    with({});
-    const Client& first = ask(1);
-    run_until_copied(2);
+    const Client& first = ask_and_copy(1, 2);
     scrapes->cancel(1);
     scrapes->cancel(99);
     const Client& second = ask(2);
     run();
-    ASSERT_TRUE(first.got);
-    EXPECT_EQ(*first.got, nullptr);
+    EXPECT_TRUE(first.is_refused());
     EXPECT_THAT(second.text(), HasSubstr("copy2"));
     EXPECT_EQ(pieces, 2 + 4);
 }
 
 TEST_F(ScrapesTest, WhoWaitsForTheNextTextMayLeave) {
-    with({});
-    const Client& first = ask(1);
-    run_until_copied(1);
+    const Client& first = ask_and_copy(1, 1);
     const Client& second = ask(2);
     scrapes->cancel(2);
     run();
     EXPECT_EQ(copies, 1);
     EXPECT_THAT(first.text(), HasSubstr("copy1"));
-    ASSERT_TRUE(second.got);
-    EXPECT_EQ(*second.got, nullptr);
+    EXPECT_TRUE(second.is_refused());
 }
 
 TEST_F(ScrapesTest, AQueueThatIsFullTakesNobodyElse) {
@@ -154,8 +131,7 @@ TEST_F(ScrapesTest, AQueueThatIsFullTakesNobodyElse) {
     const Client& third = ask(3);
     run();
     EXPECT_NE(second.text(), "");
-    ASSERT_TRUE(third.got);
-    EXPECT_EQ(*third.got, nullptr);
+    EXPECT_TRUE(third.is_refused());
 }
 
 TEST_F(ScrapesTest, TextsThatAreStillBeingSentAreBounded) {
@@ -164,7 +140,7 @@ TEST_F(ScrapesTest, TextsThatAreStillBeingSentAreBounded) {
     run();
     const Client& refused = ask(2);
     run();
-    EXPECT_EQ(*refused.got, nullptr);
+    EXPECT_TRUE(refused.is_refused());
     slow.got.reset();
     const Client& third = ask(3);
     run();
@@ -172,9 +148,7 @@ TEST_F(ScrapesTest, TextsThatAreStillBeingSentAreBounded) {
 }
 
 TEST_F(ScrapesTest, MayEndInTheMiddle) {
-    with({});
-    ask(1);
-    run_until_copied(4);
+    ask_and_copy(1, 4);
     scrapes.reset();
     run();
 }

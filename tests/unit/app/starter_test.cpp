@@ -2,22 +2,20 @@
 
 #include <gmock/gmock.h>
 
+#include <cstdint>
 #include <regex>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "panelgate/profile/load_profile.hpp"
 #include "unit/config/memory_files.hpp"
 
 namespace panelgate::app::starter_test {
 namespace {
 
+using config::load_valid;
 using testing::HasSubstr;
-
-config::Config load(const std::string& text) {
-    yaml::Problems problems("made.yaml");
-    auto config = config::load(text, config::MemoryFiles({}), problems);
-    EXPECT_TRUE(config) << problems.text() << text;
-    return std::move(config).value();
-}
 
 scan::StationFinding station(std::uint8_t id, std::vector<scan::Candidate> candidates) {
     scan::StationFinding found;
@@ -48,25 +46,21 @@ std::string starter(const scan::Result& result, const std::string& device = "/de
     return starter_yaml({device, "", result, kProfiles});
 }
 
-TEST(Starter, OfEachProfileIsAConfiguration) {
+TEST(Starter, OfEachProfileIsAConfigurationWithPointsThatOnlyNeedToBeUncommented) {
     const auto profiles = profile::Catalogue::shipped();
-    const config::Config config = load(starter(everything(profiles)));
+    const std::string text = starter(everything(profiles));
+    const config::Config config = load_valid(text);
     ASSERT_EQ(config.lines[0].stations.size(), profiles.all().size());
     EXPECT_EQ(config.lines[0].device.device, "/dev/ttyUSB0");
     EXPECT_EQ(to_string(config.lines[0].device.serial), "38400 8N1");
     EXPECT_EQ(config.lines[0].stations[1].name, "station-2");
     for (const config::Station& one : config.lines[0].stations)
         EXPECT_TRUE(profiles.find(one.profile->name) != nullptr);
-}
-
-TEST(Starter, HasExamplesOfPointsThatOnlyNeedToBeUncommented) {
-    const auto profiles = profile::Catalogue::shipped();
-    const std::string text = starter(everything(profiles));
     const std::string uncommented =
         std::regex_replace(text, std::regex("\n        # (points:|  - )"), "\n        $1");
     ASSERT_NE(uncommented, text);
-    const config::Config config = load(uncommented);
-    for (const config::Station& one : config.lines[0].stations)
+    const config::Config with_points = load_valid(uncommented);
+    for (const config::Station& one : with_points.lines[0].stations)
         EXPECT_FALSE(one.points.empty()) << one.profile->name;
 }
 
@@ -75,7 +69,7 @@ TEST(Starter, WhoAnsweredLateIsGivenMoreTime) {
     result.format = kFormat;
     result.stations = {station(5, {{"generic", "a"}}), station(6, {{"generic", "a"}})};
     result.stations[0].evidence.late = 1;
-    const config::Config config = load(starter(result));
+    const config::Config config = load_valid(starter(result));
     EXPECT_EQ(config.lines[0].arbiter.stations[0].response_timeout, 2s);
     EXPECT_EQ(config.lines[0].arbiter.stations[1].response_timeout, 500ms);
 }
@@ -86,7 +80,7 @@ TEST(Starter, OfARemoteLineSaysThatItsFormatIsSupposed) {
     result.format = kFormat;
     result.stations = {station(31, {{"autonics-gplp-s", "a"}, {"generic", "b"}})};
     const std::string text = starter(result, "tcp://10.0.0.7:4001");
-    EXPECT_EQ(load(text).lines[0].device.device, "tcp://10.0.0.7:4001");
+    EXPECT_EQ(load_valid(text).lines[0].device.device, "tcp://10.0.0.7:4001");
     EXPECT_THAT(text, HasSubstr("supposed from the panels"));
     EXPECT_THAT(text, HasSubstr("profile: autonics-gplp-s   # or generic\n"));
     EXPECT_THAT(text, HasSubstr("# Incomplete: the scan was interrupted.\n"));
@@ -97,7 +91,7 @@ TEST(Starter, LeavesOutWhoseRepliesCouldNotBeRead) {
     result.stations = {station(5, {}), station(6, {})};
     result.stations[1].evidence = {};
     const std::string text = starter(result);
-    const config::Config config = load(text);
+    const config::Config config = load_valid(text);
     ASSERT_EQ(config.lines[0].stations.size(), 1U);
     EXPECT_EQ(config.lines[0].stations[0].profile->name, "generic");
     EXPECT_THAT(text, HasSubstr("      # - {id: 6}"));
@@ -107,7 +101,7 @@ TEST(Starter, TakesAnyPathAsItIs) {
     scan::Result result;
     result.stations = {station(5, {})};
     const std::string path = "/dev/a \"b\\ ${HOME}";
-    EXPECT_EQ(load(starter(result, path)).lines[0].device.device, path);
+    EXPECT_EQ(load_valid(starter(result, path)).lines[0].device.device, path);
 }
 
 }  // namespace

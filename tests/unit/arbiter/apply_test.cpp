@@ -1,9 +1,13 @@
+// New settings for a running arbiter, and another line.
+#include <gtest/gtest.h>
+
+#include <cstddef>
+
 #include "arbiter_fixture.hpp"
 
 namespace panelgate::arbiter::apply_test {
 namespace {
 
-/// New settings for a running arbiter.
 class ApplyTest : public ArbiterTest {
   protected:
     StationSettings& station(std::size_t index) { return settings.stations[index]; }
@@ -15,24 +19,23 @@ TEST_F(ApplyTest, WhatWaitsIsAskedAndAnsweredAllTheSame) {
     station(1).response_timeout = 100ms;
     settings.queue.limit = 1;
     bus.apply(settings);
-    bus.run_to_end_of_request();
-    bus.hear_reply(17, kReply);
+    answer(bus, 17, kReply);
     EXPECT_TRUE(bus.answered(first));
-    ASSERT_TRUE(bus.next_sent());
-    bus.run_to_end_of_request();
-    bus.hear_reply(18, kReply);
+    answer_next(bus, 18, kReply);
     EXPECT_TRUE(bus.answered(second));
 }
 
 TEST_F(ApplyTest, TheNextRequestIsWaitedForAsTheNewSettingsSay) {
-    station(0).response_timeout = 50ms;
-    station(0).retries = 0;
+    station(0).response_timeout = settings.unlisted.response_timeout = 50ms;
+    station(0).retries = settings.unlisted.retries = 0;
+    settings.stations.pop_back();  // 18 is asked as the others
     bus.apply(settings);
-    const Ticket asked = bus.submit(17, kRead, 1);
-    bus.run_to_end_of_request();
-    bus.run_for(60ms);
-    EXPECT_TRUE(bus.answered(asked));
-    EXPECT_EQ(bus.answer(asked).pdu.error(), Fault::timeout);
+    for (const std::uint8_t station : Bytes{17, 18}) {
+        const Ticket asked = bus.submit(station, kRead, 1);
+        bus.run_for(100ms);
+        EXPECT_EQ(bus.answer(asked).pdu.error(), Fault::timeout);
+    }
+    EXPECT_FALSE(bus.arbiter().station_counters().contains(18));
 }
 
 TEST_F(ApplyTest, P1AShorterTimeoutEndsNoRestThatHasBegun) {
@@ -63,9 +66,7 @@ TEST_F(ApplyTest, P1OutstandingRepliesStayOutstandingOnAnotherWireToo) {
     bus.hear_reply(17, kReply);  // late, of the first
     bus.run_for(10ms);
     EXPECT_FALSE(bus.answered(next));
-    ASSERT_TRUE(bus.next_sent());
-    bus.run_to_end_of_request();
-    bus.hear_reply(17, reply_number(7));
+    answer_next(bus, 17, reply_number(7));
     EXPECT_EQ(bus.answer(next).pdu.value(), reply_number(7));
 }
 
@@ -74,8 +75,7 @@ TEST_F(ApplyTest, P3BetweenTwoLinesRequestsWaitForTheirTurn) {
     bus.arbiter().suspend();
     const Ticket second = bus.submit(18, read_at(2), 2);
     EXPECT_TRUE(bus.arbiter().is_waiting());
-    bus.run_to_end_of_request();
-    bus.hear_reply(17, kReply);
+    answer(bus, 17, kReply);
     EXPECT_TRUE(bus.answered(first));
     EXPECT_FALSE(bus.next_sent(100ms));
     bus.arbiter().on_line_left();
@@ -86,8 +86,7 @@ TEST_F(ApplyTest, P3BetweenTwoLinesRequestsWaitForTheirTurn) {
     bus.line_up();
     for (const Ticket ticket : {second, third}) {
         ASSERT_TRUE(bus.next_sent());
-        bus.run_to_end_of_request();
-        bus.hear_reply(bus.sent.back().adu[0], reply_number(ticket));
+        answer(bus, bus.sent.back().adu[0], reply_number(ticket));
         EXPECT_TRUE(bus.answered(ticket));
     }
 }
@@ -97,7 +96,6 @@ TEST_F(ApplyTest, P7JobsForALineThatDoesNotOpenAreAnsweredSo) {
     const Ticket waits = bus.submit(17, kRead, 1);
     bus.arbiter().on_line_left();
     bus.line_down();
-    ASSERT_TRUE(bus.answered(waits));
     EXPECT_EQ(bus.answer(waits).pdu.error(), Fault::line_down);
     EXPECT_EQ(bus.try_submit(17, kRead).error(), Fault::line_down);
 }
@@ -115,8 +113,7 @@ TEST_F(ApplyTest, P1AWireThatAnotherMasterHasUsedRestsWhileItsRepliesAreOutstand
     other.arbiter().rest_until(clear);
     other.line_up();
     other.submit(18, kRead, 1);
-    ASSERT_TRUE(other.next_sent());
-    EXPECT_GE(other.sent.back().at, clear);
+    EXPECT_GE(other.next_sent().value().at, clear);
 }
 
 TEST_F(ApplyTest, P1TheTurnaroundOfABroadcastHoldsOnAnotherLineToo) {
@@ -130,8 +127,7 @@ TEST_F(ApplyTest, P1TheTurnaroundOfABroadcastHoldsOnAnotherLineToo) {
     script.arbiter().on_line_left();
     script.line_up();
     script.submit(17, kRead, 1);
-    ASSERT_TRUE(script.next_sent());
-    EXPECT_GE(script.sent.back().at, sent + 800ms);
+    EXPECT_GE(script.next_sent().value().at, sent + 800ms);
 }
 
 TEST_F(ApplyTest, P2AWriteThatHasBegunIsRepeatedOnlyIfThatWasAllowedThen) {
@@ -144,22 +140,9 @@ TEST_F(ApplyTest, P2AWriteThatHasBegunIsRepeatedOnlyIfThatWasAllowedThen) {
     EXPECT_EQ(bus.sent.size(), 1u);
 }
 
-TEST_F(ApplyTest, AStationThatIsListedNoLongerIsAskedAsTheOthers) {
-    settings.stations.pop_back();
-    settings.unlisted.response_timeout = 50ms;
-    settings.unlisted.retries = 0;
-    bus.apply(settings);
-    const Ticket asked = bus.submit(18, kRead, 1);
-    bus.run_to_end_of_request();
-    bus.run_for(60ms);
-    EXPECT_TRUE(bus.answered(asked));
-    EXPECT_FALSE(bus.arbiter().station_counters().contains(18));
-}
-
 TEST_F(ApplyTest, WhatWasCountedOfAStationStays) {
     bus.submit(17, kRead, 1);
-    bus.run_to_end_of_request();
-    bus.hear_reply(17, kReply);
+    answer(bus, 17, kReply);
     const auto before = bus.arbiter().station_counters().at(17).symptoms.answered;
     ASSERT_EQ(before, 1u);
     station(0).retries = 3;

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cstddef>
+#include <cstdint>
 
+#include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
@@ -38,9 +40,52 @@ inline Settings settings_38400() {
     return settings;
 }
 
+/// The station answers so long after the request sent last has left.
+inline void answer(BusScript& bus, std::uint8_t station, ByteView pdu, Duration after = {}) {
+    bus.run_to_end_of_request();
+    bus.run_for(after);
+    bus.hear_reply(station, pdu);
+}
+
+/// The next request is sent, and the station answers it.
+inline void answer_next(BusScript& bus, std::uint8_t station, ByteView pdu, Duration after = {}) {
+    ASSERT_TRUE(bus.next_sent());
+    answer(bus, station, pdu, after);
+}
+
+/// It is answered at this instant and not before.
+inline void expect_answer_at(BusScript& bus, Ticket ticket, TimePoint at) {
+    bus.run_until(at - 1us);
+    EXPECT_FALSE(bus.answered(ticket));
+    bus.run_until(at);
+    EXPECT_TRUE(bus.answered(ticket));
+}
+
+/// P1: a late reply of the same shape answers no request and ends the rest.
+inline void expect_no_answer_by_a_late_reply(Settings settings) {
+    settings.stations[0].retries = 0;
+    BusScript bus{settings};
+    const Ticket first = bus.submit(17, read_at(1), 1);
+    const Ticket second = bus.submit(17, read_at(2), 2);
+    while (!bus.answered(first)) bus.run_for(1ms);
+    bus.run_for(300ms);
+    bus.hear_reply(17, kReply);  // of the first: same station, function and length
+    bus.run_for(100ms);
+    EXPECT_FALSE(bus.answered(second));
+    ASSERT_EQ(bus.events.size(), 1u);
+    EXPECT_EQ(bus.events[0].kind, StationEvent::Kind::late);
+    ASSERT_EQ(bus.sent.size(), 2u);
+    bus.hear_reply(17, reply_number(2));
+    EXPECT_EQ(bus.answer(second).pdu.value(), reply_number(2));
+}
+
 /// The arbiter of a line with the stations 17 and 18.
 class ArbiterTest : public testing::Test {
   protected:
+    const StationCounters& counters(std::uint8_t station = 17) {
+        return bus.arbiter().station_counters().at(station);
+    }
+
     Settings settings = settings_38400();
     BusScript bus{settings};
     Duration gap = silent_interval(settings.serial);

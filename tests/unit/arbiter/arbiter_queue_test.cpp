@@ -1,12 +1,102 @@
-// Order of the queue (P9).
+// From a request's arrival to its turn: admission, order (P9), shared reads and memory (P6).
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "arbiter_fixture.hpp"
+#include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "support/hex.hpp"
+#include "support/read_span.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::arbiter::arbiter_queue_test {
 namespace {
+
+using modbus::encode_adu;
+
+constexpr TimePoint kNow{1h};
+
+Job job_of(const Bytes& pdu, std::uint8_t station = 17) {
+    return {.station = station, .request = test::request_of(pdu)};
+}
+
+class AdmissionTest : public testing::Test {
+  protected:
+    AdmissionTest() { admission_.memory().store(*test::read_span(17, kRead), kReply, kNow); }
+    Admission admission_{Settings{}};
+};
+
+TEST_F(AdmissionTest, TicketsAreNeverUsedTwiceAlsoNotForAnswersFromMemory) {
+    Ticket last = 0;
+    for (int i = 0; i < 10; ++i) {
+        Job job = job_of(kRead);
+        admission_.stamp(kNow, job);
+        EXPECT_GT(job.ticket, last);
+        const auto hit = admission_.from_memory(kNow, job, 1s);
+        ASSERT_TRUE(hit);
+        EXPECT_GT(hit->ticket, job.ticket);
+        last = hit->ticket;
+    }
+}
+
+TEST_F(AdmissionTest, P3TheDeadlineCountsFromTheArrivalAndIsEarlierForAClientThatWaitsForLess) {
+    Settings settings;
+    settings.queue.deadline = 700ms;
+    Admission admission(settings);
+    for (const Duration within : {job_of(kRead).within, Duration(300ms), Duration(1h)}) {
+        Job job = job_of(kRead);
+        job.within = within;
+        admission.stamp(kNow, job);
+        EXPECT_EQ(job.arrived, kNow);
+        EXPECT_EQ(job.deadline, kNow + std::min<Duration>(within, 700ms));
+    }
+}
+
+TEST_F(AdmissionTest, P3WhatStartsAtTheLastMomentCanStillBeAnsweredByItsNormalReply) {
+    const Bytes write = Writer().u8(0x10).u16(0).u16(100).u8(200).raw(Bytes(200)).take();
+    struct Row {
+        int baud;
+        std::uint8_t station;
+        Bytes pdu;
+        std::size_t reply;  ///< bytes, address to CRC
+    };
+    const Row rows[] = {
+        {1200, 17, kRead, 11},
+        {9600, 17, kRead, 11},
+        {115200, 17, kRead, 11},
+        {9600, 17, "03 00 00 00 64"_hex, 205},
+        {9600, 17, write, 8},
+        {9600, 17, "11"_hex, 5},             // of unknown length: room for the shortest
+        {9600, 0, "06 00 6B 00 01"_hex, 0},  // a broadcast only has to leave
+    };
+    for (const Row& row : rows) {
+        Settings settings;
+        settings.serial.baud = row.baud;
+        Job job = job_of(row.pdu, row.station);
+        Admission(settings).stamp(kNow, job);
+        const Duration frames = wire_time(settings.serial, row.pdu.size() + 3 + row.reply);
+        const Duration gap = row.reply == 0 ? 0ms : silent_interval(settings.serial);
+        EXPECT_GE(job.deadline - job.start_by, frames + gap) << to_hex(row.pdu);
+        EXPECT_LE(job.deadline - job.start_by, frames + gap + 1us) << to_hex(row.pdu);
+    }
+}
+
+TEST_F(AdmissionTest, P6MemoryAnswersOnlyReadsOfClientsAndWhereTheStationAllowsIt) {
+    Job job = job_of(kRead);
+    const auto hit = admission_.from_memory(kNow + 1s, job, 1s);
+    ASSERT_TRUE(hit);
+    EXPECT_EQ(hit->hit.pdu, kReply);
+    EXPECT_EQ(hit->hit.age, Duration(1s));
+    EXPECT_FALSE(admission_.from_memory(kNow, job, 0s));
+    EXPECT_FALSE(admission_.from_memory(kNow, job_of("06 00 6B 00 01"_hex), 1s));
+    EXPECT_FALSE(admission_.from_memory(kNow, job_of(kRead, 18), 1s));
+    job.priority = PriorityClass::poll;
+    EXPECT_FALSE(admission_.from_memory(kNow, job, 1s));
+}
 
 TEST_F(ArbiterTest, P9WhatHasWaitedLongGoesAheadButAWriteStartsWithinTwoTransactions) {
     settings.queue.deadline = 60s;
@@ -16,36 +106,20 @@ TEST_F(ArbiterTest, P9WhatHasWaitedLongGoesAheadButAWriteStartsWithinTwoTransact
     for (unsigned i = 0; i < 200 && !script.answered(poll); ++i) {
         if (i % 2 == 0) script.submit(17, read_at(2 + i), 2);
         if (script.arbiter().queue_depth() < 8) script.submit(17, kWrite, 3, PriorityClass::write);
-        script.run_to_end_of_request();
-        script.run_for(10ms);
-        const Bytes request(script.sent.back().adu.begin() + 1, script.sent.back().adu.end() - 2);
-        script.hear_reply(script.sent.back().adu[0], request[0] == 6 ? request : kReply);
+        const Bytes adu = script.sent.back().adu;
+        const Bytes request(adu.begin() + 1, adu.end() - 2);
+        answer(script, adu[0], request[0] == 6 ? request : kReply, 10ms);
         ASSERT_TRUE(script.next_sent());
     }
     EXPECT_TRUE(script.answered(poll));
-}
-
-TEST_F(ArbiterTest, ClientsTakeTurns) {
-    bus.submit(18, read_at(9), 9);  // keeps the line busy while the others queue
-    for (unsigned i = 0; i < 3; ++i) bus.submit(17, read_at(i), 1);
-    bus.submit(18, kRead, 2);
-    std::vector<int> order;
-    while (order.size() < 4) {
-        bus.run_to_end_of_request();
-        bus.hear_reply(bus.sent.back().adu[0], reply_number(order.size()));
-        ASSERT_TRUE(bus.next_sent());
-        order.push_back(bus.sent.back().adu[0]);
-    }
-    EXPECT_EQ(order, (std::vector<int>{17, 18, 17, 17}));
 }
 
 TEST_F(ArbiterTest, P9WritesGoBeforeReadsOfOtherClients) {
     bus.submit(17, kRead, 1);
     bus.submit(17, kRead, 2);
     bus.submit(18, kWrite, 3, PriorityClass::write);
-    bus.run_to_end_of_request();
-    bus.hear_reply(17, kReply);
-    EXPECT_EQ(bus.next_sent()->adu[1], 0x06);
+    answer(bus, 17, kReply);
+    EXPECT_EQ(bus.next_sent().value().adu[1], 0x06);
 }
 
 TEST_F(ArbiterTest, P9RefusesAtOnceWhenAQueueIsFull) {
@@ -64,6 +138,169 @@ TEST_F(ArbiterTest, P9RefusesAtOnceWhenAQueueIsFull) {
     EXPECT_EQ(script.answers.begin()->second.pdu.error(), Fault::busy);
     EXPECT_EQ(script.try_submit(17, read_at(8), 3).error(), Fault::busy);
     EXPECT_EQ(script.arbiter().queue_depth(), 4u);
+}
+
+/// The line is busy with station 18 while requests to station 17 queue.
+class ArbiterSharingTest : public ArbiterTest {
+  protected:
+    ArbiterSharingTest() { bus.submit(18, kRead, 99); }
+    /// Station 18 answers; returns the next request.
+    Bytes next() {
+        answer(bus, 18, kReply);
+        return bus.next_sent().value().adu;
+    }
+    Bytes value(Ticket ticket) const { return bus.answer(ticket).pdu.value(); }
+};
+
+TEST_F(ArbiterSharingTest, P6IdenticalReadsShareOneTransaction) {
+    std::vector<Ticket> tickets;
+    for (Client client = 1; client <= 8; ++client) tickets.push_back(bus.submit(17, kRead, client));
+    next();
+    answer(bus, 17, kReply);
+    for (const Ticket ticket : tickets) EXPECT_EQ(value(ticket), kReply);
+    bus.run_for(5s);
+    EXPECT_EQ(bus.sent.size(), 2u);
+}
+
+TEST_F(ArbiterTest, P6OneMayJoinWhileTheRequestLeavesButNotLater) {
+    settings.paced = true;
+    BusScript uart{settings};
+    uart.submit(17, kRead, 1);
+    uart.run_for(1ms);
+    const Ticket joined = uart.submit(17, kRead, 2);
+    uart.run_to_end_of_request();
+    const Ticket late = uart.submit(17, kRead, 3);
+    uart.run_for(3ms);
+    uart.hear_reply(17, kReply);
+    EXPECT_TRUE(uart.answered(joined));
+    EXPECT_FALSE(uart.answered(late)) << "its value would have been sampled before it asked";
+    EXPECT_TRUE(uart.next_sent());
+}
+
+TEST_F(ArbiterTest, P6NoReadJoinsWhatAFarEndMayHaveAlready) {
+    bus.submit(17, kRead, 1);
+    const Ticket late = bus.submit(17, kRead, 2);
+    bus.hear_reply(17, kReply);
+    EXPECT_FALSE(bus.answered(late)) << "the far end of a tcp line has the request at once";
+}
+
+TEST_F(ArbiterSharingTest, P6TouchingReadsAreJoinedAndContainedOnesSliced) {
+    const Ticket a = bus.submit(17, "03 00 0A 00 02"_hex, 1);
+    const Ticket b = bus.submit(17, "03 00 0C 00 01"_hex, 2);
+    const Ticket c = bus.submit(17, "03 00 0B 00 01"_hex, 3);
+    const Ticket apart = bus.submit(17, "03 00 0E 00 01"_hex, 4);
+    EXPECT_EQ(next(), encode_adu(17, "03 00 0A 00 03"_hex));
+    answer(bus, 17, "03 06 00 01 00 02 00 03"_hex);
+    EXPECT_EQ(value(a), "03 04 00 01 00 02"_hex);
+    EXPECT_EQ(value(b), "03 02 00 03"_hex);
+    EXPECT_EQ(value(c), "03 02 00 02"_hex);
+    EXPECT_FALSE(bus.answered(apart));
+}
+
+TEST_F(ArbiterSharingTest, P6BitsAreSlicedToo) {
+    const Ticket a = bus.submit(17, "01 00 03 00 0A"_hex, 1);
+    const Ticket b = bus.submit(17, "01 00 0D 00 05"_hex, 2);
+    next();
+    answer(bus, 17, "01 02 CD 6B"_hex);  // bits 3..17, the sixteenth is padding
+    EXPECT_EQ(value(a), "01 02 CD 03"_hex);
+    EXPECT_EQ(value(b), "01 01 1A"_hex);
+}
+
+TEST_F(ArbiterSharingTest, P6AJoinThatThePanelRefusesIsSplitAndRemembered) {
+    const Ticket a = bus.submit(17, "03 00 0A 00 02"_hex, 1);
+    const Ticket b = bus.submit(17, "03 00 0C 00 02"_hex, 2);
+    next();
+    answer(bus, 17, "83 02"_hex);
+    EXPECT_FALSE(bus.answered(a));
+    for (int i = 0; i < 2; ++i) {
+        ASSERT_TRUE(bus.next_sent());
+        const bool first_half = bus.sent.back().adu[3] == 0x0A;
+        answer(bus, 17, first_half ? "03 04 00 01 00 02"_hex : "83 02"_hex);
+    }
+    EXPECT_EQ(value(a), "03 04 00 01 00 02"_hex);
+    EXPECT_EQ(value(b), "83 02"_hex);
+    bus.submit(18, kRead, 99);
+    bus.submit(17, "03 00 0A 00 02"_hex, 1);
+    bus.submit(17, "03 00 0C 00 02"_hex, 2);
+    ASSERT_TRUE(bus.sent.back().adu[0] == 18 || bus.next_sent());
+    EXPECT_EQ(next(), encode_adu(17, "03 00 0A 00 02"_hex));
+}
+
+TEST_F(ArbiterSharingTest, P6AClientNeverReadsOlderThanItsOwnWrite) {
+    const Ticket others = bus.submit(17, kRead, 1);
+    bus.submit(17, "06 00 6B 00 07"_hex, 2, PriorityClass::write);
+    const Ticket own = bus.submit(17, kRead, 2);
+    ASSERT_EQ(next()[1], 6);
+    answer(bus, 17, "06 00 6B 00 07"_hex);
+    answer_next(bus, 17, kReply);
+    EXPECT_TRUE(bus.answered(others));
+    EXPECT_TRUE(bus.answered(own)) << "after the write it may share";
+    EXPECT_EQ(bus.sent.size(), 3u);
+}
+
+TEST_F(ArbiterTest, P9TheTimeOfASharedTransactionIsSharedOut) {
+    settings.paced = true;
+    BusScript uart{settings};
+    uart.submit(17, kRead, 1);
+    uart.submit(17, kRead, 2);  // joins
+    answer(uart, 17, kReply, 3ms);
+    uart.run_for(3ms);
+    uart.submit(17, kRead, 3);
+    answer(uart, 17, kReply, 3ms);
+    const auto& shares = uart.arbiter().shares().all();
+    ASSERT_EQ(shares.size(), 3u);
+    EXPECT_EQ(shares.at(1).busy, shares.at(2).busy);
+    EXPECT_EQ(shares.at(3).busy / 2, shares.at(1).busy);
+    uart.cancel(3);
+    EXPECT_EQ(uart.arbiter().shares().all().size(), 2u);
+}
+
+/// Values of station 17 may be so old, and it was polled.
+class ArbiterMemoryTest : public ArbiterTest {
+  protected:
+    void poll(Duration max_age) {
+        settings.stations[0].max_age = max_age;
+        bus.apply(settings);
+        bus.submit(17, kRead, 9, PriorityClass::poll);
+        answer(bus, 17, kReply, 3ms);
+        bus.run_for(3ms);
+    }
+};
+
+TEST_F(ArbiterMemoryTest, P6MemoryAnswersAClientButNeverAPoll) {
+    poll(1s);
+    const Ticket cached = bus.submit(17, kRead, 1);
+    EXPECT_EQ(bus.answer(cached).pdu.value(), kReply);
+    EXPECT_FALSE(bus.answer(cached).transmitted);
+    EXPECT_EQ(bus.sent.size(), 1u);
+    bus.submit(17, kRead, 9, PriorityClass::poll);
+    EXPECT_EQ(bus.sent.size(), 2u);
+    answer(bus, 17, kReply, 3ms);
+    bus.run_for(1s);
+    bus.submit(17, kRead, 1);
+    EXPECT_EQ(bus.sent.size(), 3u) << "too old";
+}
+
+TEST_F(ArbiterMemoryTest, P6AClientNeverReadsOlderThanItsOwnWriteAlsoOneThatTimedOut) {
+    poll(1min);
+    const Ticket write = bus.submit(17, "06 00 6B 00 05"_hex, 1);
+    const Ticket read = bus.submit(17, kRead, 1);
+    EXPECT_FALSE(bus.answered(read)) << "its own write is still open";
+    bus.run_for(490ms);  // silence; the timeout is 500 ms
+    EXPECT_FALSE(bus.answered(write));
+    ASSERT_TRUE(bus.next_sent(1s));
+    ASSERT_TRUE(bus.answered(write));
+    EXPECT_FALSE(bus.answered(read)) << "and what was known is forgotten";
+    ASSERT_EQ(bus.sent.size(), 3u);
+    EXPECT_EQ(bus.sent.back().adu[1], 3);
+}
+
+TEST_F(ArbiterMemoryTest, IsEmptyAfterTheLineWasLost) {
+    poll(1min);
+    bus.line_down();
+    bus.line_up();
+    bus.run_for(10ms);
+    EXPECT_FALSE(bus.answered(bus.submit(17, kRead, 1)));
 }
 
 }  // namespace

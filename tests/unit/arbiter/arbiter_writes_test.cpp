@@ -1,15 +1,33 @@
 // Writes, broadcasts and deadlines (P2, P3): nothing is sent twice, or without a client.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <optional>
 #include <variant>
+#include <vector>
 
 #include "arbiter_fixture.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 #include "support/request.hpp"
 
 namespace panelgate::arbiter::arbiter_writes_test {
 namespace {
+
+const Bytes kToAll = "10 00 64 00 02 04 00 0A 01 02"_hex;
+const Bytes kToOne = "10 00 64 00 02 04 00 0B 00 00"_hex;
+const Bytes kElsewhere = "10 00 68 00 02 04 00 0B 00 00"_hex;
+const Bytes kConfirmed = "10 00 64 00 02"_hex;
+
+/// The answers that this arbiter gives now.
+std::vector<Finish> finished(Arbiter& arbiter) {
+    std::vector<Finish> all;
+    while (auto action = arbiter.poll_action()) {
+        if (const auto* finish = std::get_if<Finish>(&*action)) all.push_back(*finish);
+    }
+    return all;
+}
 
 TEST_F(ArbiterTest, P2NeverRepeatsAWrite) {
     for (const Bytes& write :
@@ -34,10 +52,9 @@ TEST_F(ArbiterTest, RepeatsAWriteWhenTheStationAllowsIt) {
 
 TEST_F(ArbiterTest, P6ReportsWhatAWriteTouchesWhenItLeavesAndWhenItsAttemptIsOver) {
     bus.submit(17, kRead);
-    bus.run_to_end_of_request();
-    bus.hear_reply(17, kReply);
+    answer(bus, 17, kReply);
     EXPECT_TRUE(bus.written.empty()) << "a read";
-    bus.submit(17, "10 00 64 00 02 04 00 0A 01 02"_hex);
+    bus.submit(17, kToAll);
     ASSERT_TRUE(bus.next_sent());
     ASSERT_EQ(bus.written.size(), 1u);
     EXPECT_EQ(bus.written[0].station, 17);
@@ -55,17 +72,25 @@ TEST_F(ArbiterTest, P6ReportsWhatAWriteTouchesWhenItLeavesAndWhenItsAttemptIsOve
     EXPECT_FALSE(bus.written.back().items) << "nobody knows what it does";
 }
 
-TEST_F(ArbiterTest, BroadcastIsAnsweredWhenItHasLeftAndTheLineRestsForTheTurnaround) {
-    const Ticket broadcast = bus.submit(0, kWrite, 1, PriorityClass::write);
-    bus.submit(17, kRead, 2);
-    const TimePoint end = bus.now() + wire_time(settings.serial, 8);
-    bus.run_until(end);
-    ASSERT_TRUE(bus.answered(broadcast));
-    EXPECT_EQ(bus.answer(broadcast).pdu.value(), kWrite);
-    const auto next = bus.next_sent();
-    ASSERT_TRUE(next);
-    EXPECT_EQ(next->at - end, 100ms);
-    EXPECT_EQ(bus.arbiter().counters().broadcasts, 1u);
+TEST_F(ArbiterTest, ABroadcastIsAnsweredWhenItHasLeftAndTheLineRestsForTheTurnaround) {
+    struct Row {
+        Bytes pdu;
+        Bytes confirmed;
+    };
+    const Row rows[] = {
+        {kWrite, kWrite},
+        {kToAll, kConfirmed},  // several items: address and quantity
+    };
+    for (const Row& row : rows) {
+        BusScript script{settings};
+        const Ticket broadcast = script.submit(0, row.pdu, 1, PriorityClass::write);
+        script.submit(17, kRead, 2);
+        script.run_to_end_of_request();
+        EXPECT_EQ(script.answer(broadcast).pdu.value(), row.confirmed);
+        const TimePoint end = script.now();
+        EXPECT_EQ(script.next_sent().value().at - end, 100ms);
+        EXPECT_EQ(script.arbiter().counters().broadcasts, 1u);
+    }
 }
 
 TEST_F(ArbiterTest, P3ABroadcastIsNotConfirmedBehindItsDeadlineWhenTheProcessStoodStill) {
@@ -78,29 +103,15 @@ TEST_F(ArbiterTest, P3ABroadcastIsNotConfirmedBehindItsDeadlineWhenTheProcessSto
     arbiter.on_deadline(free);
     ASSERT_TRUE(arbiter.submit(free, job));
     arbiter.on_deadline(free + settings.queue.deadline + 1s);
-    int answers = 0;
-    while (auto action = arbiter.poll_action()) {
-        const auto* finish = std::get_if<Finish>(&*action);
-        if (finish == nullptr) continue;
-        ++answers;
-        EXPECT_EQ(finish->pdu.error(), Fault::timeout);
-    }
-    EXPECT_EQ(answers, 1);
-}
-
-TEST_F(ArbiterTest, BroadcastOfSeveralIsAnsweredWithAddressAndQuantity) {
-    const Ticket ticket = bus.submit(0, "10 00 64 00 02 04 00 0A 01 02"_hex);
-    bus.run_for(1s);
-    EXPECT_EQ(bus.sent.size(), 1u);
-    EXPECT_EQ(bus.answer(ticket).pdu.value(), "10 00 64 00 02"_hex);
+    const auto answers = finished(arbiter);
+    ASSERT_EQ(answers.size(), 1u);
+    EXPECT_EQ(answers[0].pdu.error(), Fault::timeout);
 }
 
 TEST_F(ArbiterTest, AReplyToABroadcastIsCountedAndGivenToNoClient) {
     const Ticket broadcast = bus.submit(0, kWrite);
     const Ticket read = bus.submit(17, kRead, 2);
-    bus.run_to_end_of_request();
-    bus.run_for(10ms);
-    bus.hear_reply(17, kReply);
+    answer(bus, 17, kReply, 10ms);
     EXPECT_TRUE(bus.answered(broadcast));
     EXPECT_FALSE(bus.answered(read));
 }
@@ -111,40 +122,28 @@ TEST_F(ArbiterTest, P2AWriteIsConfirmedByAPanelWhoseClockIsFast) {
     const Bytes confirmation = "10 00 64 00 7B"_hex;
     for (int i = 0; i < 3; ++i) {
         bus.submit(17, write);
-        bus.run_to_end_of_request();
-        bus.run_for(3ms);
-        bus.hear_reply(17, confirmation);
+        answer(bus, 17, confirmation, 3ms);
         bus.run_for(10ms);
     }
     const Ticket ticket = bus.submit(17, write);
     bus.run_for(wire_time(settings.serial, 255) * 99 / 100);
     bus.hear_reply(17, confirmation);
     bus.run_for(100ms);
-    ASSERT_TRUE(bus.answered(ticket));
     EXPECT_EQ(bus.answer(ticket).pdu.value(), confirmation);
 }
 
 /// The reply repeats another one, so it is kept as a candidate; meanwhile the process is stopped.
 TEST_F(ArbiterTest, P3ACandidateIsNotGivenToClientsItIsTooLateFor) {
     bus.submit(17, read_at(1));
-    bus.run_to_end_of_request();
-    bus.run_for(3ms);
-    bus.hear_reply(17, kReply);
+    answer(bus, 17, kReply, 3ms);
     const Ticket second = bus.submit(17, read_at(2));
-    ASSERT_TRUE(bus.next_sent());
-    bus.run_to_end_of_request();
-    bus.run_for(3ms);
-    bus.hear_reply(17, kReply);
+    answer_next(bus, 17, kReply, 3ms);
     ASSERT_FALSE(bus.answered(second));
     bus.arbiter().on_deadline(bus.now() + settings.queue.deadline);
-    std::optional<Finish> answer;
-    while (auto action = bus.arbiter().poll_action()) {
-        if (const auto* finish = std::get_if<Finish>(&*action)) answer = *finish;
-    }
-    ASSERT_TRUE(answer);
-    EXPECT_EQ(answer->ticket, second);
-    ASSERT_FALSE(answer->pdu);
-    EXPECT_EQ(answer->pdu.error(), Fault::timeout);
+    const auto answers = finished(bus.arbiter());
+    ASSERT_EQ(answers.size(), 1u);
+    EXPECT_EQ(answers[0].ticket, second);
+    EXPECT_EQ(answers[0].pdu.error(), Fault::timeout);
 }
 
 TEST_F(ArbiterTest, P3ExpiresWhatCannotFinishBeforeItsDeadlineWithoutTouchingTheWire) {
@@ -169,11 +168,105 @@ TEST_F(ArbiterTest, P2ACancelledClientsQueueNeverReachesTheWire) {
     bus.cancel(1);
     EXPECT_EQ(bus.answer(queued).pdu.error(), Fault::cancelled);
     EXPECT_FALSE(bus.answer(queued).transmitted);
-    bus.run_to_end_of_request();
-    bus.hear_reply(17, kReply);
+    answer(bus, 17, kReply);
     EXPECT_EQ(bus.answer(on_wire).pdu.value(), kReply);
     bus.run_for(5s);
     EXPECT_EQ(bus.sent.size(), 1u);
+}
+
+/// What the replies of a panel that wrongly answers broadcasts may be taken for (P8).
+class ArbiterBehindABroadcast : public ArbiterTest {
+  protected:
+    /// Station 17 has needed so long for its answers.
+    static void teach(BusScript& script, Duration think) {
+        script.submit(17, kRead);
+        answer(script, 17, kReply, think);
+        script.run_for(1s);
+    }
+    /// When its last bit has left.
+    static TimePoint broadcast(BusScript& script) {
+        script.submit(0, kToAll, 1, PriorityClass::write);
+        script.run_to_end_of_request();
+        return script.now();
+    }
+    static std::optional<TimePoint> sent(BusScript& script, std::uint8_t station, const Bytes& pdu,
+                                         TimePoint until) {
+        script.run_until(until);
+        const Bytes adu = modbus::encode_adu(station, pdu);
+        const auto found = std::ranges::find(script.sent, adu, &BusScript::Sent::adu);
+        return found == script.sent.end() ? std::nullopt : std::optional(found->at);
+    }
+};
+
+TEST_F(ArbiterBehindABroadcast, P8ALateReplyToItConfirmsNoWrite) {
+    teach(bus, 150ms);
+    const TimePoint left = broadcast(bus);
+    const Ticket write = bus.submit(17, kToOne, 2, PriorityClass::write);
+    bus.run_until(left + 150ms);
+    bus.hear_reply(17, kConfirmed);
+    EXPECT_FALSE(bus.answered(write));
+    EXPECT_TRUE(sent(bus, 17, kToOne, left + 1500ms));
+}
+
+TEST_F(ArbiterBehindABroadcast, SuchAWriteGoesWhenItsStationHasHadAllTheTimeThatItEverNeeded) {
+    for (const bool lost : {false, true}) {
+        BusScript script{settings};
+        teach(script, 150ms);
+        script.submit(0, kToAll, 1, PriorityClass::write);
+        const TimePoint left = script.now() + wire_time(settings.serial, kToAll.size() + 3);
+        script.run_until(lost ? left - 100us : left);
+        if (lost) {  // under the broadcast, which changes nothing
+            script.line_down();
+            script.line_up();
+        }
+        script.submit(17, kToOne, 2, PriorityClass::write);
+        const auto at = sent(script, 17, kToOne, left + 1s);
+        ASSERT_TRUE(at);
+        EXPECT_GT(*at, left + 150ms);
+        if (!lost) EXPECT_LT(*at, left + 300ms);
+    }
+}
+
+TEST_F(ArbiterBehindABroadcast, WhatItsReplyCannotConfirmGoesAtTheTurnaround) {
+    struct Row {
+        Duration think;  ///< of station 17 before; 0: it was never heard
+        std::uint8_t station;
+        Bytes write;
+        Duration later;  ///< than the broadcast's last bit
+    };
+    const Duration turnaround = settings.broadcast_turnaround;
+    const Row rows[] = {
+        {150ms, 17, kElsewhere, turnaround},                    // confirmed in other words
+        {20ms, 17, kToOne, turnaround},                         // of a quick panel
+        {0ms, 0, kToOne, turnaround},                           // another broadcast
+        {0ms, 17, kToOne, settings.unlisted.response_timeout},  // never heard
+    };
+    for (const Row& row : rows) {
+        BusScript script{settings};
+        if (row.think > 0ms) teach(script, row.think);
+        const TimePoint left = broadcast(script);
+        script.submit(row.station, row.write, 2, PriorityClass::write);
+        EXPECT_EQ(sent(script, row.station, row.write, left + 1s), left + row.later);
+    }
+}
+
+TEST_F(ArbiterBehindABroadcast, OthersGoMeanwhile) {
+    teach(bus, 150ms);
+    const TimePoint left = broadcast(bus);
+    bus.submit(17, kToOne, 2, PriorityClass::write);
+    bus.submit(17, read_at(7), 3);
+    EXPECT_EQ(sent(bus, 17, read_at(7), left + 110ms), left + settings.broadcast_turnaround);
+}
+
+TEST_F(ArbiterBehindABroadcast, AStationThatHasAnsweredOneIsWaitedForAsForAnyOutstandingReply) {
+    teach(bus, 20ms);
+    broadcast(bus);
+    bus.run_for(20ms);
+    bus.hear_reply(17, kConfirmed);
+    bus.run_for(1s);
+    const TimePoint left = broadcast(bus);
+    bus.submit(17, kToOne, 2, PriorityClass::write);
+    EXPECT_EQ(sent(bus, 17, kToOne, left + 1900ms), left + 2 * settings.unlisted.response_timeout);
 }
 
 }  // namespace

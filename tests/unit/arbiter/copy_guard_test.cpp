@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/copy_guard.hpp"
+#include "panelgate/arbiter/outstanding.hpp"
 
 #include <gtest/gtest.h>
 

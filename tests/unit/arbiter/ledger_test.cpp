@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/ledger.hpp"
+#include "panelgate/arbiter/outbox.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/strays.hpp"
+#include "panelgate/arbiter/unsolicited.hpp"
 
 #include <gtest/gtest.h>
 

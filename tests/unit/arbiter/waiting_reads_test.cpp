@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/waiting_reads.hpp"
+#include "panelgate/arbiter/read_cache.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,9 +5,11 @@
 #include <boost/asio/io_context.hpp>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "bus_case.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 #include "support/manual_clock.hpp"
@@ -16,9 +18,6 @@
 
 namespace panelgate::bus::listening_bus_test {
 namespace {
-
-const Bytes kRead = "03 00 6B 00 03"_hex;
-const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
 
 class ListeningBusTest : public testing::Test {
   protected:
@@ -33,6 +32,8 @@ class ListeningBusTest : public testing::Test {
             if (const auto* made = std::get_if<tap::Transaction>(&event)) heard.push_back(*made);
             if (const auto* made = std::get_if<TransactionEvent>(&event))
                 outcomes.push_back(made->outcome);
+            if (const auto* made = std::get_if<arbiter::StationEvent>(&event))
+                told += std::to_string(made->station) + ':' + std::string(label(made->kind)) + ' ';
         };
         auto memory = std::make_unique<test::MemoryLine>(clock);
         line = memory.get();
@@ -45,6 +46,11 @@ class ListeningBusTest : public testing::Test {
         clock.advance(pause + wire_time(settings.arbiter.serial, adu.size()));
         line->come(adu);
         line->poll_input();
+    }
+    /// A read of this station and its reply.
+    void hear_exchange(std::uint8_t station) {
+        hear(10ms, station, kRead);
+        hear(4ms, station, kReply);
     }
     StationReport report_of(const std::string& name) const {
         for (const StationReport& station : bus->report().stations) {
@@ -60,12 +66,12 @@ class ListeningBusTest : public testing::Test {
     std::unique_ptr<ListeningBus> bus;
     std::vector<tap::Transaction> heard;
     std::vector<Outcome> outcomes;
+    std::string told;  ///< of stations
 };
 
 TEST_F(ListeningBusTest, TellsWhatPassesBy) {
     EXPECT_EQ(bus->station_status(17).state, Health::unknown);
-    hear(10ms, 17, kRead);
-    hear(4ms, 17, kReply);
+    hear_exchange(17);
     ASSERT_EQ(heard.size(), 1u);
     EXPECT_EQ(heard[0].reply, kReply);
     EXPECT_EQ(outcomes, std::vector{Outcome::ok});
@@ -104,8 +110,7 @@ TEST_F(ListeningBusTest, SaysWhoDoesNotAnswerItsMaster) {
 }
 
 TEST_F(ListeningBusTest, CountsWhatNobodyListedTogether) {
-    hear(10ms, 5, kRead);
-    hear(4ms, 5, kReply);
+    hear_exchange(5);
     hear(10ms, 0, "06 00 64 00 07"_hex);
     EXPECT_EQ(report_of("other").requests.at(3)[Outcome::ok], 1u);
     EXPECT_EQ(bus->report().wire.broadcasts, 1u);
@@ -144,9 +149,30 @@ TEST_F(ListeningBusTest, SaysThatTheLineIsDown) {
     EXPECT_TRUE(outcomes.empty()) << "nobody here knows what came of it";
 }
 
+TEST_F(ListeningBusTest, P10ALineThatIsDownTakesWhatIsKnownOfItsStationsAlong) {
+    hear_exchange(17);
+    hear_exchange(17);
+    EXPECT_EQ(told, "17:heard ");
+    line->events()->on_down("unplugged");
+    EXPECT_EQ(bus->station_status(17).state, Health::unknown);
+    EXPECT_EQ(told, "17:heard 17:unknown ");
+    line->events()->on_up();
+    EXPECT_EQ(bus->station_status(17).state, Health::heard);
+    EXPECT_EQ(told, "17:heard 17:unknown 17:heard ");
+}
+
+TEST_F(ListeningBusTest, P10WhatASilenceSaidIsWithdrawnWithTheLine) {
+    for (int i = 0; i < 7; ++i) hear(300ms, 17, kRead);
+    hear(300ms, 18, kRead);
+    hear(4ms, 18, kReply);
+    ASSERT_EQ(bus->status().findings.size(), 1u);
+    EXPECT_EQ(bus->status().findings[0].cause, "station-silent");
+    line->events()->on_down("unplugged");
+    EXPECT_TRUE(bus->status().findings.empty());
+}
+
 TEST_F(ListeningBusTest, RecordsTheTransactionsOfItsMaster) {
-    hear(10ms, 17, kRead);
-    hear(4ms, 17, kReply);
+    hear_exchange(17);
     hear(10ms, 17, "83 02"_hex);  // no request
     hear(10ms, 18, kRead);
     hear(10ms, 18, "83 02"_hex);
@@ -167,8 +193,7 @@ TEST_F(ListeningBusTest, RecordsTheTransactionsOfItsMaster) {
 }
 
 TEST_F(ListeningBusTest, KeepsWhatHappenedAroundASilence) {
-    hear(10ms, 17, kRead);
-    hear(4ms, 17, kReply);
+    hear_exchange(17);
     hear(10ms, 17, kRead);
     hear(2s, 18, kRead);  // the master has gone on
     hear(4ms, 18, kReply);

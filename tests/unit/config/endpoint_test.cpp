@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+#include <vector>
+
 namespace panelgate::config::endpoint_test {
 namespace {
 
@@ -23,32 +26,21 @@ TEST(Endpoint, RefusesEverythingElse) {
           "127.0.0.1:0502", "127.0.0.1:5o2", "127.0.0.256:502", "127.1:502", "localhost:502",
           "::1:502", "[::1]", "[::1]:", "[127.0.0.1]:502", "[]:502", "[::1:502", " 127.0.0.1:502"})
         EXPECT_FALSE(parse_endpoint(text)) << text;
-}
-
-TEST(Endpoint, KnowsTheAddressesThatAreAll) {
-    for (const char* all : {"0.0.0.0", "::", "0::0", "0:0:0:0:0:0:0:0"})
-        EXPECT_TRUE(is_any_address(all)) << all;
-    for (const char* one : {"127.0.0.1", "::1", "0.0.0.1", ""}) EXPECT_FALSE(is_any_address(one));
+    for (const char* text :
+         {"", "/8", "10.0.0.0/", "10.0.0.0/33", "10.0.0.0/-1", "10.0.0.0/08", "::/129",
+          "::ffff:10.0.0.0/24", "::ffff:10.0.0.0/95", "10.0.0/8", "host/8", "10.0.0.0/8/8"})
+        EXPECT_FALSE(parse_cidr(text)) << text;
 }
 
 TEST(Cidr, ReadsNetworksAndBareAddresses) {
-    const auto network = parse_cidr("10.0.0.0/8");
-    ASSERT_TRUE(network);
-    EXPECT_EQ(network->address, "10.0.0.0");
-    EXPECT_EQ(network->prefix, 8U);
+    EXPECT_EQ(parse_cidr("10.0.0.0/8").value().address, "10.0.0.0");
+    EXPECT_EQ(parse_cidr("10.0.0.0/8")->prefix, 8U);
     EXPECT_EQ(parse_cidr("192.168.1.7")->prefix, 32U);
     EXPECT_EQ(parse_cidr("::1")->prefix, 128U);
     EXPECT_EQ(parse_cidr("0.0.0.0/0")->prefix, 0U);
     EXPECT_EQ(parse_cidr("fd00::/8")->prefix, 8U);
     EXPECT_EQ(parse_cidr("::ffff:10.0.0.0/120")->prefix, 120U);
     EXPECT_EQ(parse_cidr("::ffff:10.0.0.1")->prefix, 128U);
-}
-
-TEST(Cidr, RefusesEverythingElse) {
-    for (const char* text :
-         {"", "/8", "10.0.0.0/", "10.0.0.0/33", "10.0.0.0/-1", "10.0.0.0/08", "::/129",
-          "::ffff:10.0.0.0/24", "::ffff:10.0.0.0/95", "10.0.0/8", "host/8", "10.0.0.0/8/8"})
-        EXPECT_FALSE(parse_cidr(text)) << text;
 }
 
 TEST(Endpoint, AnAddressIsInANetworkWhateverTheirSpelling) {
@@ -60,6 +52,56 @@ TEST(Endpoint, AnAddressIsInANetworkWhateverTheirSpelling) {
     EXPECT_FALSE(is_in("::1", "0.0.0.0", 0));
     EXPECT_FALSE(is_in("::2", "::1", 128));
     EXPECT_FALSE(is_in("here", "0.0.0.0", 0));
+}
+
+TEST(Endpoint, KnowsTheAddressesThatAreAllAndThoseThatOnlyThisMachineReaches) {
+    for (const char* all : {"0.0.0.0", "::", "0::0", "0:0:0:0:0:0:0:0"})
+        EXPECT_TRUE(is_any_address(all)) << all;
+    for (const char* one : {"127.0.0.1", "::1", "0.0.0.1", ""}) EXPECT_FALSE(is_any_address(one));
+    for (const char* own : {"127.0.0.1", "127.1.2.3", "::1", "::ffff:127.0.0.1"})
+        EXPECT_TRUE(is_loopback(own)) << own;
+    for (const char* other : {"0.0.0.0", "::", "192.168.1.5", "::2", "localhost"})
+        EXPECT_FALSE(is_loopback(other)) << other;
+}
+
+TEST(Endpoint, AllAddressesOfTheMachineAreReachedOnLoopbackAndOneAtItself) {
+    EXPECT_EQ(reachable("0.0.0.0"), "127.0.0.1");
+    EXPECT_EQ(reachable("::"), "::1");
+    EXPECT_EQ(reachable("0:0::0"), "::1");
+    for (const std::string one : {"192.0.2.7", "2001:db8::7"}) EXPECT_EQ(reachable(one), one);
+}
+
+TEST(Endpoint, IsReachableFromOutsideUnlessItIsLoopbackOrAllowsKnownNetworks) {
+    for (const char* address : {"0.0.0.0", "::", "192.168.1.5", "2001:db8::7"}) {
+        EXPECT_TRUE(is_reachable_from_outside(address, {})) << address;
+        EXPECT_FALSE(is_reachable_from_outside(address, {{"192.168.10.0", 24}, {"fd00::", 8}}));
+    }
+    EXPECT_FALSE(is_reachable_from_outside("127.0.0.1", {}));
+    EXPECT_FALSE(is_reachable_from_outside("::1", {{"::", 0}}));
+}
+
+TEST(Endpoint, IsReachableFromOutsideByNetworksThatTogetherArePublicAndWide) {
+    const auto open = [](const std::vector<Network>& allow) {
+        return is_reachable_from_outside("0.0.0.0", allow);
+    };
+    EXPECT_TRUE(open({{"10.0.0.0", 8}, {"0.0.0.0", 0}}));
+    EXPECT_TRUE(open({{"0.0.0.0", 1}, {"128.0.0.0", 1}}));
+    EXPECT_TRUE(open({{"::", 0}}));
+    EXPECT_TRUE(open({{"52.0.0.0", 7}}));
+    EXPECT_TRUE(open({{"52.0.0.0", 8}, {"54.0.0.0", 8}}));
+    EXPECT_FALSE(open({{"52.0.0.0", 8}, {"52.0.0.0", 8}, {"52.1.0.0", 16}})) << "one of them";
+    EXPECT_FALSE(open({{"10.0.0.0", 8}, {"172.16.0.0", 12}, {"192.168.0.0", 16}})) << "private";
+    EXPECT_TRUE(open({{"10.0.0.0", 7}})) << "half of it is public";
+}
+
+TEST(Endpoint, IsReachableFromOutsideByTheNetworksOfItsOwnFamily) {
+    EXPECT_TRUE(is_reachable_from_outside("2001:db8::7", {{"2000::", 3}}));
+    EXPECT_TRUE(is_reachable_from_outside("::", {{"2000::", 3}}));
+    EXPECT_FALSE(is_reachable_from_outside("192.168.1.5", {{"2000::", 3}}));
+    EXPECT_FALSE(is_reachable_from_outside("2001:db8::7", {{"0.0.0.0", 0}}));
+    EXPECT_TRUE(is_reachable_from_outside("::", {{"0.0.0.0", 0}})) << "takes both";
+    EXPECT_FALSE(is_reachable_from_outside("2001:db8::7", {{"2001::", 16}}));
+    EXPECT_FALSE(is_reachable_from_outside("2001:db8::7", {{"fc00::", 7}}));
 }
 
 }  // namespace

@@ -1,17 +1,28 @@
+// What the keys of a file come to. Defaults of single keys: unit/app/every_key_test; faults:
+// golden_test.
 #include <gmock/gmock.h>
 
-#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "memory_files.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/real_files.hpp"
+#include "panelgate/yaml/document.hpp"
+#include "load.hpp"
 
 namespace panelgate::config::load_test {
 namespace {
 
+using std::tuple;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 const std::string kSimple = "lines:\n  - name: a\n    device: /dev/ttyS0\n";
@@ -20,51 +31,30 @@ const std::string kServe = "modbus_tcp:\n  - listen: 127.0.0.1:0\n";
 const std::string kFast =
     "lines:\n  - name: a\n    device: sim\n    serial: {baud: 38400, parity: none}\n";
 
-/// Returns the valid configuration, or fails the test.
-Config load_valid(const std::string& text, const Files& files = MemoryFiles({})) {
+/// Returns the problems of a configuration that is not valid.
+yaml::Problems problems_of(const std::string& text) {
     yaml::Problems problems("f.yaml");
-    std::optional<Config> config = load(text, files, problems);
-    EXPECT_EQ(problems.text(), "");
-    return std::move(config).value();
+    EXPECT_FALSE(load(text, MemoryFiles({}), problems));
+    return problems;
 }
 
-TEST(ConfigLoad, FillsInTheDefaultsOfALine) {
-    const Config config = load_valid(kSimple + kServe);
-    ASSERT_EQ(config.lines.size(), 1U);
-    const Line& line = config.lines[0];
+TEST(ConfigLoad, FillsInWhatALineAndAStationDoNotSay) {
+    const Config config = load_valid(kSimple + "    stations: [{id: 7}]\n" + kServe);
+    const Line& line = config.lines.at(0);
     EXPECT_EQ(line.kind, Line::Kind::serial);
     EXPECT_EQ(line.device.device, "/dev/ttyS0");
     EXPECT_EQ(to_string(line.device.serial), "19200 8E1");
     EXPECT_EQ(line.arbiter.serial, line.device.serial);
-    EXPECT_EQ(line.arbiter.broadcast_turnaround, Duration(100ms));
-    EXPECT_EQ(line.arbiter.queue.limit, 256U);
-    EXPECT_EQ(line.arbiter.queue.per_client, 32U);
-    EXPECT_EQ(line.arbiter.queue.deadline, Duration(2s));
-    EXPECT_EQ(line.arbiter.offline.after, 3);
-    EXPECT_EQ(line.arbiter.offline.probe_max, Duration(5s));
-    EXPECT_EQ(line.arbiter.quarantine, arbiter::Quarantine::automatic);
     EXPECT_FALSE(line.arbiter.may_stall);
-    EXPECT_EQ(line.arbiter.unlisted.response_timeout, Duration(500ms));
+    EXPECT_EQ(line.arbiter.unlisted.response_timeout, 500ms);
     EXPECT_EQ(line.arbiter.unlisted.frame_gap, silent_interval(line.device.serial));
     EXPECT_EQ(line.arbiter.unlisted.late_window, std::nullopt);
-    EXPECT_EQ(line.arbiter.unlisted.retries, 1);
-    EXPECT_FALSE(line.refuse_unlisted);
+    EXPECT_EQ(line.stations.at(0).name, "a-7");
+    EXPECT_EQ(line.stations[0].profile->name, "generic");
+    const arbiter::StationSettings& settings = line.arbiter.stations.at(0);
+    EXPECT_EQ(tuple(settings.id, settings.retry_writes, settings.vouched), tuple(7, false, false));
+    EXPECT_EQ(tuple(settings.max_registers, settings.max_bits), tuple(125, 2000));
     EXPECT_THAT(config.warnings, IsEmpty());
-}
-
-TEST(ConfigLoad, FillsInTheDefaultsOfAStation) {
-    const Config config = load_valid(kSimple + "    stations: [{id: 7}]\n" + kServe);
-    const Station& station = config.lines[0].stations.at(0);
-    EXPECT_EQ(station.id, 7);
-    EXPECT_EQ(station.name, "a-7");
-    EXPECT_EQ(station.profile->name, "generic");
-    EXPECT_FALSE(station.read_only);
-    const arbiter::StationSettings& settings = config.lines[0].arbiter.stations.at(0);
-    EXPECT_EQ(settings.id, 7);
-    EXPECT_FALSE(settings.retry_writes);
-    EXPECT_FALSE(settings.vouched);
-    EXPECT_EQ(settings.max_registers, 125);
-    EXPECT_EQ(settings.max_bits, 2000);
 }
 
 TEST(ConfigLoad, ReadsHowRs485IsSwitched) {
@@ -97,19 +87,18 @@ TEST(ConfigLoad, ReadsEveryKeyOfALine) {
     EXPECT_EQ(line.device.rs485, line::Rs485{});
     EXPECT_EQ(line.kind, Line::Kind::simulated);
     EXPECT_EQ(to_string(line.device.serial), "250000 8O1");
-    EXPECT_EQ(line.arbiter.unlisted.response_timeout, Duration(1s));
-    EXPECT_EQ(line.arbiter.unlisted.frame_gap, Duration(5ms));
-    EXPECT_EQ(line.arbiter.unlisted.late_window, Duration(700ms));
-    EXPECT_EQ(line.arbiter.reply_hole, Duration(120ms));
+    EXPECT_EQ(line.arbiter.unlisted.response_timeout, 1s);
+    EXPECT_EQ(line.arbiter.unlisted.frame_gap, 5ms);
+    EXPECT_EQ(line.arbiter.unlisted.late_window, 700ms);
+    EXPECT_EQ(line.arbiter.reply_hole, 120ms);
     EXPECT_EQ(line.arbiter.quarantine, arbiter::Quarantine::line);
     EXPECT_EQ(line.arbiter.unlisted.retries, 4);
-    EXPECT_EQ(line.arbiter.broadcast_turnaround, Duration(200ms));
-    EXPECT_EQ(line.arbiter.queue.limit, 8U);
-    EXPECT_EQ(line.arbiter.queue.per_client, 8U) << "never more than the line's limit";
-    EXPECT_EQ(line.arbiter.queue.deadline, Duration(5s));
+    EXPECT_EQ(line.arbiter.broadcast_turnaround, 200ms);
+    EXPECT_EQ(line.arbiter.queue, (arbiter::QueueSettings{8, 8, 5s}))
+        << "of one client never more than the line's limit";
     EXPECT_EQ(line.arbiter.offline.after, 5);
-    EXPECT_EQ(line.arbiter.offline.probe_min, Duration(1min));
-    EXPECT_EQ(line.arbiter.offline.probe_max, Duration(2min));
+    EXPECT_EQ(line.arbiter.offline.probe_min, 1min);
+    EXPECT_EQ(line.arbiter.offline.probe_max, 2min);
     EXPECT_TRUE(line.refuse_unlisted);
 }
 
@@ -120,22 +109,14 @@ TEST(ConfigLoad, MergedReadsStayWithinTheStandardEvenWherePanelsTakeMore) {
     EXPECT_EQ(config.lines[0].arbiter.stations[0].max_bits, 2000);
 }
 
-TEST(ConfigLoad, FillsInTheDefaultsOfTheServers) {
+TEST(ConfigLoad, FillsInWhatAListenerDoesNotSay) {
     const Config config = load_valid(kSimple + "modbus_tcp:\n  - {}\nhttp: {}\n");
     const tcp_server::Settings& listener = config.modbus_tcp.at(0);
-    EXPECT_EQ(listener.name(), "127.0.0.1:502");
     EXPECT_THAT(listener.lines, ElementsAre("a"));
     EXPECT_THAT(listener.units, IsEmpty());
     EXPECT_EQ(listener.broadcast, tcp_server::BroadcastMode::reply);
-    EXPECT_EQ(listener.diagnostics_unit, 255);
-    EXPECT_FALSE(listener.read_only);
     EXPECT_THAT(listener.allow, IsEmpty());
-    EXPECT_EQ(listener.max_connections, 1024U);
-    ASSERT_TRUE(config.http);
-    EXPECT_EQ(config.http->name(), "127.0.0.1:8080");
-    EXPECT_EQ(config.http->anonymous, web::Role::viewer);
-    EXPECT_EQ(config.log.level, rt::LogLevel::info);
-    EXPECT_EQ(config.log.format, rt::LogFormat::text);
+    EXPECT_THAT(config.http.value().hosts, IsEmpty());
 }
 
 TEST(ConfigLoad, ReadsEveryKeyOfAListener) {
@@ -156,21 +137,20 @@ TEST(ConfigLoad, ReadsEveryKeyOfAListener) {
         "    lines: [b]\n"
         "    diagnostics_unit: 7\n");
     const tcp_server::Settings& first = config.modbus_tcp.at(0);
-    EXPECT_EQ(first.address, "::1");
-    EXPECT_EQ(first.port, 1502);
+    EXPECT_EQ(tuple(first.address, first.port), tuple("::1", 1502));
     EXPECT_THAT(first.lines, ElementsAre("a", "b"));
-    ASSERT_EQ(first.units.size(), 4U);
-    EXPECT_EQ(first.units.at(1).line, "a");
-    EXPECT_EQ(first.units.at(2).line, "b");
-    EXPECT_EQ(first.units.at(2).station, 1);
-    EXPECT_EQ(first.units.at(3).station, 200) << "unlisted, and the line passes those";
-    EXPECT_EQ(first.units.at(0).station, 0) << "everybody on line b";
+    const std::map<std::uint8_t, tcp_server::UnitTarget> units{
+        {0, {"b", 0}},  // everybody on line b
+        {1, {"a", 1}},
+        {2, {"b", 1}},
+        {3, {"a", 200}},  // unlisted, and the line passes those
+    };
+    EXPECT_EQ(first.units, units);
     EXPECT_EQ(first.broadcast, tcp_server::BroadcastMode::silent);
     EXPECT_EQ(first.diagnostics_unit, std::nullopt);
     EXPECT_TRUE(first.read_only);
     ASSERT_EQ(first.allow.size(), 3U);
-    EXPECT_EQ(first.allow[0].prefix, 8U);
-    EXPECT_EQ(first.allow[1].prefix, 32U);
+    EXPECT_EQ(tuple(first.allow[0].prefix, first.allow[1].prefix), tuple(8U, 32U));
     EXPECT_EQ(first.allow[2].address, "fd00::");
     EXPECT_EQ(first.max_connections, 3U);
     EXPECT_EQ(config.modbus_tcp.at(1).diagnostics_unit, 7);
@@ -197,26 +177,19 @@ TEST(ConfigLoad, TakesNothingFromTheEnvironmentIntoASecret) {
     EXPECT_EQ(config->http->tokens.at(0).secret, "${BAUD}$$0123456789");
 }
 
-TEST(ConfigLoad, ReadsByWhichNamesAndFromWhereHttpMayBeAsked) {
+TEST(ConfigLoad, ReadsByWhichNamesAndFromWhereAndWithWhichTokensHttpMayBeAsked) {
+    const MemoryFiles files({{"/run/secrets/ops", "\n s3cret \r\n"}});
     const Config config =
         load_valid(kSimple +
-                   "http:\n  hosts: [gateway.plant.example, 192.0.2.7, 'fd00::7']\n"
-                   "  allow: [10.0.0.0/8, 'fd00::/8']\n");
+                       "http:\n  hosts: [gateway.plant.example, 192.0.2.7, 'fd00::7']\n"
+                       "  allow: [10.0.0.0/8, 'fd00::/8']\n  anonymous: none\n"
+                       "  tokens: [{name: ops, role: operator, file: /run/secrets/ops}]\n"
+                       "log: {level: trace, format: json}\n",
+                   files);
     EXPECT_THAT(config.http->hosts, ElementsAre("gateway.plant.example", "192.0.2.7", "fd00::7"));
     ASSERT_EQ(config.http->allow.size(), 2U);
     EXPECT_EQ(config.http->allow[0].address, "10.0.0.0");
     EXPECT_EQ(config.http->allow[0].prefix, 8U);
-    EXPECT_THAT(load_valid(kSimple + "http: {}\n").http->hosts, IsEmpty());
-}
-
-TEST(ConfigLoad, ReadsTokensFromTheirFiles) {
-    const MemoryFiles files({{"/run/secrets/ops", "\n s3cret \r\n"}});
-    const Config config =
-        load_valid(kSimple +
-                       "http:\n  anonymous: none\n"
-                       "  tokens: [{name: ops, role: operator, file: /run/secrets/ops}]\n"
-                       "log: {level: trace, format: json}\n",
-                   files);
     EXPECT_EQ(config.http->anonymous, web::Role::none);
     ASSERT_EQ(config.http->tokens.size(), 1U);
     EXPECT_EQ(config.http->tokens[0].name, "ops");
@@ -241,31 +214,232 @@ TEST(ConfigLoad, AProfilesDirAddsToTheShippedProfilesAndReplacesThem) {
 }
 
 TEST(ConfigLoad, NothingIsReturnedWhenAnythingIsWrong) {
-    yaml::Problems problems("f.yaml");
-    EXPECT_FALSE(load(kSimple + kServe + "colour: red\n", MemoryFiles({}), problems));
-    EXPECT_EQ(problems.list().size(), 1U);
+    EXPECT_EQ(problems_of(kSimple + kServe + "colour: red\n").list().size(), 1U);
 }
 
-class Shipped : public ::testing::TestWithParam<const char*> {};
+/// Line floor1 with a press that has these keys.
+Config with_press(const std::string& keys) {
+    return load_valid(
+        "lines:\n  - name: floor1\n    device: sim\n    serial: {baud: 38400, parity: none}\n"
+        "    stations:\n      - {id: 31, name: press, profile: autonics-gplp-s, " +
+        keys + "}\n" + kServe);
+}
 
-TEST_P(Shipped, LoadsWithoutAProblemOrAWarning) {
-    const std::string path = std::string(SOURCE_ROOT) + "/config/" + GetParam() + ".yaml";
-    const Config config = load_valid(RealFiles().read(path).value(), RealFiles());
+TEST(ConfigPoints, AreWhatTheirNotationSays) {
+    const Config config = with_press("points: [{name: a, at: UW100}, {name: b, at: UB180}]");
+    const Station& press = config.lines[0].stations[0];
+    ASSERT_EQ(press.points.size(), 2U);
+    const points::Point& word = press.points[0];
+    EXPECT_EQ(tuple(word.table, word.address), tuple(modbus::Table::holding_registers, 100));
+    EXPECT_EQ(word.type, points::Type::u16);
+    const points::Point& bit = press.points[1];
+    EXPECT_EQ(tuple(bit.table, bit.address), tuple(modbus::Table::coils, 288));
+    EXPECT_EQ(bit.type, points::Type::boolean);
+    EXPECT_TRUE(press.polls.empty());
+    EXPECT_FALSE(press.guard);
+}
+
+TEST(ConfigPoints, ReadsEveryKeyOfAPoint) {
+    const Config config = with_press(
+        "points: ["
+        "{name: t_1-x, at: uw00102, type: i32, word_order: DCBA, scale: 0.5, offset: -3, unit: bar,"
+        " min: -1.5, max: 400, writable: true, no_value: [-1, 7], every: 250ms},"
+        "{name: mode, at: UW20, labels: {0: off, 10: 'on'}},"
+        "{name: recipe, at: UW30, type: string, length: 5},"
+        "{name: alarm, at: UW40, bit: 15}]");
+    const auto& points = config.lines[0].stations[0].points;
+    const points::Point& first = points.at(0);
+    EXPECT_EQ(tuple(first.name, first.at, first.unit), tuple("t_1-x", "uw00102", "bar"));
+    EXPECT_EQ(tuple(first.address, first.count()), tuple(102, 2U));
+    EXPECT_EQ(tuple(first.type, first.word_order),
+              tuple(points::Type::i32, points::WordOrder::dcba));
+    EXPECT_EQ(tuple(first.scale, first.offset), tuple(0.5, -3.0));
+    EXPECT_EQ(first.min, -1.5);
+    EXPECT_EQ(first.max, 400);
+    EXPECT_TRUE(first.writable);
+    EXPECT_EQ(first.no_value, (std::vector<std::int64_t>{-1, 7}));
+    EXPECT_EQ(first.every, 250ms);
+    EXPECT_EQ(points.at(1).labels, (std::map<std::int64_t, std::string>{{0, "off"}, {10, "on"}}));
+    EXPECT_EQ(tuple(points.at(2).length, points.at(2).count()), tuple(5U, 3U));
+    EXPECT_EQ(points.at(3).bit, 15U);
+    EXPECT_EQ(points.at(3).type, points::Type::boolean);
+}
+
+TEST(ConfigPoints, ReadsPollsMaxAgeAndGuard) {
+    const Config config = with_press(
+        "guard: true, max_age: 2s, poll: [{read: UW0, count: 32, every: 5s}, {read: UB180}]");
+    const Station& press = config.lines[0].stations[0];
+    EXPECT_TRUE(press.guard);
+    EXPECT_EQ(config.lines[0].arbiter.stations[0].max_age, 2s);
+    const std::vector<points::Poll> polls{
+        {"UW0", modbus::Table::holding_registers, 0, 32, 5s},
+        {"UB180", modbus::Table::coils, 288, 1, 1s},
+    };
+    EXPECT_EQ(press.polls, polls);
+}
+
+TEST(ConfigPoints, MorePointsThanTheLimitAreRefusedAtOnce) {
+    std::string points;
+    for (std::size_t i = 0; i <= points::kMaxPoints; ++i)
+        points += "{name: p" + std::to_string(i) + ", at: UW" + std::to_string(i) + "}, ";
+    const yaml::Problems problems =
+        problems_of(kFast + "    stations:\n      - {id: 1, profile: autonics-gplp-s, points: [" +
+                    points + "]}\n" + kServe);
+    ASSERT_EQ(problems.list().size(), 1U);
+    EXPECT_EQ(problems.list()[0].message, "at most 4096 points of one station, not 4097");
+}
+
+std::string with_relays(const std::string& relays) {
+    return kSimple + "    stations: [{id: 1, name: a}, {id: 2, name: b}]\nrelays:\n" + relays +
+           kServe;
+}
+
+std::string relay(const std::string& from, unsigned source, const std::string& to, unsigned target,
+                  unsigned count) {
+    return "  - {from: " + from + '/' + std::to_string(400001 + source) + ", to: " + to + '/' +
+           std::to_string(400001 + target) + ", count: " + std::to_string(count) + "}\n";
+}
+
+TEST(ConfigRelays, AreReadWithTheirDefaults) {
+    const Config config = load_valid(with_relays(
+        relay("a", 100, "b", 200, 8) +
+        "  - {from: b/400300, to: a/400400, every: 5s, on_change: true, refresh: 5min}\n"));
+    const auto holding = modbus::Table::holding_registers;
+    const std::vector<points::Relay> relays{
+        {{"a", "400101", holding, 100}, {"b", "400201", holding, 200}, 8, 1s, false, 60s},
+        {{"b", "400300", holding, 299}, {"a", "400400", holding, 399}, 1, 5s, true, 5min},
+    };
+    EXPECT_EQ(config.relays, relays);
     EXPECT_THAT(config.warnings, IsEmpty());
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Files, Shipped, ::testing::Values("demo", "minimal", "panelgate.example"),
-    [](const auto& info) {
-        return std::string(info.param).substr(0, std::string(info.param).find('.'));
-    });
+TEST(ConfigRelays, RefreshWithoutOnChangeHasNoEffectAndIsReported) {
+    const Config config =
+        load_valid(with_relays("  - {from: a/400101, to: b/400201, refresh: 5s}\n"));
+    EXPECT_THAT(config.warnings,
+                ElementsAre(HasSubstr("refresh has no effect without on_change: true")));
+    problems_of(with_relays("  - {from: a/400101, to: b/400201, on_change: true, refresh: 5}\n"));
+}
 
-TEST(ShippedDemo, HasTheFivePanelsOfTheContract) {
+TEST(ConfigRelays, AChainMayVisitAStationAgainElsewhere) {
+    load_valid(with_relays(relay("a", 0, "b", 0, 8) + relay("b", 0, "a", 100, 8) +
+                           relay("a", 100, "b", 100, 8)));
+}
+
+/// Layers of three: one copies a block to two places, two merge them again: 2^60 paths.
+TEST(ConfigRelays, ManyWaysThroughTheRelaysAreNotWalkedOneByOne) {
+    std::string relays;
+    for (unsigned layer = 60; layer-- > 0;) {  // backwards, so that each finds the rest
+        const unsigned at = layer * 10;
+        relays += relay("a", at, "b", at, 2);
+        relays += relay("a", at, "b", at + 2, 2);
+        relays += relay("b", at, "a", at + 10, 1);
+        relays += relay("b", at + 2, "a", at + 11, 1);
+    }
+    load_valid(with_relays(relays));
+}
+
+/// The tree after apply_templates(), and the problems.
+struct Applied {
+    yaml::Node tree;
+    std::string problems;
+
+    /// The only station of the only line.
+    const yaml::Node& station() const {
+        return tree.entries.at(0).value.items.at(0).entries.at(0).value.items.at(0);
+    }
+};
+
+Applied apply(const std::string& text) {
+    const MemoryFiles files({});
+    yaml::Problems problems("f");
+    Config config;
+    Loading loading{files, problems, config, {}};
+    yaml::Node tree = yaml::parse(text, problems);
+    apply_templates(loading, tree);
+    return {std::move(tree), problems.text()};
+}
+
+/// Returns "key=value …" of a map; the length of a list.
+std::string text_of(const yaml::Node& map) {
+    std::string text;
+    for (const yaml::Entry& entry : map.entries) {
+        text += (text.empty() ? "" : " ") + entry.key + '=';
+        if (entry.value.kind == yaml::Node::Kind::map) {
+            text += '{' + text_of(entry.value) + '}';
+        } else if (entry.value.kind == yaml::Node::Kind::sequence) {
+            text += std::to_string(entry.value.items.size());
+        } else {
+            text += entry.value.scalar;
+        }
+    }
+    return text;
+}
+
+/// What template m gives to a station.
+Applied merged(const std::string& given, const std::string& stations) {
+    return apply("templates: {m: " + given + "}\nlines: [{stations: [" + stations + "]}]");
+}
+
+TEST(ConfigTemplates, GiveWhatTheStationDoesNotSayMapsKeyByKeyAndListsAsAWhole) {
+    const auto station_of = [](const std::string& given, const std::string& station) {
+        const Applied applied = merged(given, station);
+        EXPECT_EQ(applied.problems, "");
+        return text_of(applied.station());
+    };
+    EXPECT_EQ(station_of("{profile: x, guard: true}", "{id: 1, template: m, guard: false}"),
+              "id=1 guard=false profile=x");
+    EXPECT_EQ(station_of("{timing: {a: 1, b: 2}}", "{template: m, timing: {b: 3}}"),
+              "timing={b=3 a=1}");
+    EXPECT_EQ(station_of("{points: [1, 2, 3]}", "{template: m, points: [4]}"), "points=1");
+    EXPECT_EQ(station_of("{points: [1, 2, 3]}", "{template: m, points: []}"), "points=0");
+    EXPECT_EQ(station_of("{points: [1, 2, 3]}", "{template: m}"), "points=3");
+}
+
+TEST(ConfigTemplates, KeepTheirMarks) {
+    const Applied applied =
+        apply("templates:\n  m:\n    profile: x\nlines: [{stations: [{template: m}]}]");
+    EXPECT_EQ(applied.station().mark.line, 4);
+    EXPECT_EQ(applied.station().entries.at(0).mark.line, 3);
+    EXPECT_EQ(applied.station().entries.at(0).value.mark.column, 14);
+}
+
+TEST(ConfigTemplates, OfStrangeTreesNothingIsMade) {
+    for (const std::string text :
+         {"lines: 5", "lines: [5, {stations: 6}, {stations: [7]}]", "[1]", "x", "templates:"})
+        EXPECT_EQ(apply(text).problems, "") << text;
+}
+
+std::string repeated(const std::string& item, std::size_t times) {
+    std::string list = item;
+    for (std::size_t i = 1; i < times; ++i) list += ", " + item;
+    return list;
+}
+
+TEST(ConfigTemplates, WhatTheyGiveInAllIsBounded) {
+    const std::string problem = merged("{points: [" + repeated("x", 1000) + "]}",
+                                       repeated("{template: m}", 2 * (kMaxTemplateValues / 1000)))
+                                    .problems;
+    EXPECT_THAT(problem, HasSubstr(": templates give more than 500000 values"));
+    EXPECT_EQ(problem.find('\n'), problem.size() - 1) << "once";
+    EXPECT_THAT(merged("{unit: " + std::string(1'000'000, 'x') + "}", repeated("{template: m}", 20))
+                    .problems,
+                HasSubstr("16 MiB of text"));
+}
+
+TEST(ConfigShipped, LoadsWithoutAProblemOrAWarning) {
+    for (const std::string name : {"demo", "minimal", "panelgate.example"}) {
+        const std::string path = std::string(SOURCE_ROOT) + "/config/" + name + ".yaml";
+        EXPECT_THAT(load_valid(RealFiles().read(path).value(), RealFiles()).warnings, IsEmpty())
+            << name;
+    }
+}
+
+TEST(ConfigShipped, TheDemoHasTheFivePanelsOfTheContract) {
     const std::string path = std::string(SOURCE_ROOT) + "/config/demo.yaml";
     const Config config = load_valid(RealFiles().read(path).value(), RealFiles());
     const Line& line = config.lines.at(0);
-    EXPECT_EQ(line.name, "floor1");
-    EXPECT_EQ(line.kind, Line::Kind::simulated);
+    EXPECT_EQ(tuple(line.name, line.kind), tuple("floor1", Line::Kind::simulated));
     EXPECT_EQ(to_string(line.device.serial), "38400 8N1");
     std::string stations;
     for (const Station& s : line.stations)

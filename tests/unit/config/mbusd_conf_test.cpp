@@ -3,14 +3,18 @@
 #include <gmock/gmock.h>
 
 #include <string>
+#include <utility>
 
 #include "memory_files.hpp"
+#include "panelgate/config/config.hpp"
 
 namespace panelgate::config::mbusd_conf_test {
 namespace {
 
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using Rs485 = line::Rs485::Mode;
 
 Imported imported_of(const std::string& text) {
     yaml::Problems problems("mbusd.conf");
@@ -19,12 +23,8 @@ Imported imported_of(const std::string& text) {
     return imported.value_or(Imported{});
 }
 
-Config load(const Imported& imported) {
-    yaml::Problems problems("made.yaml");
-    auto config = config::load(imported.yaml, MemoryFiles({}), problems);
-    EXPECT_TRUE(config) << problems.text() << imported.yaml;
-    return std::move(config).value();
-}
+Config load(const Imported& imported) { return load_valid(imported.yaml); }
+Rs485 rs485_of(const Imported& imported) { return load(imported).lines[0].device.rs485.mode; }
 
 std::string faults(const std::string& text) {
     yaml::Problems problems("mbusd.conf");
@@ -53,7 +53,7 @@ TEST(MbusdConf, TakesOverWhatHasACounterpart) {
     const Line& line = config.lines[0];
     EXPECT_EQ(line.device.device, "/dev/serial/x 'y$");
     EXPECT_EQ(to_string(line.device.serial), "38400 8E2");
-    EXPECT_EQ(line.device.rs485.mode, line::Rs485::Mode::rts);
+    EXPECT_EQ(line.device.rs485.mode, Rs485::rts);
     EXPECT_FALSE(line.device.rs485.rts_high_on_send);
     EXPECT_EQ(config.modbus_tcp[0].name(), "[::1]:8080");
     EXPECT_EQ(config.modbus_tcp[0].max_connections, 7U);
@@ -66,21 +66,18 @@ TEST(MbusdConf, TakesOverWhatHasACounterpart) {
 }
 
 TEST(MbusdConf, SwitchesTheTransceiverAsTheDriverOrRtsDid) {
-    EXPECT_EQ(load(imported_of("enable_rs485 = yes")).lines[0].device.rs485.mode,
-              line::Rs485::Mode::kernel);
+    EXPECT_EQ(rs485_of(imported_of("enable_rs485 = yes")), Rs485::kernel);
     const auto rts = load(imported_of("trx_control = rts")).lines[0].device.rs485;
-    EXPECT_EQ(rts.mode, line::Rs485::Mode::rts);
+    EXPECT_EQ(rts.mode, Rs485::rts);
     EXPECT_TRUE(rts.rts_high_on_send);
-    EXPECT_EQ(load(imported_of("trx_control = addc")).lines[0].device.rs485.mode,
-              line::Rs485::Mode::off);
+    EXPECT_EQ(rs485_of(imported_of("trx_control = addc")), Rs485::off);
 }
 
 TEST(MbusdConf, SaysWhatHasNoCounterpartInCommentsAndNotes) {
     const Imported imported = imported_of(
         "pause = 100\ntimeout = 60\nlogfile = /var/log/\xe9.log\ntrx_control = sysfs_1\n"
         "trx_sysfile = /sys/class/gpio/gpio5/value\nretries = 15\n");
-    const Config config = load(imported);
-    EXPECT_EQ(config.lines[0].arbiter.unlisted.retries, 10);
+    EXPECT_EQ(load(imported).lines[0].arbiter.unlisted.retries, 10);
     ASSERT_EQ(imported.notes.size(), 6U);
     EXPECT_THAT(imported.notes[0], testing::StartsWith("mbusd.conf:1: pause = 100: between two"));
     EXPECT_THAT(imported.notes[2], HasSubstr("/var/log/?.log: the log goes to standard error"));
@@ -93,13 +90,13 @@ TEST(MbusdConf, NotesRtsThatTheDriverAlreadySwitchesInEitherOrder) {
     const std::string kernel = "enable_rs485 = yes\n";
     for (const std::string& text : {rts + kernel, kernel + rts}) {
         const Imported imported = imported_of(text);
-        EXPECT_EQ(load(imported).lines[0].device.rs485.mode, line::Rs485::Mode::kernel) << text;
+        EXPECT_EQ(rs485_of(imported), Rs485::kernel) << text;
         ASSERT_EQ(imported.notes.size(), 1U) << text;
         EXPECT_THAT(imported.notes[0], HasSubstr("trx_control = rts_0: with enable_rs485 the"));
         EXPECT_THAT(imported.notes[0], HasSubstr("{mode: rts, rts_on_send: low}"));
     }
     const Imported off = imported_of("enable_rs485 = no\n" + rts);
-    EXPECT_EQ(load(off).lines[0].device.rs485.mode, line::Rs485::Mode::rts);
+    EXPECT_EQ(rs485_of(off), Rs485::rts);
     EXPECT_THAT(off.notes, IsEmpty());
 }
 
@@ -108,19 +105,17 @@ TEST(MbusdConf, OfARepeatedSettingTheLastCountsAndTheFirstIsReported) {
         imported_of("speed = 9600\ntrx_control = rts\nspeed = 38400\ntrx_control = addc\n");
     const Line line = load(imported).lines[0];
     EXPECT_EQ(line.device.serial.baud, 38400);
-    EXPECT_EQ(line.device.rs485.mode, line::Rs485::Mode::off);
+    EXPECT_EQ(line.device.rs485.mode, Rs485::off);
     EXPECT_THAT(imported.notes,
-                testing::ElementsAre("mbusd.conf:1: speed = 9600: line 3 sets it again, and that "
-                                     "one counts",
-                                     "mbusd.conf:2: trx_control = rts: line 4 sets it again, and "
-                                     "that one counts"));
+                ElementsAre("mbusd.conf:1: speed = 9600: line 3 sets it again, and that one counts",
+                            "mbusd.conf:2: trx_control = rts: line 4 sets it again, and that one "
+                            "counts"));
 }
 
 TEST(MbusdConf, AdvisesNothingWhereNothingIsLost) {
     EXPECT_THAT(imported_of("pause = 0\ntimeout = 0\n").notes, IsEmpty());
-    EXPECT_THAT(
-        imported_of("pause = 0x14\n").notes,
-        testing::ElementsAre(HasSubstr("mbusd reads this as 20"), HasSubstr("{frame_gap: 20ms}")));
+    EXPECT_THAT(imported_of("pause = 0x14\n").notes,
+                ElementsAre(HasSubstr("mbusd reads this as 20"), HasSubstr("{frame_gap: 20ms}")));
 }
 
 TEST(MbusdConf, ReadsNumbersAsMbusdDoesAndSaysSo) {
@@ -130,9 +125,9 @@ TEST(MbusdConf, ReadsNumbersAsMbusdDoesAndSaysSo) {
     EXPECT_EQ(config.modbus_tcp[0].port, 502);
     EXPECT_EQ(config.lines[0].arbiter.unlisted.response_timeout, Duration(500ms));
     EXPECT_THAT(imported.notes,
-                testing::ElementsAre("mbusd.conf:1: speed = 9600 # fast: mbusd reads this as 9600",
-                                     "mbusd.conf:2: port = 0x1F6: mbusd reads this as 502",
-                                     "mbusd.conf:3: wait = +0764: mbusd reads this as 500"));
+                ElementsAre("mbusd.conf:1: speed = 9600 # fast: mbusd reads this as 9600",
+                            "mbusd.conf:2: port = 0x1F6: mbusd reads this as 502",
+                            "mbusd.conf:3: wait = +0764: mbusd reads this as 500"));
     for (const char* value : {"fast", "-1", "0x", "99999999999999999999", "4294967298", "#9"})
         EXPECT_THAT(faults("port = " + std::string(value)), HasSubstr("1:8: port must be"));
 }
@@ -160,12 +155,15 @@ TEST(MbusdConf, ReportsAllFaultsWithTheirPlaces) {
         "mbusd.conf:5:7: port has no value; leave the line out for the default\n"
         "mbusd.conf:6:15: trx_control must be addc, rts_0, rts_1 (or rts), sysfs_0 or sysfs_1, "
         "not 'gpio'\n");
-    EXPECT_THAT(faults("device = ttyS0"), HasSubstr("1:10: device must be the absolute path"));
-    EXPECT_THAT(faults("device = /dev/ttyS0:9600"), HasSubstr("device must be"));
-    EXPECT_THAT(faults("address = plc.example"), HasSubstr("address must be an IP address"));
-    EXPECT_THAT(faults("replyonbroadcast = maybe"), HasSubstr("must be yes or no"));
-    EXPECT_THAT(faults("logfile = a\x01"), HasSubstr("control characters"));
-    EXPECT_THAT(faults("= 5"), HasSubstr("a line must be NAME = VALUE"));
+    const std::pair<const char*, const char*> rows[] = {
+        {"device = ttyS0", "1:10: device must be the absolute path"},
+        {"device = /dev/ttyS0:9600", "device must be"},
+        {"address = plc.example", "address must be an IP address"},
+        {"replyonbroadcast = maybe", "must be yes or no"},
+        {"logfile = a\x01", "control characters"},
+        {"= 5", "a line must be NAME = VALUE"},
+    };
+    for (const auto& [text, fault] : rows) EXPECT_THAT(faults(text), HasSubstr(fault));
 }
 
 }  // namespace

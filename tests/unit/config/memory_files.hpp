@@ -1,8 +1,11 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "panelgate/config/config.hpp"
@@ -37,5 +40,14 @@ class MemoryFiles final : public Files {
   private:
     std::map<std::string, std::string> texts_;
 };
+
+/// Returns the valid configuration, or fails the test and throws.
+inline Config load_valid(const std::string& text, const Files& files = MemoryFiles({}),
+                         const std::string& name = "f.yaml") {
+    yaml::Problems problems(name);
+    std::optional<Config> config = load(text, files, problems);
+    EXPECT_EQ(problems.text(), "") << text;
+    return std::move(config).value();
+}
 
 }  // namespace panelgate::config

@@ -23,10 +23,16 @@ using ::testing::ElementsAre;
 class RealFilesTest : public ::testing::Test {
   protected:
     std::string put(const std::string& name, const std::string& text) const {
-        const std::string path = (dir_ / name).string();
+        const std::string path = at(name);
         std::ofstream(path, std::ios::binary) << text;
         return path;
     }
+    std::string put_pipe() const {
+        const std::string path = at("pipe");
+        EXPECT_EQ(::mkfifo(path.c_str(), 0600), 0);
+        return path;
+    }
+    std::string at(const std::string& name) const { return (dir_ / name).string(); }
 
     const test::TempDir folder_;
     const fs::path& dir_ = folder_.path();
@@ -39,17 +45,18 @@ TEST_F(RealFilesTest, ReadsAFileByteForByte) {
 }
 
 TEST_F(RealFilesTest, SaysWhyAFileCannotBeRead) {
-    EXPECT_EQ(RealFiles().read((dir_ / "absent").string()), std::nullopt);
+    EXPECT_EQ(RealFiles().read(at("absent")), std::nullopt);
     EXPECT_EQ(errno, ENOENT);
     EXPECT_EQ(RealFiles().read(dir_.string()), std::nullopt);
     EXPECT_EQ(errno, EISDIR);
     EXPECT_EQ(RealFiles::read_any("/dev/zero"), std::nullopt) << "endless";
     EXPECT_EQ(errno, EFBIG);
+    EXPECT_EQ(RealFiles::read_any("/proc/self/mem"), std::nullopt) << "reading fails";
+    EXPECT_EQ(errno, EIO);
 }
 
 TEST_F(RealFilesTest, DoesNotReadWhatMightNeverEnd) {
-    const std::string pipe = (dir_ / "pipe").string();
-    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    const std::string pipe = put_pipe();
     for (const std::string& path : {pipe, std::string("/dev/zero")}) {
         EXPECT_TRUE(RealFiles().is_special(path)) << path;
         EXPECT_EQ(RealFiles().read(path), std::nullopt) << path;
@@ -57,24 +64,17 @@ TEST_F(RealFilesTest, DoesNotReadWhatMightNeverEnd) {
     }
     EXPECT_FALSE(RealFiles().is_special(put("x", "")));
     EXPECT_FALSE(RealFiles().is_special(dir_.string()));
-    EXPECT_FALSE(RealFiles().is_special((dir_ / "absent").string()));
-}
-
-TEST_F(RealFilesTest, SaysThatReadingFails) {
-    EXPECT_EQ(RealFiles::read_any("/proc/self/mem"), std::nullopt);
-    EXPECT_EQ(errno, EIO);
+    EXPECT_FALSE(RealFiles().is_special(at("absent")));
 }
 
 TEST_F(RealFilesTest, DoesNotWaitForeverForAPipeWriter) {
-    const std::string pipe = (dir_ / "pipe").string();
-    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    const std::string pipe = put_pipe();
     EXPECT_EQ(RealFiles::read_any(pipe), std::nullopt);
     EXPECT_EQ(errno, EPIPE);
 }
 
 TEST_F(RealFilesTest, ReadsWhatAnotherThreadWritesToAPipe) {
-    const std::string pipe = (dir_ / "pipe").string();
-    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    const std::string pipe = put_pipe();
     std::future<std::optional<std::string>> read =
         std::async(std::launch::async, [&] { return RealFiles::read_any(pipe); });
     std::ofstream(pipe) << "lines: []\n";
@@ -95,14 +95,14 @@ TEST_F(RealFilesTest, KnowsWhichFilesAllUsersMayRead) {
     EXPECT_FALSE(RealFiles().is_readable_by_all(path));
     fs::permissions(path, fs::perms(0644));
     EXPECT_TRUE(RealFiles().is_readable_by_all(path));
-    EXPECT_FALSE(RealFiles().is_readable_by_all((dir_ / "absent").string()));
+    EXPECT_FALSE(RealFiles().is_readable_by_all(at("absent")));
 }
 
 TEST_F(RealFilesTest, ListsTheYamlFilesOfADirectorySorted) {
     for (const char* name : {"b.yaml", "a.yaml", "c.yml", "README"}) put(name, "");
     EXPECT_THAT(RealFiles().list_yaml(dir_.string()).value(),
-                ElementsAre((dir_ / "a.yaml").string(), (dir_ / "b.yaml").string()));
-    EXPECT_EQ(RealFiles().list_yaml((dir_ / "absent").string()), std::nullopt);
+                ElementsAre(at("a.yaml"), at("b.yaml")));
+    EXPECT_EQ(RealFiles().list_yaml(at("absent")), std::nullopt);
 }
 
 }  // namespace

@@ -1,8 +1,20 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
 #include "panelgate/doctor/doctor.hpp"
 
 namespace panelgate::doctor {
+
+using Stations = std::map<std::uint8_t, arbiter::Symptoms>;
 
 /// Counts of one station, as the arbiter would count them.
 class Mix {
@@ -73,6 +85,53 @@ class Mix {
     }
 
     arbiter::Symptoms s_;
+};
+
+class Diagnose : public testing::Test {
+  protected:
+    Diagnose() { facts.serial = {9600, 8, Parity::even, 1}; }
+
+    std::vector<Finding> findings(Stations stations,
+                                  const std::vector<Finding>& standing = {}) const {
+        Sample window;
+        window.stations = std::move(stations);
+        window.uart = uart;
+        window.broadcasts = broadcasts;
+        return diagnose(facts, window, standing);
+    }
+    /// "wrong-baud", or with its station "gap-too-short 2"; "noise, gap-too-short 2".
+    static std::string text_of(const std::vector<Finding>& found) {
+        std::string text;
+        for (const Finding& f : found) {
+            text += (text.empty() ? "" : ", ") + std::string(code(f.cause));
+            if (f.station) text += ' ' + std::to_string(*f.station);
+        }
+        return text;
+    }
+    std::string causes(Stations stations, const std::vector<Finding>& standing = {}) const {
+        return text_of(findings(std::move(stations), standing));
+    }
+    /// Of station 1 alone on its line.
+    std::string alone(const arbiter::Symptoms& one) const { return causes({{1, one}}); }
+    /// Of station 2 beside one that has no fault.
+    std::string beside(const arbiter::Symptoms& two) const {
+        return causes({{1, fine}, {2, two}});
+    }
+    /// The only finding, which is this one.
+    Finding only(const std::string& what, Stations stations) const {
+        const std::vector<Finding> found = findings(std::move(stations));
+        EXPECT_EQ(text_of(found), what);
+        return found.empty() ? Finding{} : found.front();
+    }
+    /// A finding of the previous look.
+    static Finding known(Cause cause, std::optional<std::uint8_t> station = {}) {
+        return {cause, station, {}, {}, {}};
+    }
+
+    const arbiter::Symptoms fine = Mix().answered(50);
+    LineFacts facts;
+    std::optional<line::UartErrors> uart;
+    std::uint64_t broadcasts = 0;
 };
 
 }  // namespace panelgate::doctor

@@ -3,106 +3,83 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "support/hex.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::modbus::response_test {
 namespace {
 
 using Random = std::mt19937;
+using Texts = std::vector<const char*>;
 
-TEST(Answers, AcceptsAnExceptionOfTheSameFunctionInTwoBytes) {
-    const Bytes request = "03 00 6B 00 03"_hex;
-    EXPECT_TRUE(answers(request, "83 02"_hex));
-    EXPECT_TRUE(answers(request, "83 41"_hex)) << "vendors' codes pass";
-    EXPECT_FALSE(answers(request, "83"_hex));
-    EXPECT_FALSE(answers(request, "83 02 00"_hex));
-    EXPECT_FALSE(answers(request, "84 02"_hex));
-}
+Bytes bytes_of(const char* hex) { return from_hex(hex).value(); }
 
-TEST(Answers, IsNotFooledByNothing) {
-    EXPECT_FALSE(answers("03 00 6B 00 03"_hex, {}));
-    EXPECT_FALSE(answers({}, "03 02 00 01"_hex));
-    EXPECT_FALSE(answers({}, {}));
-}
+/// A request, replies that answer it and replies that do not.
+struct Judged {
+    const char* request;
+    Texts good;
+    Texts bad;
+};
 
-TEST(Answers, WantsAsManyBytesAsWereAskedFor) {
-    EXPECT_TRUE(answers("01 00 13 00 13"_hex, "01 03 CD 6B 05"_hex));
-    EXPECT_FALSE(answers("01 00 13 00 13"_hex, "01 02 CD 6B"_hex));
-    EXPECT_TRUE(answers("01 00 13 00 13"_hex, "01 03 CD 6B FF"_hex)) << "pad bits are not judged";
-    EXPECT_TRUE(answers("03 00 6B 00 01"_hex, "03 02 02 2B"_hex));
-    EXPECT_FALSE(answers("03 00 6B 00 01"_hex, "04 02 02 2B"_hex));
-    EXPECT_FALSE(answers("03 00 6B 00 01"_hex, "03 04 02 2B 00 00"_hex));
-    EXPECT_FALSE(answers("03 00 6B 00 01"_hex, "03 03 02 2B"_hex)) << "count and size differ";
-    EXPECT_FALSE(answers("03 00 6B 00 81"_hex, "03 02 02 2B"_hex)) << "258 bytes are not 2";
-}
+const Judged kJudged[] = {
+    // An exception of the same function in two bytes; vendors' codes pass.
+    {"03 00 6B 00 03", {"83 02", "83 41"}, {"", "83", "83 02 00", "84 02"}},
+    {"", {}, {"03 02 00 01", ""}},
+    // As many bytes as were asked for; pad bits are not judged.
+    {"01 00 13 00 13", {"01 03 CD 6B 05", "01 03 CD 6B FF"}, {"01 02 CD 6B"}},
+    // ... and count and size may not differ.
+    {"03 00 6B 00 01", {"03 02 02 2B"}, {"04 02 02 2B", "03 04 02 2B 00 00", "03 03 02 2B"}},
+    // 258 bytes are not 2.
+    {"03 00 6B 00 81", {}, {"03 02 02 2B"}},
+    // The echo of single writes.
+    {"05 00 AC FF 00", {"05 00 AC FF 00"}, {"05 00 AC 00 00"}},
+    {"06 00 01 00 03", {}, {"06 00 02 00 03", "06 00 01 00"}},
+    {"16 00 04 00 F2 00 25", {}, {"16 00 04 00 F2 00 24"}},
+    {"15 09 06 00 04 00 07 00 01 06 AF", {}, {"15 09 06 00 04 00 07 00 01 06 AE"}},
+    // Address and quantity of multiple writes: the echo of the request is not the reply.
+    {"10 00 01 00 02 04 00 0A 01 02",
+     {"10 00 01 00 02"},
+     {"10 00 01 00 03", "10 00 02 00 02", "10 00 01 00 02 04 00 0A 01 02"}},
+    // The sub-function of diagnostics; 04 is never answered.
+    {"08 00 00 A5 37", {"08 00 00 A5 37"}, {"08 00 00 A5 38"}},
+    {"08 00 0B 00 00", {"08 00 0B 12 34"}, {"08 00 0C 12 34", "08 00 0B"}},
+    {"08 00 04 00 00", {}, {"08 00 04 00 00"}},
+    // The fixed sizes of status and counter.
+    {"07", {"07 6D"}, {"07 6D 00"}},
+    {"0B", {"0B FF FF 01 08"}, {"0B FF FF 01"}},
+    // A byte count that is true.
+    {"0C", {"0C 08 00 00 01 08 01 21 20 00"}, {"0C 08 00 00 01 08 01 21 20"}},
+    {"11", {"11 02 B4 FF"}, {"11 03 B4 FF", "11"}},
+    {"18 04 DE",
+     {"18 00 06 00 02 01 B8 12 84"},
+     {"18 00 06 00 03 01 B8 12 84", "18 00 08 00 02 01 B8 12 84"}},
+    // Every file group as it was asked for: order, type, number.
+    {"14 0E 06 00 04 00 01 00 02 06 00 03 00 09 00 01",
+     {"14 0A 05 06 0D FE 00 20 03 06 33 CD"},
+     {"14 0A 03 06 33 CD 05 06 0D FE 00 20", "14 0A 05 07 0D FE 00 20 03 06 33 CD",
+      "14 06 05 06 0D FE 00 20"}},
+    // The MEI type and the code; the objects may be miscounted.
+    {"2B 0E 01 00",
+     {"2B 0E 01 01 00 00 01 00 01 41", "2B 0E 01 01 00 00 09 00 01 41"},
+     {"2B 0E 02 01 00 00 01 00 01 41", "2B 0D 01 01 00 00 01 00 01 41", "2B 0E 01 01 00 00"}},
+    {"2B 0D 01", {"2B 0D"}, {}},
+    // Only the function of vendors' own.
+    {"41 00 01", {"41", "41 C0 C1 C2"}, {"42 C0 C1 C2"}},
+};
 
-TEST(Answers, WantsTheEchoOfSingleWrites) {
-    EXPECT_TRUE(answers("05 00 AC FF 00"_hex, "05 00 AC FF 00"_hex));
-    EXPECT_FALSE(answers("05 00 AC FF 00"_hex, "05 00 AC 00 00"_hex));
-    EXPECT_FALSE(answers("06 00 01 00 03"_hex, "06 00 02 00 03"_hex));
-    EXPECT_FALSE(answers("06 00 01 00 03"_hex, "06 00 01 00"_hex));
-    EXPECT_FALSE(answers("16 00 04 00 F2 00 25"_hex, "16 00 04 00 F2 00 24"_hex));
-    EXPECT_FALSE(
-        answers("15 09 06 00 04 00 07 00 01 06 AF"_hex, "15 09 06 00 04 00 07 00 01 06 AE"_hex));
-}
-
-TEST(Answers, WantsAddressAndQuantityOfMultipleWrites) {
-    const Bytes request = "10 00 01 00 02 04 00 0A 01 02"_hex;
-    EXPECT_TRUE(answers(request, "10 00 01 00 02"_hex));
-    EXPECT_FALSE(answers(request, "10 00 01 00 03"_hex));
-    EXPECT_FALSE(answers(request, "10 00 02 00 02"_hex));
-    EXPECT_FALSE(answers(request, request)) << "the echo of the request is not the reply";
-}
-
-TEST(Answers, WantsTheSubFunctionOfDiagnosticsBack) {
-    EXPECT_TRUE(answers("08 00 00 A5 37"_hex, "08 00 00 A5 37"_hex));
-    EXPECT_FALSE(answers("08 00 00 A5 37"_hex, "08 00 00 A5 38"_hex));
-    EXPECT_TRUE(answers("08 00 0B 00 00"_hex, "08 00 0B 12 34"_hex));
-    EXPECT_FALSE(answers("08 00 0B 00 00"_hex, "08 00 0C 12 34"_hex));
-    EXPECT_FALSE(answers("08 00 0B 00 00"_hex, "08 00 0B"_hex));
-    EXPECT_FALSE(answers("08 00 04 00 00"_hex, "08 00 04 00 00"_hex)) << "is never answered";
-}
-
-TEST(Answers, WantsTheFixedSizesOfStatusAndCounter) {
-    EXPECT_TRUE(answers("07"_hex, "07 6D"_hex));
-    EXPECT_FALSE(answers("07"_hex, "07 6D 00"_hex));
-    EXPECT_TRUE(answers("0B"_hex, "0B FF FF 01 08"_hex));
-    EXPECT_FALSE(answers("0B"_hex, "0B FF FF 01"_hex));
-}
-
-TEST(Answers, WantsAByteCountThatIsTrue) {
-    EXPECT_TRUE(answers("0C"_hex, "0C 08 00 00 01 08 01 21 20 00"_hex));
-    EXPECT_FALSE(answers("0C"_hex, "0C 08 00 00 01 08 01 21 20"_hex));
-    EXPECT_TRUE(answers("11"_hex, "11 02 B4 FF"_hex));
-    EXPECT_FALSE(answers("11"_hex, "11 03 B4 FF"_hex));
-    EXPECT_FALSE(answers("11"_hex, "11"_hex));
-    EXPECT_TRUE(answers("18 04 DE"_hex, "18 00 06 00 02 01 B8 12 84"_hex));
-    EXPECT_FALSE(answers("18 04 DE"_hex, "18 00 06 00 03 01 B8 12 84"_hex));
-    EXPECT_FALSE(answers("18 04 DE"_hex, "18 00 08 00 02 01 B8 12 84"_hex));
-}
-
-TEST(Answers, WantsEveryFileGroupAsItWasAskedFor) {
-    const Bytes request = "14 0E 06 00 04 00 01 00 02 06 00 03 00 09 00 01"_hex;
-    EXPECT_TRUE(answers(request, "14 0A 05 06 0D FE 00 20 03 06 33 CD"_hex));
-    EXPECT_FALSE(answers(request, "14 0A 03 06 33 CD 05 06 0D FE 00 20"_hex)) << "order";
-    EXPECT_FALSE(answers(request, "14 0A 05 07 0D FE 00 20 03 06 33 CD"_hex)) << "type";
-    EXPECT_FALSE(answers(request, "14 06 05 06 0D FE 00 20"_hex)) << "one group missing";
-}
-
-TEST(Answers, WantsTheMeiTypeAndTheCodeBack) {
-    EXPECT_TRUE(answers("2B 0E 01 00"_hex, "2B 0E 01 01 00 00 01 00 01 41"_hex));
-    EXPECT_TRUE(answers("2B 0E 01 00"_hex, "2B 0E 01 01 00 00 09 00 01 41"_hex)) << "miscounted";
-    EXPECT_FALSE(answers("2B 0E 01 00"_hex, "2B 0E 02 01 00 00 01 00 01 41"_hex));
-    EXPECT_FALSE(answers("2B 0E 01 00"_hex, "2B 0D 01 01 00 00 01 00 01 41"_hex));
-    EXPECT_FALSE(answers("2B 0E 01 00"_hex, "2B 0E 01 01 00 00"_hex));
-    EXPECT_TRUE(answers("2B 0D 01"_hex, "2B 0D"_hex));
-}
-
-TEST(Answers, KnowsOnlyTheFunctionOfVendorsOwn) {
-    EXPECT_TRUE(answers("41 00 01"_hex, "41"_hex));
-    EXPECT_TRUE(answers("41 00 01"_hex, "41 C0 C1 C2"_hex));
-    EXPECT_FALSE(answers("41 00 01"_hex, "42 C0 C1 C2"_hex));
+TEST(Answers, WhatRepeatsTheRequestAndHasTheSizeOfTheReply) {
+    for (const Judged& row : kJudged) {
+        for (const char* reply : row.good)
+            EXPECT_TRUE(answers(bytes_of(row.request), bytes_of(reply)))
+                << row.request << " / " << reply;
+        for (const char* reply : row.bad)
+            EXPECT_FALSE(answers(bytes_of(row.request), bytes_of(reply)))
+                << row.request << " / " << reply;
+    }
 }
 
 TEST(Response, GivesTheNormalReplyOfABroadcast) {
@@ -144,56 +121,42 @@ Exchange any_read(Random& random) {
     return {encode_read(table, number(random, 0, 65535), count), reply.take(), 2};
 }
 
-Exchange any_write(Random& random) {
+Bytes any_write_request(Random& random) {
     const std::uint16_t address = number(random, 0, 65535);
-    Bytes request;
     switch (number(random, 0, 3)) {
         case 0:
-            request = encode_write_coil(address, number(random, 0, 1) == 1);
-            break;
+            return encode_write_coil(address, number(random, 0, 1) == 1);
         case 1:
-            request = encode_write_register(address, number(random, 0, 65535));
-            break;
+            return encode_write_register(address, number(random, 0, 65535));
         case 2: {
             std::vector<bool> values(number(random, 1, 1968));
             for (auto&& value : values) value = number(random, 0, 1) == 1;
-            request = encode_write_coils(address, values);
-            break;
+            return encode_write_coils(address, values);
         }
         default: {
             std::vector<std::uint16_t> values(number(random, 1, 123));
             for (std::uint16_t& value : values) value = number(random, 0, 65535);
-            request = encode_write_registers(address, values);
+            return encode_write_registers(address, values);
         }
     }
-    Bytes reply = normal_write_reply(request);
-    return {std::move(request), std::move(reply), 5};
 }
 
-Exchange any_echo(Random& random) {
+Bytes any_echoed_request(Random& random) {
     Writer request;
-    if (number(random, 0, 1) == 0) {
-        request.u8(0x16).raw(noise(random, 6));
-    } else {
-        const std::size_t words = number(random, 1, 100);
-        request.u8(0x08).u16(0).raw(noise(random, 2 * words));
-    }
-    const Bytes pdu = request.take();
-    return {pdu, pdu, pdu.size()};
+    if (number(random, 0, 1) == 0) return request.u8(0x16).raw(noise(random, 6)).take();
+    const std::size_t words = number(random, 1, 100);
+    return request.u8(0x08).u16(0).raw(noise(random, 2 * words)).take();
 }
 
 Exchange any_exchange(Random& random) {
-    switch (number(random, 0, 2)) {
-        case 0:
-            return any_read(random);
-        case 1:
-            return any_write(random);
-        default:
-            return any_echo(random);
-    }
+    const auto kind = number(random, 0, 2);
+    if (kind == 0) return any_read(random);
+    const Bytes request = kind == 1 ? any_write_request(random) : any_echoed_request(random);
+    if (kind == 1) return {request, normal_write_reply(request), 5};
+    return {request, request, request.size()};
 }
 
-TEST(AnswersProperty, EveryRequestIsAnsweredByItsReply) {
+TEST(AnswersProperty, EveryRequestIsAnsweredByItsReplyOrAnException) {
     Random random(3);
     for (int round = 0; round < 5000; ++round) {
         const Exchange e = any_exchange(random);
@@ -206,7 +169,7 @@ TEST(AnswersProperty, EveryRequestIsAnsweredByItsReply) {
     }
 }
 
-TEST(AnswersProperty, NoByteThatMustComeBackMayDiffer) {
+TEST(AnswersProperty, NoByteThatMustComeBackMayDifferAndNoneBeTooFewOrMany) {
     Random random(4);
     for (int round = 0; round < 3000; ++round) {
         const Exchange e = any_exchange(random);
@@ -215,18 +178,11 @@ TEST(AnswersProperty, NoByteThatMustComeBackMayDiffer) {
             wrong[i] = static_cast<std::uint8_t>(wrong[i] ^ number(random, 1, 255));
             ASSERT_FALSE(answers(e.request, wrong)) << to_hex(e.request) << " / " << to_hex(wrong);
         }
-    }
-}
-
-TEST(AnswersProperty, NoReplyMayBeShorterOrLonger) {
-    Random random(5);
-    for (int round = 0; round < 3000; ++round) {
-        const Exchange e = any_exchange(random);
         Bytes longer = e.reply;
         longer.push_back(0);
-        const Bytes shorter(e.reply.begin(), e.reply.end() - 1);
         ASSERT_FALSE(answers(e.request, longer)) << to_hex(e.request);
-        ASSERT_FALSE(answers(e.request, shorter)) << to_hex(e.request);
+        ASSERT_FALSE(answers(e.request, ByteView(e.reply).first(e.reply.size() - 1)))
+            << to_hex(e.request);
     }
 }
 
@@ -242,6 +198,45 @@ TEST(AnswersProperty, AnyBytesAreJudgedWithoutHarm) {
         access_of(request);
         registers_of(reply);
         bits_of(reply, 100);
+    }
+}
+
+Bytes sent_for(const Bytes& asked) {
+    const auto other = translated(test::request_of(asked));
+    return other ? other->pdu() : Bytes{};
+}
+
+TEST(Translation, AWriteIsOneOfSeveralAndInputsAreReadAsWhatShowsTheSame) {
+    EXPECT_EQ(sent_for("05 00 AC FF 00"_hex), "0F 00 AC 00 01 01 01"_hex);
+    EXPECT_EQ(sent_for("05 FF FF 00 00"_hex), "0F FF FF 00 01 01 00"_hex);
+    EXPECT_EQ(sent_for("06 00 64 12 34"_hex), "10 00 64 00 01 02 12 34"_hex);
+    EXPECT_EQ(sent_for("02 01 20 00 05"_hex), "01 01 20 00 05"_hex);
+    EXPECT_EQ(sent_for("04 00 64 00 05"_hex), "03 00 64 00 05"_hex);
+}
+
+TEST(Translation, NothingElseIsTranslatedNorAValueThatIsNoCoils) {
+    for (const Bytes& asked :
+         {"05 00 AC 00 01"_hex, "05 00 AC FF 01"_hex, "05 00 AC 55 00"_hex, "01 00 00 00 01"_hex,
+          "03 00 00 00 01"_hex, "07"_hex, "0F 00 00 00 01 01 01"_hex, "10 00 00 00 01 02 00 01"_hex,
+          "16 00 04 00 F2 00 25"_hex, "17 00 00 00 01 00 00 00 01 02 00 01"_hex, "41 01"_hex})
+        EXPECT_EQ(sent_for(asked), Bytes{}) << to_hex(asked);
+}
+
+/// A write is confirmed as it was asked; a read gives its values, and an exception its code, under
+/// the function asked.
+TEST(Translation, WhatComesBackAnswersWhatWasAsked) {
+    for (const auto& [asked, reply, back] :
+         {std::tuple("05 00 AC FF 00"_hex, "0F 00 AC 00 01"_hex, "05 00 AC FF 00"_hex),
+          std::tuple("06 00 64 12 34"_hex, "10 00 64 00 01"_hex, "06 00 64 12 34"_hex),
+          std::tuple("02 01 20 00 05"_hex, "01 01 19"_hex, "02 01 19"_hex),
+          std::tuple("04 00 64 00 01"_hex, "03 02 00 0A"_hex, "04 02 00 0A"_hex),
+          std::tuple("05 00 AC FF 00"_hex, "8F 02"_hex, "85 02"_hex),
+          std::tuple("06 00 64 12 34"_hex, "90 03"_hex, "86 03"_hex),
+          std::tuple("02 01 20 00 05"_hex, "81 01"_hex, "82 01"_hex),
+          std::tuple("04 00 64 00 01"_hex, "83 99"_hex, "84 99"_hex)}) {
+        EXPECT_TRUE(answers(sent_for(asked), reply)) << to_hex(reply);
+        EXPECT_EQ(translated_back(asked, reply), back) << to_hex(reply);
+        EXPECT_TRUE(answers(asked, back)) << to_hex(reply);
     }
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "panelgate/modbus/request.hpp"
@@ -35,14 +36,27 @@ std::vector<SerialAdu> after_silence(RtuRequestFramer& framer) {
     return drain(framer);
 }
 
+/// What these bytes and the silence behind them give.
+std::vector<SerialAdu> heard(RtuRequestFramer& framer, ByteView bytes) {
+    std::vector<SerialAdu> frames = fed(framer, bytes);
+    for (SerialAdu& late : after_silence(framer)) frames.push_back(std::move(late));
+    return frames;
+}
+
+/// The frame with another bit, in its data or in its CRC.
+Bytes damaged_at(std::size_t byte, const SerialAdu& adu) {
+    Bytes bytes = frame(adu);
+    bytes[byte] ^= 0x01;
+    return bytes;
+}
+
 const SerialAdu kRead{0x11, "03 00 6B 00 03"_hex};
 const SerialAdu kOther{0x1F, "06 00 01 00 03"_hex};
 const SerialAdu kVendor{0x05, "41 01 02 03"_hex};
 
-class KnownLength : public ::testing::TestWithParam<Bytes> {};
-
-TEST_P(KnownLength, EndsWithItsLastByte) {
-    const SerialAdu adu{0x21, GetParam()};
+void expect_end_at_last_byte(const Bytes& pdu) {
+    SCOPED_TRACE(to_hex(pdu));
+    const SerialAdu adu{0x21, pdu};
     const Bytes bytes = frame(adu);
     RtuRequestFramer framer;
     for (std::size_t i = 0; i + 1 < bytes.size(); ++i)
@@ -53,37 +67,32 @@ TEST_P(KnownLength, EndsWithItsLastByte) {
     EXPECT_EQ(fed(framer, bytes + bytes), (std::vector{adu, adu})) << "glued";
     EXPECT_EQ(framer.take_faults(), 0U);
 }
-INSTANTIATE_TEST_SUITE_P(
-    Functions, KnownLength,
-    ::testing::Values("01 0013 0013"_hex, "02 00C4 0016"_hex, "03 006B 0003"_hex,
-                      "04 0008 0001"_hex, "05 00AC FF00"_hex, "06 0001 0003"_hex, "07"_hex,
-                      "08 0000 A537"_hex, "08 000B 0000"_hex, "0B"_hex, "0C"_hex,
-                      "0F 0013 000A 02 CD01"_hex, "10 0001 0002 04 000A 0102"_hex, "11"_hex,
-                      "14 0E 06 0004 0001 0002 06 0003 0009 0002"_hex,
-                      "15 0D 06 0004 0007 0003 06AF 04BE 100D"_hex, "16 0004 00F2 0025"_hex,
-                      "17 0003 0006 000E 0003 06 00FF 00FF 00FF"_hex, "18 04DE"_hex,
-                      "2B 0E 01 00"_hex, "10 0000 007B F6"_hex + Bytes(246, 0x10)));
 
-TEST(RtuRequestFramer, StepsOverStrayBytesInFrontOfARequest) {
+TEST(RtuRequestFramer, RequestsOfKnownLengthEndWithTheirLastByte) {
+    for (const std::uint8_t function : "07 0B 0C 11"_hex) expect_end_at_last_byte(Bytes{function});
+    for (const Bytes& pdu :
+         {"01 0013 0013"_hex, "02 00C4 0016"_hex, "03 006B 0003"_hex, "04 0008 0001"_hex,
+          "05 00AC FF00"_hex, "06 0001 0003"_hex, "08 0000 A537"_hex, "08 000B 0000"_hex,
+          "0F 0013 000A 02 CD01"_hex, "10 0001 0002 04 000A 0102"_hex, "16 0004 00F2 0025"_hex,
+          "14 0E 06 0004 0001 0002 06 0003 0009 0002"_hex,
+          "15 0D 06 0004 0007 0003 06AF 04BE 100D"_hex,
+          "17 0003 0006 000E 0003 06 00FF 00FF 00FF"_hex, "18 04DE"_hex, "2B 0E 01 00"_hex,
+          "10 0000 007B F6"_hex + Bytes(246, 0x10)})
+        expect_end_at_last_byte(pdu);
+}
+
+TEST(RtuRequestFramer, StepsOverStrayBytesAndADamagedRequest) {
     for (unsigned stray = 0; stray < 256; ++stray) {
         RtuRequestFramer framer;
-        std::vector<SerialAdu> frames =
-            fed(framer, Bytes{static_cast<std::uint8_t>(stray)} + frame(kRead) + frame(kOther));
-        for (SerialAdu& late : after_silence(framer)) frames.push_back(std::move(late));
-        EXPECT_EQ(frames, (std::vector{kRead, kOther})) << stray;
+        const Bytes front{static_cast<std::uint8_t>(stray)};
+        EXPECT_EQ(heard(framer, front + frame(kRead) + frame(kOther)), (std::vector{kRead, kOther}))
+            << stray;
         EXPECT_EQ(framer.take_faults(), 1U) << stray;
         EXPECT_FALSE(framer.partial());
     }
-}
-
-TEST(RtuRequestFramer, ADamagedRequestIsSteppedOver) {
-    Bytes damaged = frame(kRead);
-    damaged[4] ^= 0x01;
     const SerialAdu next{0x1F, "04 00 01 00 03"_hex};
     RtuRequestFramer framer;
-    std::vector<SerialAdu> frames = fed(framer, damaged + frame(next));
-    for (SerialAdu& late : after_silence(framer)) frames.push_back(std::move(late));
-    EXPECT_EQ(frames, std::vector{next});
+    EXPECT_EQ(heard(framer, damaged_at(4, kRead) + frame(next)), std::vector{next});
     EXPECT_EQ(framer.take_faults(), 1U);
     EXPECT_EQ(framer.discarded(), 0U) << "a good frame was found since";
 }
@@ -123,6 +132,18 @@ const std::vector<SerialAdu> kWrites = {
     {3, "10 0000 0001 02 BEEF"_hex}, {1, "16 0004 00F2 0025"_hex},
     {1, "08 0001 0000"_hex},         {1, "17 0000 0001 0000 0001 02 BEEF"_hex}};
 
+/// Hears the bytes with a silence at `cut`.
+void expect_only_reads(const Bytes& damaged, std::size_t cut) {
+    RtuRequestFramer framer;
+    std::vector<SerialAdu> frames = fed(framer, ByteView(damaged).first(cut));
+    framer.on_silence();
+    for (SerialAdu& adu : heard(framer, ByteView(damaged).subspan(cut)))
+        frames.push_back(std::move(adu));
+    framer.drop_pending();
+    for (const SerialAdu& adu : frames) ASSERT_TRUE(adu == kRead || !check_request(adu.pdu)) << cut;
+    ASSERT_GE(framer.take_faults(), 1U) << cut;
+}
+
 TEST(RtuRequestFramer, P2AWriteInTheDataOfADamagedRequestIsNotExecuted) {
     const Bytes read = frame(kRead);
     for (const SerialAdu& write : kWrites) {
@@ -131,16 +152,8 @@ TEST(RtuRequestFramer, P2AWriteInTheDataOfADamagedRequestIsNotExecuted) {
                                   inside + inside, "07 07 07"_hex + inside + read}) {
             for (const Bytes& damaged : damaged_around(data)) {
                 for (std::size_t cut = 0; cut <= damaged.size(); ++cut) {
-                    RtuRequestFramer framer;
-                    std::vector<SerialAdu> frames = fed(framer, ByteView(damaged).first(cut));
-                    framer.on_silence();
-                    for (const auto& adu : fed(framer, ByteView(damaged).subspan(cut)))
-                        frames.push_back(adu);
-                    for (const auto& adu : after_silence(framer)) frames.push_back(adu);
-                    framer.drop_pending();
-                    for (const SerialAdu& adu : frames)
-                        ASSERT_TRUE(adu == kRead || !check_request(adu.pdu)) << cut;
-                    ASSERT_GE(framer.take_faults(), 1U) << cut;
+                    expect_only_reads(damaged, cut);
+                    if (::testing::Test::HasFatalFailure()) return;
                 }
             }
         }
@@ -151,45 +164,33 @@ TEST(RtuRequestFramer, AWriteRightBehindADamagedRequestIsToBeSentAgain) {
     for (const Bytes& damaged : damaged_around("00 07 00 03 00 01"_hex)) {
         if (request_length(damaged).kind != RequestLength::Kind::known) continue;
         RtuRequestFramer framer;
-        EXPECT_TRUE(fed(framer, damaged + frame(kOther)).empty());
-        EXPECT_TRUE(after_silence(framer).empty());
-        std::vector<SerialAdu> again = fed(framer, frame(kOther));
-        for (SerialAdu& late : after_silence(framer)) again.push_back(std::move(late));
-        EXPECT_EQ(again, std::vector{kOther}) << damaged[1];
+        EXPECT_TRUE(heard(framer, damaged + frame(kOther)).empty());
+        EXPECT_EQ(heard(framer, frame(kOther)), std::vector{kOther}) << damaged[1];
     }
 }
 
 TEST(RtuRequestFramer, WhatIsLeftOfADamagedRequestCostsTheNextOneBehindASilenceNothing) {
-    Bytes damaged = frame({0x11, "10 0001 0002 04 000A 0102"_hex});
-    damaged.back() ^= 0x01;
     RtuRequestFramer framer;
-    EXPECT_TRUE(fed(framer, damaged).empty());
+    EXPECT_TRUE(fed(framer, damaged_at(12, {0x11, "10 0001 0002 04 000A 0102"_hex})).empty());
     EXPECT_TRUE(framer.partial()) << "its tail may be a beginning";
     EXPECT_TRUE(after_silence(framer).empty());
-    std::vector<SerialAdu> frames = fed(framer, frame(kOther));
-    for (SerialAdu& late : after_silence(framer)) frames.push_back(std::move(late));
-    EXPECT_EQ(frames, std::vector{kOther});
+    EXPECT_EQ(heard(framer, frame(kOther)), std::vector{kOther});
 }
 
 TEST(RtuRequestFramer, AGlitchInFrontOfAWriteIsNoDamage) {
     for (const Bytes& glitch : {"FF"_hex, "00"_hex, "00 FF"_hex, "FF FF FF"_hex}) {
         RtuRequestFramer framer;
-        std::vector<SerialAdu> frames = fed(framer, glitch + frame(kOther));
-        for (SerialAdu& late : after_silence(framer)) frames.push_back(std::move(late));
-        EXPECT_EQ(frames, std::vector{kOther}) << glitch.size();
+        EXPECT_EQ(heard(framer, glitch + frame(kOther)), std::vector{kOther}) << glitch.size();
         EXPECT_EQ(fed(framer, frame(kOther)), std::vector{kOther}) << "it counts for itself";
     }
 }
 
 TEST(RtuRequestFramer, MoreFramesInARowThanOneCouldHoldAreTrusted) {
-    Bytes damaged = frame(kRead);
-    damaged[4] ^= 0x01;
-    Bytes stream = damaged;
+    Bytes stream = damaged_at(4, kRead);
     for (int i = 0; i < 40; ++i) stream = stream + frame(kOther);
     RtuRequestFramer framer;
-    std::vector<SerialAdu> frames = fed(framer, stream);
-    for (SerialAdu& late : after_silence(framer)) frames.push_back(std::move(late));
-    EXPECT_EQ(frames, std::vector(40 - 33, kOther)) << "33 of 8 bytes are more than 256";
+    EXPECT_EQ(heard(framer, stream), std::vector(40 - 33, kOther))
+        << "33 of 8 bytes are more than 256";
 }
 
 TEST(RtuRequestFramer, SilenceDiscardsAStartThatBlocksAValidFrame) {
@@ -218,31 +219,17 @@ TEST(RtuRequestFramer, GivesUpWhatWillNotCome) {
     EXPECT_EQ(after_silence(framer), std::vector{kVendor});
 }
 
-TEST(RtuRequestFramer, FunctionsWithoutALengthRuleEndBySilence) {
+TEST(RtuRequestFramer, WhatHasNoLengthOrAWrongOneEndsBySilence) {
     RtuRequestFramer framer;
-    EXPECT_TRUE(fed(framer, frame(kVendor)).empty());
-    EXPECT_EQ(after_silence(framer), std::vector{kVendor});
-    const SerialAdu loop{1, "08 0000 1234 5678"_hex};
-    EXPECT_TRUE(fed(framer, frame(loop)).empty());
-    EXPECT_EQ(after_silence(framer), std::vector{loop});
-    const SerialAdu reserved{1, "83 02"_hex};
-    EXPECT_TRUE(fed(framer, frame(reserved)).empty());
-    EXPECT_EQ(after_silence(framer), std::vector{reserved}) << "others refuse it";
-    EXPECT_EQ(framer.take_faults(), 0U);
-}
-
-TEST(RtuRequestFramer, ARequestBehindOneOfAVendorWaitsForTheSilenceWithIt) {
-    RtuRequestFramer framer;
-    EXPECT_TRUE(fed(framer, frame(kVendor) + frame(kRead)).empty());
+    for (const SerialAdu& adu : {kVendor, SerialAdu{1, "08 0000 1234 5678"_hex},
+                                 SerialAdu{1, "83 02"_hex},     // others refuse it
+                                 SerialAdu{1, "03 00"_hex}}) {  // its length is judged by others
+        EXPECT_TRUE(fed(framer, frame(adu)).empty()) << to_hex(adu.pdu);
+        EXPECT_EQ(after_silence(framer), std::vector{adu});
+    }
+    EXPECT_TRUE(fed(framer, frame(kVendor) + frame(kRead)).empty()) << "the read waits with it";
     EXPECT_EQ(after_silence(framer), (std::vector{kVendor, kRead}));
     EXPECT_EQ(framer.take_faults(), 0U);
-}
-
-TEST(RtuRequestFramer, ARequestThatIsTooShortEndsBySilence) {
-    RtuRequestFramer framer;
-    const SerialAdu half{1, "03 00"_hex};
-    EXPECT_TRUE(fed(framer, frame(half)).empty());
-    EXPECT_EQ(after_silence(framer), std::vector{half}) << "its length is judged by others";
 }
 
 TEST(RtuRequestFramer, BuffersNoMoreThanOneFrame) {

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "plant_line.hpp"
 
@@ -13,6 +15,9 @@ namespace panelgate::plan::advice_test {
 namespace {
 
 using test::kRegisters;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
@@ -20,9 +25,7 @@ using testing::Not;
 class AdviceTest : public testing::Test, protected test::PlantLine {
   protected:
     std::vector<Advice> advice() const { return advise(line, make_plan(line)); }
-    static Duration rounded(std::chrono::duration<double, std::milli> every) {
-        return std::chrono::round<std::chrono::microseconds>(every);
-    }
+    std::vector<std::string> warned() const { return warnings(line, make_plan(line)); }
     static double factor(const Advice& all) {
         return std::stod(all.what.substr(std::string_view("all intervals ").size()));
     }
@@ -33,22 +36,26 @@ class AdviceTest : public testing::Test, protected test::PlantLine {
         }
         return {};
     }
+    /// Returns what one relay would be advised instead of, after `change`, which is then undone.
+    template <class Change>
+    std::string merged_after(Change change) {
+        const Line before = line;
+        change();
+        std::string what = find("one relay instead of ").what;
+        line = before;
+        return what;
+    }
 };
 
-TEST_F(AdviceTest, ALineThatIsFineNeedsNone) {
-    ask(add("press"), 0, 10, 1s);
-    EXPECT_THAT(advice(), IsEmpty());
-}
-
-TEST_F(AdviceTest, TheLowestRateThatIsEnoughIsTold) {
-    ask(add("press"), 0, 100, 200ms);
+TEST_F(AdviceTest, TheLowestRateThatIsEnoughIsToldIfAllPanelsHaveIt) {
+    Station& press = add("press");
+    ask(press, 0, 10, 1s);
+    EXPECT_THAT(advice(), IsEmpty()) << "a line that is fine needs none";
+    press.asked.clear();
+    ask(press, 0, 100, 200ms);
     const Advice rate = find("serial: {baud: 19200}");
     EXPECT_NEAR(rate.load, make_plan(at_rate(line, 19200)).load, 1e-12);
     EXPECT_LT(rate.load, kHigh);
-}
-
-TEST_F(AdviceTest, ARateThatAPanelDoesNotHaveIsNotTold) {
-    ask(add("press"), 0, 100, 200ms);
     profile::PanelProfile slow = *shipped.find("generic");
     slow.serial.baud = {9600};
     add("old").profile = &slow;
@@ -64,6 +71,35 @@ TEST_F(AdviceTest, ADearPollIsToldByItsStationWithAnIntervalThatIsEnough) {
     EXPECT_GT(slower.load, 0.7);
 }
 
+TEST_F(AdviceTest, AReadIsToldByItsFirstAndItsLastItem) {
+    struct Asked {
+        std::uint32_t first;
+        std::uint32_t count;
+        Duration every;
+    };
+    static const struct {
+        std::vector<Asked> asked;
+        const char* what;
+        const char* instead;
+    } kRows[] = {
+        // points of one read
+        {{{8, 2, 40ms}, {0, 2, 40ms}, {4, 2, 40ms}, {2, 1, 10s}}, "R0 to R8", "40ms"},
+        // with several intervals
+        {{{8, 2, 40ms}, {0, 2, 40ms}, {4, 2, 45ms}}, "R0 to R8", "40ms to 45ms"},
+        // a block that is cut
+        {{{0, 300, 500ms}}, "R0 (300)", "500ms"},
+    };
+    for (const auto& row : kRows) {
+        SCOPED_TRACE(row.instead);
+        line.stations.clear();
+        Station& press = add("press");
+        for (const Asked& one : row.asked) ask(press, one.first, one.count, one.every);
+        const Advice rarer = find(std::string("read press ") + row.what + " every ");
+        EXPECT_THAT(rarer.what, EndsWith(std::string(" instead of ") + row.instead));
+        EXPECT_LE(rarer.load, kHigh);
+    }
+}
+
 TEST_F(AdviceTest, WhereNoPollAloneIsEnoughAllIntervalsAre) {
     for (const char* name : {"a", "b", "c", "d"}) ask(add(name), 0, 100, 600ms);
     EXPECT_THAT(find("read").what, IsEmpty());
@@ -72,9 +108,52 @@ TEST_F(AdviceTest, WhereNoPollAloneIsEnoughAllIntervalsAre) {
     EXPECT_GT(all.load, 0.7);
 }
 
+TEST_F(AdviceTest, AllIntervalsEndAtADay) {
+    ask(add("press"), 0, 100, 150ms);
+    ask(line.stations[0], 5000, 1, 24h);
+    EXPECT_THAT(find("all intervals ").what, HasSubstr("(24h at most)"));
+}
+
+TEST_F(AdviceTest, AllIntervalsAreLongEnoughWhereReadingAgainIsAtItsLimit) {
+    add_both();
+    show_as_written(line.stations[1]);
+    ask(line.stations[1], 500, 60, 2s);
+    copy(0, 4, 50ms);
+    const LinePlan now = make_plan(line);
+    const Advice all = find("all intervals ");
+    ASSERT_THAT(all.what, Not(IsEmpty()));
+    EXPECT_GT(factor(all), now.load / kHigh + 0.2);
+    EXPECT_NEAR(all.load, make_plan(at_intervals(line, factor(all))).load, 1e-9);
+    EXPECT_LE(all.load, kHigh);
+}
+
+TEST_F(AdviceTest, AFactorOfManyHundredsIsFoundToo) {
+    add_both();
+    ask(line.stations[0], 0, 125, 600us);
+    copy(500, 20, 50ms).refresh = 60s;  // it stays
+    const Advice all = find("all intervals ");
+    ASSERT_THAT(all.what, Not(IsEmpty()));
+    EXPECT_GT(factor(all), make_plan(line).load / kHigh);
+    EXPECT_GT(factor(all), 500);
+    EXPECT_LE(all.load, kHigh);
+}
+
+TEST_F(AdviceTest, ARefreshIsNoInterval) {
+    line.serial.baud = 1200;
+    add_both();
+    copy(0, 20, 100ms).refresh = 2s;
+    ASSERT_EQ(verdict(make_plan(line)), Verdict::overload);
+    ASSERT_TRUE(is_high_by_changes(make_plan(at_rate(line, 9600))));
+    EXPECT_THAT(find("serial: ").what, HasSubstr("19200")) << "neither figure is too high then";
+    const Advice all = find("all intervals ");
+    EXPECT_THAT(all.what, HasSubstr("times as long (refresh as it is)"));
+    line.relays[0].every = std::chrono::round<std::chrono::microseconds>(factor(all) * 100ms);
+    EXPECT_NEAR(all.load, make_plan(line).load, 1e-6);
+    EXPECT_EQ(verdict(make_plan(line)), Verdict::fine);
+}
+
 TEST_F(AdviceTest, RelaysThatGoOnWhereAnotherEndsCouldBeOne) {
-    add("from");
-    add("to");
+    add_both();
     for (const std::uint32_t first : {4u, 0u, 8u}) copy(first, 4, 200ms);
     const Advice one = find("one relay instead of ");
     EXPECT_THAT(one.what, HasSubstr("copy4 and copy8"));
@@ -85,23 +164,24 @@ TEST_F(AdviceTest, RelaysThatGoOnWhereAnotherEndsCouldBeOne) {
 }
 
 TEST_F(AdviceTest, RelaysThatDifferStayTwo) {
-    add("from");
-    add("to");
+    add_both();
     copy(0, 4, 150ms);
-    copy(4, 4, 150ms).to->span.first += 1;
-    EXPECT_THAT(find("one relay").what, IsEmpty());
-    line.relays[1].to->span.first -= 1;
-    EXPECT_THAT(find("one relay").what, Not(IsEmpty()));
-    line.relays[1].refresh = 60s;
-    EXPECT_THAT(find("one relay").what, IsEmpty());
-}
-
-TEST_F(AdviceTest, RelaysThatNoWriteHoldsTogetherStayTwo) {
-    add("from");
-    add("to");
-    copy(0, 100, 300ms);
-    copy(100, 24, 300ms);
-    EXPECT_THAT(find("one relay").what, IsEmpty());
+    copy(4, 4, 150ms);
+    EXPECT_THAT(merged_after([] {}), Not(IsEmpty()));
+    EXPECT_THAT(merged_after([&] { ++line.relays[1].to->span.first; }), IsEmpty());
+    EXPECT_THAT(merged_after([&] { line.relays[1].refresh = 60s; }), IsEmpty());
+    const auto read_on = [&] {  // it would be a circle
+        Relay& back = copy(500, 4, 150ms);
+        back.from = Relay::End{1, {kRegisters, 500, 4}};
+        back.to = Relay::End{0, {kRegisters, 4, 4}};
+    };
+    EXPECT_THAT(merged_after(read_on), IsEmpty());
+    const auto too_long = [&] {  // for one write
+        line.relays.clear();
+        copy(0, 100, 300ms);
+        copy(100, 24, 300ms);
+    };
+    EXPECT_THAT(merged_after(too_long), IsEmpty());
 }
 
 TEST_F(AdviceTest, RelaysThatTheProfileKeepsApartStayTwo) {
@@ -113,62 +193,10 @@ TEST_F(AdviceTest, RelaysThatTheProfileKeepsApartStayTwo) {
         part.readable = {first, first == 0 ? 503u : 9999u};
         part.writable = part.readable;
     }
-    add("from");
-    add("to").profile = &parts;
+    add_both();
     copy(0, 4, 150ms);
     copy(4, 4, 150ms);
-    EXPECT_THAT(find("one relay").what, IsEmpty());
-    line.stations[1].profile = shipped.find("generic");
-    EXPECT_THAT(find("one relay").what, Not(IsEmpty()));
-}
-
-TEST_F(AdviceTest, RelaysWhoseTargetIsReadOnStayTwo) {
-    add("from");
-    add("to");
-    copy(0, 4, 150ms);
-    copy(4, 4, 150ms);
-    Relay& back = copy(500, 4, 150ms);
-    back.from = Relay::End{1, {kRegisters, 500, 4}};
-    back.to = Relay::End{0, {kRegisters, 4, 4}};
-    EXPECT_THAT(find("one relay").what, IsEmpty()) << "it would be a circle";
-}
-
-TEST_F(AdviceTest, AllIntervalsAreLongEnoughWhereReadingAgainIsAtItsLimit) {
-    add("from");
-    Station& to = add("to");
-    to.memory.shown_as = [](const modbus::Span& written) { return std::vector{written}; };
-    ask(to, 500, 60, 2s);
-    copy(0, 4, 50ms);
-    const LinePlan now = make_plan(line);
-    const Advice all = find("all intervals ");
-    ASSERT_THAT(all.what, Not(IsEmpty()));
-    EXPECT_GT(factor(all), now.load / kHigh + 0.2);
-    EXPECT_NEAR(all.load, make_plan(at_intervals(line, factor(all))).load, 1e-9);
-    EXPECT_LE(all.load, kHigh);
-}
-
-TEST_F(AdviceTest, ARefreshIsNoInterval) {
-    line.serial.baud = 1200;
-    add("from");
-    add("to");
-    copy(0, 20, 100ms).refresh = 2s;
-    const Advice all = find("all intervals ");
-    EXPECT_THAT(all.what, HasSubstr("times as long (refresh as it is)"));
-    line.relays[0].every = rounded(factor(all) * 100ms);
-    EXPECT_NEAR(all.load, make_plan(line).load, 1e-6);
-    EXPECT_EQ(verdict(make_plan(line)), Verdict::fine);
-}
-
-TEST_F(AdviceTest, AFactorOfManyHundredsIsFoundToo) {
-    add("from");
-    add("to");
-    ask(line.stations[0], 0, 125, 600us);
-    copy(500, 20, 50ms).refresh = 60s;  // it stays
-    const Advice all = find("all intervals ");
-    ASSERT_THAT(all.what, Not(IsEmpty()));
-    EXPECT_GT(factor(all), make_plan(line).load / kHigh);
-    EXPECT_GT(factor(all), 500);
-    EXPECT_LE(all.load, kHigh);
+    EXPECT_THAT(merged_after([&] { line.stations[1].profile = &parts; }), IsEmpty());
 }
 
 TEST_F(AdviceTest, AGapThatIsSetIsKeptAtAnotherRate) {
@@ -184,78 +212,100 @@ TEST_F(AdviceTest, AGapThatIsSetIsKeptAtAnotherRate) {
 
 TEST_F(AdviceTest, WhatIsTooMuchWhileValuesChangeIsJudgedByThat) {
     line.serial = {.baud = 1200, .parity = Parity::even};
-    add("to");
-    add("other");
+    add_both();
     copy(0, 100, 1s).refresh = 60s;
     line.relays[0].from.reset();  // on another line
-    line.relays[0].to->station = 0;
-    const LinePlan now = make_plan(line);
-    ASSERT_TRUE(is_high_by_changes(now));
+    ASSERT_TRUE(is_high_by_changes(make_plan(line)));
     ASSERT_THAT(advice(), Not(IsEmpty()));
     const Advice rate = find("serial: {baud: 4800}");
     EXPECT_NEAR(rate.most, make_plan(at_rate(line, 4800)).most, 1e-9) << "2400 is not enough";
     for (const Advice& one : advice()) EXPECT_LE(one.most, kFull) << one.what;
 }
 
-TEST_F(AdviceTest, WhatHasTwoFiguresLeavesNeitherTooHigh) {
-    line.serial.baud = 1200;
-    add("from");
-    add("to");
-    copy(0, 20, 100ms).refresh = 2s;
-    ASSERT_EQ(verdict(make_plan(line)), Verdict::overload);
-    ASSERT_TRUE(is_high_by_changes(make_plan(at_rate(line, 9600))));
-    EXPECT_THAT(find("serial: ").what, HasSubstr("19200"));
-}
-
-TEST_F(AdviceTest, WhatBringsTheMostIsToldFirst) {
+TEST_F(AdviceTest, WhatBringsTheMostIsToldFirstAndWhatBringsNothingIsNot) {
     add("press").think_time = 3s;
     ask(line.stations[0], 0, 1, 1s);
     const std::vector<Advice> all = advice();
     ASSERT_GT(all.size(), 1u);
     EXPECT_TRUE(std::ranges::is_sorted(all, {}, &Advice::load));
     EXPECT_LT(all[0].load, kHigh);
-}
-
-TEST_F(AdviceTest, WhatBringsLessThanOnePercentIsNotTold) {
     line.serial.baud = 57600;
-    add("press").think_time = 3s;
-    ask(line.stations[0], 0, 1, 1s);
-    EXPECT_THAT(find("serial").what, IsEmpty());
-}
-
-TEST_F(AdviceTest, PointsOfOneReadAreToldFromTheFirstToTheLast) {
-    Station& press = add("press");
-    for (const std::uint32_t first : {8u, 0u, 4u}) ask(press, first, 2, 40ms);
-    ask(press, 2, 1, 10s);
-    const Advice rarer = find("read press R0 to R8 every ");
-    EXPECT_THAT(rarer.what, HasSubstr(" instead of 40ms"));
-    EXPECT_LE(rarer.load, kHigh);
-}
-
-TEST_F(AdviceTest, PointsOfOneReadWithSeveralIntervalsAreToldWithAllOfThem) {
-    Station& press = add("press");
-    for (const std::uint32_t first : {8u, 0u}) ask(press, first, 2, 40ms);
-    ask(press, 4, 2, 45ms);
-    EXPECT_THAT(find("read press R0 to R8 every ").what, HasSubstr(" instead of 40ms to 45ms"));
-}
-
-TEST_F(AdviceTest, ABlockThatIsCutIsOne) {
-    ask(add("press"), 0, 300, 500ms);
-    EXPECT_THAT(find("read press R0 (300) every ").what, HasSubstr("instead of 500ms"));
-}
-
-TEST_F(AdviceTest, IntervalsEndAtADay) {
-    ask(add("press"), 0, 100, 150ms);
-    ask(line.stations[0], 5000, 1, 24h);
-    EXPECT_THAT(find("all intervals ").what, HasSubstr("(24h at most)"));
-}
-
-TEST_F(AdviceTest, NothingIsToldThatBringsNothing) {
+    EXPECT_THAT(find("serial").what, IsEmpty()) << "less than one percent";
     line.serial.baud = 115200;
+    line.stations.clear();
     ask(add("press"), 0, 100, 12ms);
     for (const Advice& one : advice()) EXPECT_LT(one.load, make_plan(line).load) << one.what;
     EXPECT_THAT(advice(), Not(IsEmpty()));
-    EXPECT_THAT(find("serial").what, IsEmpty()) << "there is no higher one";
+    EXPECT_THAT(find("serial").what, IsEmpty()) << "there is no higher rate";
+}
+
+using WarningsTest = AdviceTest;
+
+TEST_F(WarningsTest, APanelThatThinksForLongerThanItIsWaitedForTimesOut) {
+    Station& press = add("press");
+    press.think_time = press.response_timeout = 500ms;
+    EXPECT_THAT(warned(), IsEmpty()) << "nobody asks it";
+    ask(press, 0, 1, 10s);
+    EXPECT_THAT(warned(), ElementsAre(AllOf(HasSubstr("think_time 500ms of 'press'"),
+                                            HasSubstr("response_timeout of 500ms"),
+                                            HasSubstr("would time out"))))
+        << "the silence that ends the request comes before";
+    press.response_timeout += silent_interval(line.serial);
+    EXPECT_THAT(warned(), IsEmpty());
+}
+
+TEST_F(WarningsTest, PanelsThatAreAlikeAreToldTogetherAndARelayIsARequestToo) {
+    add("from");
+    for (const char* name : {"a", "b", "c", "d", "e"}) {
+        Station& one = add(name);
+        one.think_time = 3s;
+        if (*name != 'a') ask(one, 0, 1, 60s);
+    }
+    copy(0, 4, 60s);  // to 'a'
+    EXPECT_THAT(warned(), ElementsAre(HasSubstr("'a', 'b', 'c' and 2 more")));
+}
+
+TEST_F(WarningsTest, APollThatMissesTheDeadlineBehindTheLongestOtherIsTold) {
+    Station& press = add("press");
+    ask(press, 0, 100, 60s);
+    ask(press, 500, 50, 60s);
+    const LinePlan plan = make_plan(line);
+    ASSERT_EQ(plan.polls.size(), 2u);
+    line.deadline = plan.polls[0].wire + plan.polls[1].wire;
+    EXPECT_THAT(warned(), IsEmpty());
+    line.deadline -= 1us;
+    EXPECT_THAT(warned(), ElementsAre(AllOf(HasSubstr("poll of press R0 (count 100)"),
+                                            HasSubstr("poll of press R500 (count 50)"),
+                                            HasSubstr("queue: {deadline: "),
+                                            HasSubstr("read at most 99 at once"))));
+}
+
+TEST_F(WarningsTest, WhatItSaysHelps) {
+    line.serial.baud = 1200;
+    Station& press = add("press");
+    ask(press, 0, 100, 60s);
+    ask(press, 500, 10, 60s);
+    EXPECT_THAT(warned(), Not(IsEmpty()));
+    const std::string text = warned()[0];
+    const std::string word = "read at most ";
+    ASSERT_THAT(text, HasSubstr(word));
+    std::uint32_t& count = press.asked[0].want.span.count;
+    count = static_cast<std::uint32_t>(std::stoul(text.substr(text.find(word) + word.size())));
+    EXPECT_THAT(warned(), IsEmpty());
+    ++count;
+    EXPECT_THAT(warned(), Not(IsEmpty()));
+    count = 100;
+    ASSERT_THAT(text, HasSubstr("{deadline: 3s}"));
+    line.deadline = 3s;
+    EXPECT_THAT(warned(), IsEmpty());
+}
+
+TEST_F(WarningsTest, PointsThatAreReadTogetherCannotBeFewer) {
+    line.deadline = 30ms;
+    Station& press = add("press");
+    ask(press, 0, 10, 60s);
+    ask(press, 10, 10, 60s);
+    EXPECT_THAT(warned(), ElementsAre(AllOf(HasSubstr("it misses"), Not(HasSubstr("at most")))));
 }
 
 }  // namespace

@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
+#include <cstdint>
+#include <initializer_list>
 #include <random>
 #include <regex>
+#include <string>
+#include <vector>
 
 #include "panelgate/plan/advice.hpp"
 #include "panelgate/plan/line_plan.hpp"
@@ -16,8 +19,6 @@ namespace panelgate::plan::followed_test {
 namespace {
 
 constexpr int kLines = 1500;
-
-Duration rounded(Duration every) { return std::chrono::round<std::chrono::microseconds>(every); }
 
 /// A line with any rate and format, with polls, points and relays.
 class AnyLine : private test::PlantLine {
@@ -48,10 +49,7 @@ class AnyLine : private test::PlantLine {
         Station& station = add("s" + std::to_string(i), pick({"generic", "panasonic-gt"}));
         station.think_time = pick<Duration>({0ms, 1ms, 5500us, 100ms});
         if (number(0, 2) == 0) station.frame_gap = pick<Duration>({0us, 500us, 3500us, 20ms});
-        if (number(0, 1) == 0)
-            station.memory.shown_as = [](const modbus::Span& written) {
-                return std::vector{written};
-            };
+        if (number(0, 1) == 0) show_as_written(station);
         const int asked = number(0, 5);
         for (int n = 0; n < asked; ++n) {
             const auto first = static_cast<std::uint32_t>(number(0, 30) * 20);
@@ -81,8 +79,6 @@ Duration duration_of(const std::string& text) {
     return std::stoll(text) * unit;
 }
 
-void follow_rate(Line& line, const std::smatch& words) { line.serial.baud = std::stoi(words[1]); }
-
 void follow_read(Line& line, const std::smatch& words) {
     const auto station = std::ranges::find(line.stations, words[1].str(), &Station::name);
     const auto first = static_cast<std::uint32_t>(std::stoul(words[2]));
@@ -98,7 +94,8 @@ void follow_intervals(Line& line, const std::smatch& words) {
     const double times = std::stod(words[1]);
     const auto longer = [&](Duration every) {
         const auto made = std::chrono::duration_cast<Duration>(every * times);
-        return rounded(words[2].matched ? std::min<Duration>(made, 24h) : made);
+        const Duration most = words[2].matched ? std::min<Duration>(made, 24h) : made;
+        return Duration(std::chrono::round<std::chrono::microseconds>(most));
     };
     for (Station& station : line.stations) {
         for (PolledItem& asked : station.asked) asked.want.every = longer(asked.want.every);
@@ -130,7 +127,7 @@ Line followed(const Line& before, const std::string& what) {
     Line line = before;
     std::smatch words;
     if (std::regex_match(what, words, kRate)) {
-        follow_rate(line, words);
+        line.serial.baud = std::stoi(words[1]);
     } else if (std::regex_match(what, words, kRead)) {
         follow_read(line, words);
     } else if (std::regex_match(what, words, kAll)) {

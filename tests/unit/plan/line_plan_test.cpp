@@ -2,16 +2,21 @@
 
 #include <gmock/gmock.h>
 
+#include <cstddef>
+#include <optional>
+
 #include "plant_line.hpp"
 
 namespace panelgate::plan::line_plan_test {
 namespace {
 
-using test::kRegisters;
-using testing::DoubleNear;
 using testing::SizeIs;
 
-class LinePlanTest : public testing::Test, protected test::PlantLine {};
+class LinePlanTest : public testing::Test, protected test::PlantLine {
+  protected:
+    std::optional<HighestRate> rate() const { return highest_rate(line, make_plan(line)); }
+    LinePlan at(double times) const { return make_plan(at_intervals(line, 1 / times)); }
+};
 
 TEST_F(LinePlanTest, APollCostsItsFramesItsSilencesAndTheThinkTime) {
     Station& press = add("press");
@@ -27,13 +32,8 @@ TEST_F(LinePlanTest, APollCostsItsFramesItsSilencesAndTheThinkTime) {
     EXPECT_NEAR(to_seconds(poll.wire), 0.034375 + 2 * 0.003645833 + 0.003, 1e-7);
     EXPECT_NEAR(plan.load, to_seconds(poll.wire) / 0.5, 1e-9);
     EXPECT_EQ(plan.once, poll.wire);
-}
-
-TEST_F(LinePlanTest, ALongerGapIsKeptBehindTheReplyOnly) {
-    ask(add("press"), 0, 10, 1s);
-    const Duration usual = make_plan(line).once;
-    line.stations[0].frame_gap = silent_interval(line.serial) + 20ms;
-    EXPECT_EQ(make_plan(line).once, usual + 20ms);
+    press.frame_gap = silent_interval(line.serial) + 20ms;
+    EXPECT_EQ(make_plan(line).once, poll.wire + 20ms) << "kept behind the reply only";
 }
 
 TEST_F(LinePlanTest, NeighboursAreOnePollAsTheyWillBe) {
@@ -47,8 +47,7 @@ TEST_F(LinePlanTest, NeighboursAreOnePollAsTheyWillBe) {
 }
 
 TEST_F(LinePlanTest, ARelayLoadsTheLinesOfItsEnds) {
-    add("from");
-    add("to");
+    add_both();
     copy(0, 4, 1s);
     const LinePlan both = make_plan(line);
     ASSERT_THAT(both.relays, SizeIs(2));
@@ -57,26 +56,21 @@ TEST_F(LinePlanTest, ARelayLoadsTheLinesOfItsEnds) {
     EXPECT_EQ(both.relays[1].request, RelayLoad::Request::write);
     EXPECT_EQ(both.relays[1].station, "to");
     EXPECT_EQ(both.load, both.relays[0].load + both.relays[1].load);
+    line.relays[0].refresh = 60s;
+    const LinePlan plan = make_plan(line);
+    const RelayLoad& write = plan.relays[1];
+    EXPECT_EQ(write.every, 60s) << "where it waits for changes, only that is certain";
+    EXPECT_NEAR(write.most, 60 * write.load, 1e-9);
+    EXPECT_NEAR(plan.most - plan.load, write.most - write.load, 1e-9);
     line.relays[0].to.reset();  // on another line
     EXPECT_THAT(make_plan(line).relays, SizeIs(1));
     EXPECT_NEAR(make_plan(line).load, both.relays[0].load, 1e-12);
 }
 
-TEST_F(LinePlanTest, AWriteThatWaitsForChangesIsCertainOnlyOnceARefresh) {
-    add("from");
-    add("to");
-    copy(0, 4, 1s).refresh = 60s;
-    const LinePlan plan = make_plan(line);
-    const RelayLoad& write = plan.relays[1];
-    EXPECT_EQ(write.every, 60s);
-    EXPECT_NEAR(write.most, 60 * write.load, 1e-9);
-    EXPECT_NEAR(plan.most - plan.load, write.most - write.load, 1e-9);
-}
-
 TEST_F(LinePlanTest, PollsThatAWriteMakesOldAreReadAgain) {
-    add("from");
-    Station& to = add("to");
-    to.memory.shown_as = [](const modbus::Span& written) { return std::vector{written}; };
+    add_both();
+    Station& to = line.stations[1];
+    show_as_written(to);
     ask(to, 0, 4, 10s);
     ask(to, 500, 4, 10s);
     copy(0, 4, 1s).refresh = 20s;
@@ -100,7 +94,7 @@ TEST_F(LinePlanTest, P4TheWorstDeadStationIsTheOneThatWasAskedLeast) {
     const LinePlan plan = make_plan(line);
     ASSERT_TRUE(plan.dead);
     EXPECT_EQ(plan.dead->station, "mixer");
-    EXPECT_THAT(plan.dead->load, DoubleNear(plan.polls[0].load + 0.05, 1e-9));
+    EXPECT_NEAR(plan.dead->load, plan.polls[0].load + 0.05, 1e-9);
     EXPECT_NEAR(to_seconds(plan.dead->holds), 0.7 + 0.008333333 + 0.003645833, 1e-7)
         << "press may fall silent as well";
 }
@@ -114,16 +108,11 @@ TEST_F(LinePlanTest, P4WhereTheWholeLineRestsTheOthersWaitForThatToo) {
     EXPECT_EQ(make_plan(line).dead->holds, alone + Duration(5s));
 }
 
-TEST_F(LinePlanTest, OfALineThatListensNothingIsLeftAndNobodyHoldsItUp) {
-    add("press");
-    line.listens = true;
-    const LinePlan plan = make_plan(line);
-    EXPECT_FALSE(plan.dead);
-    EXPECT_EQ(plan.free_share(), 0);
-    EXPECT_EQ(plan.free_reads(), 0);
-}
-
 TEST_F(LinePlanTest, WhatIsLeftIsForClients) {
+    const LinePlan empty = make_plan(line);  // no stations
+    EXPECT_EQ(empty.load, 0);
+    EXPECT_FALSE(empty.dead);
+    EXPECT_GT(empty.free_reads(), 10);
     Station& press = add("press");
     const LinePlan idle = make_plan(line);
     EXPECT_NEAR(idle.free_reads(), 1 / to_seconds(idle.client_read), 1e-9);
@@ -131,36 +120,31 @@ TEST_F(LinePlanTest, WhatIsLeftIsForClients) {
     const LinePlan half = make_plan(line);
     EXPECT_NEAR(half.load, 0.5, 1e-6);
     EXPECT_NEAR(half.free_reads(), idle.free_reads() / 2, 1e-3);
+    press.asked.clear();
+    line.listens = true;
+    const LinePlan listening = make_plan(line);
+    EXPECT_FALSE(listening.dead) << "nobody holds it up";
+    EXPECT_EQ(listening.free_share(), 0);
+    EXPECT_EQ(listening.free_reads(), 0);
 }
 
-TEST_F(LinePlanTest, WhatIsTooMuchIsTold) {
-    Station& press = add("press");
+TEST_F(LinePlanTest, WhatIsTooMuchIsToldAndChangesAloneAreNoOverload) {
+    add_both();
     const Duration wire = make_plan(line).client_read;
     const auto verdict_at = [&](Duration every) {
-        press.asked.clear();
-        ask(press, 0, 10, every);
+        line.stations[0].asked.clear();
+        ask(line.stations[0], 0, 10, every);
         return verdict(make_plan(line));
     };
     EXPECT_EQ(verdict_at(wire * 100 / 79), Verdict::fine);
     EXPECT_EQ(verdict_at(wire * 100 / 81), Verdict::high);
     EXPECT_EQ(verdict_at(wire * 100 / 101), Verdict::overload);
-}
-
-TEST_F(LinePlanTest, ChangesAloneAreNoOverload) {
-    add("from");
-    add("to");
+    line.stations[0].asked.clear();
     copy(0, 50, 150ms).refresh = 60s;
     const LinePlan plan = make_plan(line);
     EXPECT_GT(plan.most, 1);
     EXPECT_LT(plan.load, 1);
     EXPECT_EQ(verdict(plan), Verdict::high);
-}
-
-TEST_F(LinePlanTest, ALineWithoutStationsIsIdle) {
-    const LinePlan plan = make_plan(line);
-    EXPECT_EQ(plan.load, 0);
-    EXPECT_FALSE(plan.dead);
-    EXPECT_GT(plan.free_reads(), 10);
 }
 
 TEST_F(LinePlanTest, AnotherRateTakesTheGapsAlongThatAreNotSet) {
@@ -179,14 +163,54 @@ TEST_F(LinePlanTest, AnotherRateTakesTheGapsAlongThatAreNotSet) {
 }
 
 TEST_F(LinePlanTest, OtherIntervalsLeaveTheRefreshAndEndAtADay) {
-    ask(add("from"), 0, 1, 13h);
-    add("to");
+    add_both();
+    ask(line.stations[0], 0, 1, 13h);
     copy(0, 4, 1s).refresh = 2s;
     const Line rarer = at_intervals(line, 3);
     EXPECT_EQ(rarer.stations[0].asked[0].want.every, 24h);
     EXPECT_EQ(rarer.relays[0].every, 3s);
     EXPECT_EQ(rarer.relays[0].writes_every(), 3s);
     EXPECT_EQ(rarer.relays[0].refresh, 2s);
+}
+
+TEST_F(LinePlanTest, PollsCanGoUpToEightyPercent) {
+    Station& press = add("press");
+    EXPECT_FALSE(rate()) << "an idle line has no highest rate";
+    ask(press, 0, 10, 2 * make_plan(line).client_read);
+    ASSERT_TRUE(rate());
+    EXPECT_NEAR(rate()->times, 1.6, 1e-5);
+    EXPECT_FALSE(rate()->changing);
+}
+
+TEST_F(LinePlanTest, TheHighestRateIsSlowerWhereChangesAreTooMuch) {
+    add_both();
+    copy(0, 50, 150ms).refresh = 60s;
+    ASSERT_GT(make_plan(line).most, 1);
+    ASSERT_TRUE(rate());
+    EXPECT_LT(rate()->times, 1);
+    EXPECT_TRUE(rate()->changing);
+    EXPECT_NEAR(at(rate()->times).most, kFull, 1e-4);
+}
+
+TEST_F(LinePlanTest, ARefreshThatStaysLeavesMoreToTheHighestRate) {
+    add_both();
+    ask(line.stations[0], 200, 50, 2s);
+    copy(0, 10, 10s).refresh = 10s;
+    const LinePlan now = make_plan(line);
+    ASSERT_TRUE(rate());
+    EXPECT_GT(rate()->times, kHigh / now.load) << "writes do not come more often";
+    EXPECT_EQ(verdict(at(rate()->times * 0.999)), Verdict::fine);
+    EXPECT_NE(verdict(at(rate()->times * 1.001)), Verdict::fine);
+}
+
+TEST_F(LinePlanTest, ReadingAgainStopsAtItsLimit) {
+    add_both();
+    show_as_written(line.stations[1]);
+    ask(line.stations[1], 500, 60, 10s);
+    copy(0, 4, 100ms);
+    ASSERT_TRUE(rate());
+    EXPECT_LT(rate()->times, kHigh / make_plan(line).load) << "slower, it is as much at first";
+    EXPECT_NEAR(at(rate()->times).load, kHigh, 1e-4);
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "panelgate/plan/line_plan.hpp"
 #include "panelgate/profile/load_profile.hpp"
@@ -23,9 +25,17 @@ class PlantLine {
         station.profile = shipped.find(profile);
         return station;
     }
+    /// The ends of copy().
+    void add_both() {
+        for (const char* name : {"from", "to"}) add(name);
+    }
 
     static void ask(Station& station, std::uint32_t first, std::uint32_t count, Duration every) {
         station.asked.push_back({{{kRegisters, first, count}, every}, "R" + std::to_string(first)});
+    }
+    /// What is written there is read at the same addresses only.
+    static void show_as_written(Station& station) {
+        station.memory.shown_as = [](const modbus::Span& written) { return std::vector{written}; };
     }
 
     /// A relay from the first to the second station, which both exist.

@@ -1,22 +1,31 @@
 #include "panelgate/points/read_plan.hpp"
 
 #include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
+#include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <set>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace panelgate::points::read_plan_test {
 namespace {
 
 using modbus::Table;
-using testing::ElementsAre;
-using testing::IsEmpty;
 using testing::SizeIs;
 
 constexpr Table kRegisters = Table::holding_registers;
 
-PlanLimits limits_of(std::uint32_t max_items, std::vector<profile::AddressRange> readable = {}) {
+using Ranges = std::vector<profile::AddressRange>;
+
+PlanLimits limits_of(std::uint32_t max_items, const Ranges& readable = {},
+                     std::vector<modbus::Span> refused = {}) {
     PlanLimits limits;
     for (TableLimits& table : limits.tables) table = {max_items, readable};
+    limits.refused = std::move(refused);
     return limits;
 }
 
@@ -24,17 +33,27 @@ Want want(std::uint32_t address, std::uint32_t count = 1, Duration every = 1s) {
     return {{kRegisters, address, count}, every};
 }
 
-std::vector<modbus::Span> spans(const std::vector<PlannedRead>& plan) {
-    std::vector<modbus::Span> result;
-    for (const PlannedRead& read : plan) result.push_back(read.span);
-    return result;
-}
-
 modbus::Span span(std::uint32_t address, std::uint32_t count) {
     return {kRegisters, address, count};
 }
 
-TEST(ReadPlan, CountsWhatNobodyElseCanUseAsTheCostOfARead) {
+/// "10+2(0 1)": 2 items from 10 for these wants; '!': refused, "/500": every 500 ms and not 1 s.
+std::string text_of(const PlannedRead& read) {
+    std::string wants;
+    for (const std::size_t one : read.wants)
+        wants += (wants.empty() ? "" : " ") + std::to_string(one);
+    return std::to_string(read.span.first) + '+' + std::to_string(read.span.count) +
+           (read.refused ? "!" : "") + '(' + wants + ')' +
+           (read.every == 1s ? "" : '/' + std::to_string(read.every / 1ms));
+}
+
+std::string text_of(const std::vector<PlannedRead>& plan) {
+    std::string text;
+    for (const PlannedRead& read : plan) text += (text.empty() ? "" : " ") + text_of(read);
+    return text;
+}
+
+TEST(ReadPlan, CountsWhatNobodyElseCanUseAsTheCostOfAReadAndOfAWrite) {
     PlanLimits limits = limits_of(125);
     limits.serial = {.baud = 9600, .data_bits = 8, .parity = Parity::none, .stop_bits = 1};
     limits.gap = 4ms;
@@ -45,132 +64,91 @@ TEST(ReadPlan, CountsWhatNobodyElseCanUseAsTheCostOfARead) {
               wire_time(limits.serial, 8) + wire_time(limits.serial, 25) + silence);
     EXPECT_EQ(read_cost(limits, Table::coils, 9),
               wire_time(limits.serial, 8) + wire_time(limits.serial, 7) + silence);
-}
-
-TEST(ReadPlan, AWriteCostsItsFramesAndTheSameSilences) {
-    PlanLimits limits = limits_of(125);
-    limits.gap = 4ms;
-    limits.think_time = 3ms;
-    const Duration silence = 7ms + silent_interval(limits.serial);
-    const auto frames = [&](std::size_t bytes) {
-        return wire_time(limits.serial, bytes) + silence;
+    const auto expect_write = [&](Table table, std::uint32_t count, bool single, unsigned bytes) {
+        EXPECT_NEAR(to_seconds(write_cost(limits, table, count, single)),
+                    to_seconds(wire_time(limits.serial, bytes) + silence), 1e-8);
     };
-    EXPECT_NEAR(to_seconds(write_cost(limits, kRegisters, 10, false)),
-                to_seconds(frames(9 + 20 + 8)), 1e-8);
-    EXPECT_NEAR(to_seconds(write_cost(limits, Table::coils, 9, false)),
-                to_seconds(frames(9 + 2 + 8)), 1e-8);
-    EXPECT_NEAR(to_seconds(write_cost(limits, kRegisters, 1, true)), to_seconds(frames(8 + 8)),
-                1e-8);
+    expect_write(kRegisters, 10, false, 9 + 20 + 8);
+    expect_write(Table::coils, 9, false, 9 + 2 + 8);
+    expect_write(kRegisters, 1, true, 8 + 8);
 }
 
-TEST(ReadPlan, ReadsNeighboursTogether) {
-    const std::vector<Want> wants = {want(12, 2), want(10), want(11)};
-    const auto plan = plan_reads(wants, limits_of(125));
-    ASSERT_THAT(spans(plan), ElementsAre(span(10, 4)));
-    EXPECT_THAT(plan[0].wants, ElementsAre(0, 1, 2));
-    EXPECT_EQ(plan[0].every, 1s);
-    EXPECT_FALSE(plan[0].refused);
+struct Planned {
+    const char* why;
+    PlanLimits limits;
+    std::vector<Want> wants;
+    const char* reads;
+};
+
+void expect_plans(const std::vector<Planned>& rows) {
+    for (const Planned& row : rows)
+        EXPECT_EQ(text_of(plan_reads(row.wants, row.limits)), row.reads) << row.why;
+}
+
+TEST(ReadPlan, ServesEveryWantWithFewReads) {
+    const PlanLimits limits = limits_of(125);
+    expect_plans({
+        {"neighbours", limits, {want(12, 2), want(10), want(11)}, "10+4(0 1 2)"},
+        {"overlapping and contained ones",
+         limits,
+         {want(10, 20), want(12, 2), want(28, 10), want(10, 20)},
+         "10+28(0 1 2 3)"},
+        {"a want that fits is never torn", limits_of(4), {want(0, 3), want(3, 3)}, "0+3(0) 3+3(1)"},
+        {"one that is larger than a read is cut",
+         limits,
+         {want(0, 300), want(300, 10)},
+         "0+125(0) 125+125(0) 250+60(0 1)"},
+        {"a slow want in a fast read", limits, {want(12, 1, 10s), want(10, 5)}, "10+5(0 1)"},
+        {"not dearer per second", limits, {want(0, 2), want(2, 2, 2s)}, "0+4(0 1)"},
+        {"dearer", limits, {want(0, 2), want(2, 100, 60s)}, "0+2(0) 2+100(1)/60000"},
+        {"what cannot be asked for",
+         limits,
+         {want(0, 0), want(65535, 2), want(70000), want(5, 0xFFFFFFFF), want(1, 1, 0s)},
+         ""},
+        {"of an unreadable table", limits_of(0), {want(1)}, ""},
+        {"the last item", limits_of(125, {{0, 65535}}), {want(65535)}, "65535+1(0)"},
+    });
 }
 
 TEST(ReadPlan, CrossesAHoleOnlyWhereTheProfileSaysThatItIsReadable) {
     const std::vector<Want> wants = {want(10), want(13)};
-    EXPECT_THAT(spans(plan_reads(wants, limits_of(125, {{0, 100}}))), ElementsAre(span(10, 4)));
-    EXPECT_THAT(spans(plan_reads(wants, limits_of(125, {{0, 11}, {12, 100}}))),
-                ElementsAre(span(10, 4)));
-    EXPECT_THAT(spans(plan_reads(wants, limits_of(125, {{0, 11}, {13, 100}}))),
-                ElementsAre(span(10, 1), span(13, 1)));
+    expect_plans({
+        {"one area", limits_of(125, {{0, 100}}), wants, "10+4(0 1)"},
+        {"two side by side", limits_of(125, {{0, 11}, {12, 100}}), wants, "10+4(0 1)"},
+        {"a gap", limits_of(125, {{0, 11}, {13, 100}}), wants, "10+1(0) 13+1(1)"},
+    });
+}
+
+TEST(ReadPlan, ReadsARefusedSpanOnlyAlone) {
+    const PlanLimits limits = limits_of(125, {{0, 100}}, {span(12, 1)});
+    expect_plans({
+        {"not wanted", limits, {want(10), want(11), want(13), want(14)}, "10+2(0 1) 13+2(2 3)"},
+        {"wanted",
+         limits,
+         {want(11), want(12), want(13), want(12, 1, 5s)},
+         "11+1(0) 12+1!(1 3) 13+1(2)"},
+        {"with another want inside",
+         limits_of(125, {}, {span(10, 20)}),
+         {want(10, 20), want(12, 2)},
+         "10+20!(0) 12+2(1)"},
+    });
 }
 
 TEST(ReadPlan, ReadsAcrossAHoleOnlyWhileThatIsCheaperThanAnotherRequest) {
-    PlanLimits limits = limits_of(125, {{0, 65535}});
+    const PlanLimits limits = limits_of(125, {{0, 65535}});
     std::uint32_t hole = 0;
     while (plan_reads(std::vector{want(0), want(hole + 1)}, limits).size() == 1) ++hole;
     EXPECT_GT(read_cost(limits, kRegisters, hole + 2), 2 * read_cost(limits, kRegisters, 1));
     EXPECT_LE(read_cost(limits, kRegisters, hole + 1), 2 * read_cost(limits, kRegisters, 1));
 }
 
-TEST(ReadPlan, ServesOverlappingAndContainedWantsWithOneRead) {
-    const std::vector<Want> wants = {want(10, 20), want(12, 2), want(28, 10), want(10, 20)};
-    const auto plan = plan_reads(wants, limits_of(125));
-    ASSERT_THAT(spans(plan), ElementsAre(span(10, 28)));
-    EXPECT_THAT(plan[0].wants, ElementsAre(0, 1, 2, 3));
-}
-
-TEST(ReadPlan, NeverTearsAWantThatFitsIntoOneRead) {
-    const auto plan = plan_reads(std::vector{want(0, 3), want(3, 3)}, limits_of(4));
-    EXPECT_THAT(spans(plan), ElementsAre(span(0, 3), span(3, 3)));
-}
-
-TEST(ReadPlan, CutsAWantThatIsLargerThanARead) {
-    const std::vector<Want> wants = {want(0, 300), want(300, 10)};
-    const auto plan = plan_reads(wants, limits_of(125));
-    ASSERT_THAT(spans(plan), ElementsAre(span(0, 125), span(125, 125), span(250, 60)));
-    EXPECT_THAT(plan[0].wants, ElementsAre(0));
-    EXPECT_THAT(plan[2].wants, ElementsAre(0, 1));
-}
-
 TEST(ReadPlan, KeepsTablesApart) {
-    const std::vector<Want> wants = {{{Table::holding_registers, 1, 1}, 1s},
-                                     {{Table::input_registers, 2, 1}, 1s},
-                                     {{Table::coils, 1, 1}, 1s}};
+    const std::vector<Want> wants = {
+        want(1), {{Table::input_registers, 2, 1}, 1s}, {{Table::coils, 1, 1}, 1s}};
     const auto plan = plan_reads(wants, limits_of(125, {{0, 100}}));
     ASSERT_THAT(plan, SizeIs(3));
     EXPECT_EQ(plan[0].span.table, Table::coils);
     EXPECT_EQ(plan[1].span.table, Table::input_registers);
-}
-
-TEST(ReadPlan, ServesASlowWantByAFastReadThatContainsIt) {
-    const std::vector<Want> wants = {want(12, 1, 10s), want(10, 5, 1s)};
-    const auto plan = plan_reads(wants, limits_of(125));
-    ASSERT_THAT(spans(plan), ElementsAre(span(10, 5)));
-    EXPECT_EQ(plan[0].every, 1s);
-    EXPECT_THAT(plan[0].wants, ElementsAre(0, 1));
-}
-
-TEST(ReadPlan, JoinsIntervalsOnlyWhenThatIsNotDearerPerSecond) {
-    const PlanLimits limits = limits_of(125);
-    const auto cheap = plan_reads(std::vector{want(0, 2, 1s), want(2, 2, 2s)}, limits);
-    ASSERT_THAT(spans(cheap), ElementsAre(span(0, 4)));
-    EXPECT_EQ(cheap[0].every, 1s);
-    const auto dear = plan_reads(std::vector{want(0, 2, 1s), want(2, 100, 60s)}, limits);
-    EXPECT_THAT(spans(dear), ElementsAre(span(0, 2), span(2, 100)));
-}
-
-TEST(ReadPlan, ReadsNothingWithARefusedSpanInIt) {
-    PlanLimits limits = limits_of(125, {{0, 100}});
-    limits.refused = {span(12, 1)};
-    const std::vector<Want> wants = {want(10), want(11), want(13), want(14)};
-    EXPECT_THAT(spans(plan_reads(wants, limits)), ElementsAre(span(10, 2), span(13, 2)));
-}
-
-TEST(ReadPlan, AsksForARefusedWantAlone) {
-    PlanLimits limits = limits_of(125, {{0, 100}});
-    limits.refused = {span(12, 1)};
-    const std::vector<Want> wants = {want(11), want(12), want(13), want(12, 1, 5s)};
-    const auto plan = plan_reads(wants, limits);
-    ASSERT_THAT(spans(plan), ElementsAre(span(11, 1), span(12, 1), span(13, 1)));
-    EXPECT_TRUE(plan[1].refused);
-    EXPECT_FALSE(plan[0].refused);
-    EXPECT_THAT(plan[1].wants, ElementsAre(1, 3));
-}
-
-TEST(ReadPlan, AWantInsideARefusedOneIsReadWithoutIt) {
-    PlanLimits limits = limits_of(125);
-    limits.refused = {span(10, 20)};
-    const std::vector<Want> wants = {want(10, 20), want(12, 2)};
-    const auto plan = plan_reads(wants, limits);
-    ASSERT_THAT(spans(plan), ElementsAre(span(10, 20), span(12, 2)));
-    EXPECT_THAT(plan[0].wants, ElementsAre(0));
-    EXPECT_THAT(plan[1].wants, ElementsAre(1));
-}
-
-TEST(ReadPlan, DoesNotPlanWhatCannotBeAskedFor) {
-    const std::vector<Want> wants = {want(0, 0), want(65535, 2), want(70000), want(5, 0xFFFFFFFF),
-                                     want(1, 1, 0s)};
-    EXPECT_THAT(plan_reads(wants, limits_of(125)), IsEmpty());
-    EXPECT_THAT(plan_reads(std::vector{want(1)}, limits_of(0)), IsEmpty());
-    EXPECT_THAT(spans(plan_reads(std::vector{want(65535)}, limits_of(125, {{0, 65535}}))),
-                ElementsAre(span(65535, 1)));
 }
 
 TEST(ReadPlan, TakesTheProfilesLimitsWithinTheStandards) {
@@ -197,45 +175,48 @@ TEST(ReadPlan, TakesTheProfilesLimitsWithinTheStandards) {
 TEST(ReadPlan, PlansFourThousandScatteredBitsAtOnce) {
     std::vector<Want> wants;
     for (std::uint32_t i = 0; i < 4096; ++i) wants.push_back({{Table::coils, i * 16, 1}, 1s});
-    const PlanLimits limits = limits_of(2000, {{0, 65535}});
-    const auto plan = plan_reads(wants, limits);
-    EXPECT_THAT(plan, SizeIs(33));  // 125 of them within 2000 items
+    EXPECT_THAT(plan_reads(wants, limits_of(2000, {{0, 65535}})), SizeIs(33));  // 125 in 2000 items
 }
 
-TEST(Bisect, CutsAtTheWidestHole) {
-    const std::vector<Want> wants = {want(0), want(1), want(5), want(6), want(8)};
-    const auto plan = plan_reads(wants, limits_of(125, {{0, 100}}));
-    ASSERT_THAT(plan, SizeIs(1));
-    const auto halves = bisect(plan[0], wants);
-    ASSERT_TRUE(halves.has_value());
-    EXPECT_EQ(halves->first.span, span(0, 2));
-    EXPECT_EQ(halves->second.span, span(5, 4));
-    EXPECT_THAT(halves->second.wants, ElementsAre(2, 3, 4));
-    EXPECT_EQ(refused_between(halves->first, halves->second), span(1, 5));
+TEST(IsPlannable, AWantHasItemsOfTheTableAndAnInterval) {
+    constexpr std::uint32_t kItems = modbus::kTableItems;
+    EXPECT_TRUE(is_plannable(want(0, kItems)));
+    EXPECT_TRUE(is_plannable(want(kItems - 1, 1)));
+    EXPECT_FALSE(is_plannable(want(kItems - 1, 2)));
+    EXPECT_FALSE(is_plannable(want(kItems, 1)));
+    EXPECT_FALSE(is_plannable(want(1, 0xFFFF'FFFF))) << "the sum overflows";
+    EXPECT_FALSE(is_plannable(want(0, 0)));
+    EXPECT_FALSE(is_plannable(want(0, 1, 0s)));
 }
 
-TEST(Bisect, CutsInTheMiddleWhenThereIsNoHole) {
-    const std::vector<Want> wants = {want(0), want(1), want(2), want(3, 1, 500ms)};
-    const PlannedRead read{{kRegisters, 0, 4}, 500ms, {0, 1, 2, 3}, false};
-    const auto halves = bisect(read, wants);
-    ASSERT_TRUE(halves.has_value());
-    EXPECT_EQ(halves->first.span, span(0, 2));
-    EXPECT_EQ(halves->first.every, 1s);
-    EXPECT_EQ(halves->second.every, 500ms);
-}
-
-TEST(Bisect, LeavesAReadOfOneWantOrOfTheSameItemsAlone) {
-    const std::vector<Want> wants = {want(4, 2), want(4, 2), want(0, 300)};
-    EXPECT_FALSE(bisect({{kRegisters, 4, 2}, 1s, {0}, false}, wants).has_value());
-    EXPECT_FALSE(bisect({{kRegisters, 4, 2}, 1s, {0, 1}, false}, wants).has_value());
-    EXPECT_FALSE(bisect({{kRegisters, 125, 125}, 1s, {2}, false}, wants).has_value());
-}
-
-TEST(Bisect, KnowsNoSeamBetweenHalvesThatOverlap) {
-    const std::vector<Want> wants = {want(0, 4), want(2, 4)};
-    const auto halves = bisect({{kRegisters, 0, 6}, 1s, {0, 1}, false}, wants);
-    ASSERT_TRUE(halves.has_value());
-    EXPECT_FALSE(refused_between(halves->first, halves->second).has_value());
+TEST(Bisect, CutsAtTheWidestHoleOrInTheMiddle) {
+    struct Case {
+        std::vector<Want> wants;
+        PlannedRead read;
+        const char* halves;
+        std::optional<modbus::Span> between;  ///< refused, if both halves succeed
+    };
+    const Case cases[] = {
+        {{want(0), want(1), want(5), want(6), want(8)},
+         {span(0, 9), 1s, {0, 1, 2, 3, 4}, false},
+         "0+2(0 1) 5+4(2 3 4)",
+         span(1, 5)},
+        {{want(0), want(1), want(2), want(3, 1, 500ms)},
+         {span(0, 4), 500ms, {0, 1, 2, 3}, false},
+         "0+2(0 1) 2+2(2 3)/500",
+         span(1, 2)},
+        {{want(0, 4), want(2, 4)}, {span(0, 6), 1s, {0, 1}, false}, "0+4(0) 2+4(1)", {}},
+        // One want, the same items, a piece of one: nothing to cut.
+        {{want(4, 2)}, {span(4, 2), 1s, {0}, false}, "", {}},
+        {{want(4, 2), want(4, 2)}, {span(4, 2), 1s, {0, 1}, false}, "", {}},
+        {{want(0, 300)}, {span(125, 125), 1s, {0}, false}, "", {}},
+    };
+    for (const Case& c : cases) {
+        SCOPED_TRACE(text_of(c.read));
+        const auto halves = bisect(c.read, c.wants);
+        EXPECT_EQ(halves ? text_of(std::vector{halves->first, halves->second}) : "", c.halves);
+        if (halves) EXPECT_EQ(refused_between(halves->first, halves->second), c.between);
+    }
 }
 
 /// Simulates a panel that refuses every read containing one of `bad`, until only reads marked
@@ -271,13 +252,18 @@ TEST(Bisect, FindsWhatAPanelRefusesInALogarithmOfRequests) {
     PlanLimits limits = limits_of(125, {{0, 100}});
     EXPECT_EQ(learn(wants, limits, {37}), 7);
     const auto plan = plan_reads(wants, limits);
-    EXPECT_THAT(spans(plan), ElementsAre(span(0, 37), span(37, 1), span(38, 26)));
-    EXPECT_TRUE(plan[1].refused);
+    ASSERT_THAT(plan, SizeIs(3));
+    EXPECT_EQ(plan[0].span, span(0, 37));
+    EXPECT_EQ(text_of(plan[1]), "37+1!(37)");
+    EXPECT_EQ(plan[2].span, span(38, 26));
 
     PlanLimits holes = limits_of(125, {{0, 100}});
     wants.erase(wants.begin() + 30, wants.begin() + 34);
     EXPECT_EQ(learn(wants, holes, {32}), 1);
-    EXPECT_THAT(spans(plan_reads(wants, holes)), ElementsAre(span(0, 30), span(34, 30)));
+    const auto around = plan_reads(wants, holes);
+    ASSERT_THAT(around, SizeIs(2));
+    EXPECT_EQ(around[0].span, span(0, 30));
+    EXPECT_EQ(around[1].span, span(34, 30));
 }
 
 }  // namespace

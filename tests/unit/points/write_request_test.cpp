@@ -2,49 +2,23 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "panelgate/points/value.hpp"
+#include "panelgate/points/point.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "point_of.hpp"
 
 namespace panelgate::points::write_request_test {
 namespace {
 
-const profile::Catalogue& shipped() {
+using namespace std::string_literals;
+using enum Type;
+
+const profile::PanelProfile& shipped(const char* name) {
     static const profile::Catalogue catalogue = profile::Catalogue::shipped();
-    return catalogue;
-}
-
-std::string write(const char* profile, const Point& point, const Value& value) {
-    const auto write = write_request(*shipped().find(profile), point, value);
-    return write ? to_hex(write->pdu) : write.error().message;
-}
-
-TEST(WriteRequest, TakesTheFunctionThatThePanelHas) {
-    Point point = point_of(Type::u16);
-    point.address = 100;
-    EXPECT_EQ(write("generic", point, std::int64_t{7}), "06 00 64 00 07");
-    point.type = Type::f32;
-    point.word_order = WordOrder::cdab;
-    EXPECT_EQ(write("generic", point, 21.5), "10 00 64 00 02 04 00 00 41 ac");
-    point.table = modbus::Table::coils;
-    point.type = Type::boolean;
-    EXPECT_EQ(write("generic", point, true), "05 00 64 ff 00");
-    point.writable = false;
-    EXPECT_EQ(write("generic", point, true), "x is not writable");
-}
-
-TEST(WriteRequest, ABitOfAWordIsNeverReadChangedAndWritten) {
-    Point point = point_of(Type::boolean);
-    point.bit = 4;
-    point.address = 18;
-    EXPECT_EQ(write("generic", point, true), "16 00 12 ff ef 00 10");
-    EXPECT_EQ(write("autonics-gplp-s", point, true), "0f 01 24 00 01 01 01") << "UB184";
-    EXPECT_NE(write("panasonic-gt", point, true).find("can write no single bit of D0"),
-              std::string::npos)
-        << write("panasonic-gt", point, true);
+    return *catalogue.find(name);
 }
 
 /// A panel that has these functions.
@@ -59,39 +33,72 @@ profile::PanelProfile panel_with(std::initializer_list<std::uint8_t> codes) {
     return panel;
 }
 
-std::string write(const profile::PanelProfile& panel, const Point& point, const Value& value) {
-    const auto write = write_request(panel, point, value);
-    return write ? to_hex(write->pdu) : write.error().message;
+Point at(Point point, std::uint16_t address) {
+    point.address = address;
+    return point;
 }
 
-TEST(WriteRequest, OneRegisterGoesByTheFunctionForSeveralWhereThereIsNoOther) {
-    const Point point = point_of(Type::u16);
-    const profile::PanelProfile panel = panel_with({modbus::kWriteMultipleRegisters});
-    EXPECT_EQ(write(panel, point, std::int64_t{7}), "10 00 00 00 01 02 00 07");
-    EXPECT_EQ(write(panel_with({modbus::kReadHoldingRegisters}), point, std::int64_t{7}),
-              "panel has no function that writes 1 register");
+Point in(modbus::Table table, Point point) {
+    point.table = table;
+    return point;
 }
 
-TEST(WriteRequest, OneCoilGoesByTheFunctionForSeveralWhereThereIsNoOther) {
-    Point coil = point_of(Type::boolean);
-    coil.table = modbus::Table::coils;
-    coil.address = 9;
-    const profile::PanelProfile panel = panel_with({modbus::kWriteMultipleCoils});
-    EXPECT_EQ(write(panel, coil, true), "0f 00 09 00 01 01 01");
-    EXPECT_EQ(write(panel, coil, false), "0f 00 09 00 01 01 00");
-    EXPECT_EQ(write(panel_with({modbus::kWriteSingleCoil}), coil, false), "05 00 09 00 00");
+Point coil(std::uint16_t address) {
+    return in(modbus::Table::coils, at(point_of(boolean), address));
 }
 
-TEST(WriteRequest, ABitIsClearedByTheMaskThatKeepsTheOthers) {
-    Point point = point_of(Type::boolean);
-    point.address = 3;
-    point.bit = 0;
-    EXPECT_EQ(write("generic", point, false), "16 00 03 ff fe 00 00");
-    point.bit = 15;
-    EXPECT_EQ(write("generic", point, true), "16 00 03 7f ff 80 00");
+struct Row {
+    profile::PanelProfile panel;
+    Point point;
+    Value value;
+    std::string request;  ///< or the refusal
+};
+
+void expect_requests(const std::vector<Row>& rows) {
+    for (const Row& row : rows) {
+        const auto write = write_request(row.panel, row.point, row.value);
+        EXPECT_EQ(write ? to_hex(write->pdu) : write.error().message, row.request)
+            << row.panel.name << ' ' << label(row.point.type);
+    }
 }
 
-TEST(WriteRequest, ABitViewThatCannotBeWrittenIsNoWay) {
+TEST(WriteRequest, TakesTheFunctionThatThePanelHas) {
+    const profile::PanelProfile& generic = shipped("generic");
+    const Point f32_cdab = at(point_of(f32, WordOrder::cdab), 100);
+    Point read_only = coil(100);
+    read_only.writable = false;
+    expect_requests({
+        {generic, at(point_of(u16), 100), 7, "06 00 64 00 07"},
+        {generic, f32_cdab, 21.5, "10 00 64 00 02 04 00 00 41 ac"},
+        {generic, coil(100), true, "05 00 64 ff 00"},
+        {generic, read_only, true, "x is not writable"},
+        // One goes by the function for several where there is no other.
+        {panel_with({modbus::kWriteMultipleRegisters}), point_of(u16), 7,
+         "10 00 00 00 01 02 00 07"},
+        {panel_with({modbus::kWriteMultipleCoils}), coil(9), true, "0f 00 09 00 01 01 01"},
+        {panel_with({modbus::kWriteMultipleCoils}), coil(9), false, "0f 00 09 00 01 01 00"},
+        {panel_with({modbus::kWriteSingleCoil}), coil(9), false, "05 00 09 00 00"},
+        {panel_with({modbus::kReadHoldingRegisters}), point_of(u16), 7,
+         "panel has no function that writes 1 register"},
+        // What the value lacks is told when there is a way.
+        {generic, point_of(u16), 65536, "x must be from 0 to 65535 (u16), not 65536"},
+        {generic, in(modbus::Table::input_registers, point_of(u16)), 65536,
+         "D0 is in a table that cannot be written"},
+    });
+}
+
+TEST(WriteRequest, ABitOfAWordIsNeverReadChangedAndWritten) {
+    const std::string no_way =
+        " can write no single bit of D0: it has neither function 22 nor a bit view of it, and "
+        "reading, changing and writing the word would undo what changes in between";
+    const profile::PanelProfile& generic = shipped("generic");
+    expect_requests({
+        {generic, at(bit_of(4), 18), true, "16 00 12 ff ef 00 10"},
+        {generic, at(bit_of(0), 3), false, "16 00 03 ff fe 00 00"},  // the mask keeps the others
+        {generic, at(bit_of(15), 3), true, "16 00 03 7f ff 80 00"},
+        {shipped("autonics-gplp-s"), at(bit_of(4), 18), true, "0f 01 24 00 01 01 01"},  // UB184
+        {shipped("panasonic-gt"), at(bit_of(4), 18), true, "panasonic-gt" + no_way},
+    });
     profile::PanelProfile panel =
         panel_with({modbus::kWriteSingleCoil, modbus::kMaskWriteRegister});
     profile::Area words;
@@ -104,93 +111,49 @@ TEST(WriteRequest, ABitViewThatCannotBeWrittenIsNoWay) {
     bits.readable = {0, 159};
     bits.writable = profile::AddressRange{32, 47};
     panel.areas = {words, bits};
-    Point point = point_of(Type::boolean);
-    point.bit = 1;
-    point.address = 2;
-    EXPECT_EQ(write(panel, point, true), "05 00 21 ff 00") << "bit 33 may be written";
-    point.address = 3;
-    EXPECT_EQ(write(panel, point, true), "16 00 03 ff fd 00 02") << "bit 49 may not";
-    panel.functions.pop_back();
-    EXPECT_EQ(why_unwritable(panel, point).value_or("can be"),
-              "panel can write no single bit of D0: it has neither function 22 nor a bit view of "
-              "it, and reading, changing and writing the word would undo what changes in between");
+    profile::PanelProfile without_mask = panel;
+    without_mask.functions.pop_back();
+    expect_requests({
+        {panel, at(bit_of(1), 2), true, "05 00 21 ff 00"},        // bit 33 may be written
+        {panel, at(bit_of(1), 3), true, "16 00 03 ff fd 00 02"},  // bit 49 may not
+        {without_mask, at(bit_of(1), 3), true, "panel" + no_way},
+    });
 }
 
 TEST(WriteRequest, TellsWhatThePointIsThen) {
-    const auto written = [](const Point& point, const Value& value) {
-        const auto write =
-            write_request(*shipped().find("generic"), point, value, Rounding::nearest);
-        return write ? to_string(write->value) + write->label.value_or("") : write.error().message;
+    Point labelled = point_of(u16);
+    labelled.labels = {{1, " running"}};
+    struct Told {
+        Point point;
+        Value value;
+        const char* told;
     };
-    Point point = point_of(Type::i16);
-    point.scale = 0.1;
-    EXPECT_EQ(written(point, 21.46), "21.5");
-    point = point_of(Type::u16);
-    point.labels = {{1, " running"}};
-    EXPECT_EQ(written(point, std::string(" running")), "1 running");
-    EXPECT_EQ(written(point_of(Type::f32), 0.1), "0.1");
-    EXPECT_EQ(written(point_of(Type::string), std::string("ab")), "ab");
-    point = point_of(Type::boolean);
-    point.bit = 9;
-    EXPECT_EQ(written(point, true), "true");
-    point.bit.reset();
-    point.table = modbus::Table::coils;
-    EXPECT_EQ(written(point, std::int64_t{0}), "false");
-}
-
-TEST(WriteRequest, WhatTheValueLacksIsToldWhenThereIsAWay) {
-    Point point = point_of(Type::u16);
-    EXPECT_EQ(write("generic", point, std::int64_t{65536}),
-              "x must be from 0 to 65535 (u16), not 65536");
-    point.table = modbus::Table::input_registers;
-    EXPECT_EQ(write("generic", point, std::int64_t{65536}),
-              "D0 is in a table that cannot be written");
-}
-
-TEST(WriteRequest, ATextLongerThanOneWriteIsRefusedAndNotCut) {
-    Point point = point_of(Type::string);
-    point.length = 248;
-    const auto refused = write_request(*shipped().find("generic"), point, std::string("a"));
-    ASSERT_FALSE(refused.has_value());
-    EXPECT_EQ(refused.error().message, "generic takes at most 123 registers in one write, not 124");
-    EXPECT_EQ(why_unwritable(*shipped().find("generic"), point), refused.error().message);
-    EXPECT_EQ(why_unwritable(*shipped().find("panasonic-gt"), point), std::nullopt);
-    point.length = 246;
-    EXPECT_TRUE(write_request(*shipped().find("generic"), point, std::string("a")).has_value());
-}
-
-TEST(WriteRequest, APanelWithoutTheFunctionIsToldBeforeAnythingIsWritten) {
-    profile::PanelProfile panel;
-    panel.name = "reader";
-    for (const std::uint8_t code : {modbus::kReadHoldingRegisters, modbus::kWriteSingleRegister}) {
-        profile::FunctionRule rule;
-        rule.code = code;
-        panel.functions.push_back(rule);
+    const Told rows[] = {
+        {scaled(i16, 0.1), 21.46, "21.5"}, {labelled, " running"s, "1 running"},
+        {point_of(f32), 0.1, "0.1"},       {point_of(string), "ab"s, "ab"},
+        {bit_of(9), true, "true"},         {coil(0), 0, "false"},
+    };
+    for (const auto& [point, value, told] : rows) {
+        const auto write = write_request(shipped("generic"), point, value, Rounding::nearest);
+        ASSERT_TRUE(write.has_value()) << write.error().message;
+        EXPECT_EQ(to_string(write->value) + write->label.value_or(""), told);
     }
-    EXPECT_EQ(why_unwritable(panel, point_of(Type::u16)), std::nullopt);
-    EXPECT_EQ(why_unwritable(panel, point_of(Type::f32)),
-              "reader has no function that writes 2 registers at once");
-    Point coil = point_of(Type::boolean);
-    coil.table = modbus::Table::coils;
-    EXPECT_EQ(why_unwritable(panel, coil), "reader has no function that writes coils");
-    coil.table = modbus::Table::discrete_inputs;
-    EXPECT_EQ(why_unwritable(panel, coil), "D0 is in a table that cannot be written");
 }
 
-TEST(Interpretations, ShowOneBlockInEveryWay) {
-    const auto all = interpretations(Words{0x41AC, 0x0000});
-    const auto find = [&](Type type, WordOrder order) {
-        for (const Interpretation& one : all) {
-            if (one.type == type && one.order == order) return one.values;
-        }
-        return std::vector<std::string>{"none"};
-    };
-    EXPECT_EQ(find(Type::f32, WordOrder::abcd), std::vector<std::string>{"21.5"});
-    EXPECT_EQ(find(Type::u16, WordOrder::abcd), (std::vector<std::string>{"16812", "0"}));
-    EXPECT_EQ(find(Type::u32, WordOrder::cdab), std::vector<std::string>{"16812"});
-    EXPECT_EQ(find(Type::bcd16, WordOrder::abcd), (std::vector<std::string>{"", "0"}));
-    EXPECT_EQ(find(Type::u16, WordOrder::cdab), std::vector<std::string>{"none"});
-    EXPECT_EQ(find(Type::f64, WordOrder::abcd), std::vector<std::string>{"none"});
+TEST(WriteRequest, WhatAPanelCannotTakeIsToldBeforeAnythingIsWritten) {
+    const profile::PanelProfile panel =
+        panel_with({modbus::kReadHoldingRegisters, modbus::kWriteSingleRegister});
+    const std::string too_long = "generic takes at most 123 registers in one write, not 124";
+    EXPECT_EQ(why_unwritable(panel, point_of(u16)), std::nullopt);
+    EXPECT_EQ(why_unwritable(panel, point_of(f32)),
+              "panel has no function that writes 2 registers at once");
+    EXPECT_EQ(why_unwritable(panel, coil(0)), "panel has no function that writes coils");
+    EXPECT_EQ(why_unwritable(panel, in(modbus::Table::discrete_inputs, point_of(boolean))),
+              "D0 is in a table that cannot be written");
+    EXPECT_EQ(why_unwritable(shipped("panasonic-gt"), text_of(248)), std::nullopt);
+    EXPECT_EQ(why_unwritable(shipped("generic"), text_of(248)), too_long) << "and is not cut";
+    expect_requests({{shipped("generic"), text_of(248), "a"s, too_long}});
+    EXPECT_TRUE(write_request(shipped("generic"), text_of(246), "a"s).has_value());
 }
 
 }  // namespace

@@ -4,8 +4,13 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
-#include <vector>
+
+#include "panelgate/profile/judge.hpp"
+#include "panelgate/profile/load_profile.hpp"
+#include "support/hex.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::profile::panel_profile_test {
 namespace {
@@ -13,10 +18,7 @@ namespace {
 using modbus::Table;
 
 FunctionRule rule(std::uint8_t code, unsigned max_count = 0) {
-    FunctionRule made;
-    made.code = code;
-    made.max_count = max_count;
-    return made;
+    return {code, max_count, false, ""};
 }
 Area area(std::string name, Table table, AddressRange readable) {
     Area made;
@@ -36,9 +38,6 @@ TEST(AddressRange, HoldsItemsOnlyAsAWhole) {
     EXPECT_FALSE(range.contains(9, 2));
     EXPECT_FALSE(range.contains(10, 11));
     EXPECT_FALSE(range.contains(19, 2));
-}
-
-TEST(AddressRange, NoCountIsSoLargeThatItFits) {
     const AddressRange all{0, 65535};
     EXPECT_TRUE(all.contains(0, 65536));
     EXPECT_FALSE(all.contains(1, 65536));
@@ -93,6 +92,56 @@ TEST(PanelProfile, TheFirstAreaThatReachesAnItemIsItsArea) {
     EXPECT_EQ(found(Table::holding_registers, 1000), "none");
     EXPECT_EQ(profile.find_area("W"), &profile.areas[2]);
     EXPECT_EQ(profile.find_area("w"), nullptr);
+}
+
+class Judge : public ::testing::Test {
+  protected:
+    Judgement judged(std::string_view panel, const Bytes& pdu) const {
+        return judge(*shipped.find(panel), pdu);
+    }
+    std::string why(std::string_view panel, const Bytes& pdu) const {
+        return explain(*shipped.find(panel), test::request_of(pdu));
+    }
+    const Catalogue shipped = Catalogue::shipped();
+};
+
+TEST_F(Judge, SaysWhatTheManualSays) {
+    const std::string_view press = "autonics-gplp-s";
+    EXPECT_EQ(judged(press, "03 00 00 00 05"_hex), Judgement::fine);
+    EXPECT_EQ(judged(press, "03 00 00 00 7E"_hex), Judgement::illegal_value) << "too many";
+    EXPECT_EQ(judged(press, "03 00 00 00 00"_hex), Judgement::illegal_value) << "none";
+    EXPECT_EQ(judged(press, "03 FF FF 00 01"_hex), Judgement::illegal_address);
+    EXPECT_EQ(judged(press, "17 00 00 00 01 00 00 00 01 02 00 00"_hex),
+              Judgement::illegal_function);
+    EXPECT_EQ(judged("generic", ""_hex), Judgement::illegal_function);
+    EXPECT_EQ(judged("generic", "05 00 00 12 34"_hex), Judgement::illegal_value) << "no coil's";
+    EXPECT_EQ(judged("generic", "10 00 00 00 02 02 00 01"_hex), Judgement::illegal_value)
+        << "the byte count contradicts";
+    EXPECT_EQ(judged("generic", "10 00 00 00 02 04 00 01 00 02"_hex), Judgement::fine);
+}
+
+TEST_F(Judge, ExplainsItselfInWordsOfThePanel) {
+    EXPECT_EQ(why("autonics-gplp-s", "03 00 00 00 05"_hex), "");
+    EXPECT_EQ(why("autonics-gplp-s", "17 00 00 00 01 00 00 00 01 02 00 00"_hex),
+              "autonics-gplp-s has no function 23");
+    EXPECT_EQ(why("generic", "05 00 00 12 34"_hex), "function 5 does not take these values");
+}
+
+TEST_F(Judge, KnowsWhatCanBeReadAndNotWritten) {
+    int found = 0;
+    for (const auto& [name, profile] : shipped.all()) {
+        for (const Area& one : profile.areas) {
+            if (one.table != Table::holding_registers || one.writable) continue;
+            if (profile.find_function(6) == nullptr) continue;
+            if (profile.find_area(one.table, one.readable.first) != &one) continue;
+            const auto address = static_cast<std::uint16_t>(one.readable.first);
+            EXPECT_EQ(judge(profile, modbus::encode_write_register(address, 1)),
+                      Judgement::write_protected)
+                << name << ' ' << one.name;
+            ++found;
+        }
+    }
+    EXPECT_GT(found, 0);
 }
 
 }  // namespace

@@ -1,9 +1,12 @@
 #include <gmock/gmock.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "panelgate/profile/load_profile.hpp"
@@ -17,18 +20,7 @@ const Catalogue& catalogue() {
     static const Catalogue shipped = Catalogue::shipped();
     return shipped;
 }
-
-std::vector<int> functions_of(std::string_view name) {
-    std::vector<int> codes;
-    for (const FunctionRule& rule : catalogue().find(name)->functions) codes.push_back(rule.code);
-    return codes;
-}
-std::vector<int> broadcasts_of(std::string_view name) {
-    std::vector<int> codes;
-    for (const FunctionRule& rule : catalogue().find(name)->functions)
-        if (rule.broadcast) codes.push_back(rule.code);
-    return codes;
-}
+const PanelProfile& shipped(std::string_view name) { return *catalogue().find(name); }
 
 TEST(ShippedProfiles, AreTheFilesOfTheFolder) {
     std::size_t files = 0;
@@ -46,20 +38,6 @@ TEST(ShippedProfiles, AreTheFilesOfTheFolder) {
     EXPECT_EQ(catalogue().find("autonics"), nullptr);
 }
 
-TEST(ShippedProfiles, OldFirmwareDiffersInTheOrderOfTheCrcOnly) {
-    const PanelProfile& old = *catalogue().find("autonics-gp-2005-old");
-    const PanelProfile& panel = *catalogue().find("autonics-gp-2005");
-    EXPECT_EQ(old.crc_order, modbus::CrcOrder::high_first);
-    EXPECT_EQ(functions_of(old.name), functions_of(panel.name));
-    EXPECT_EQ(broadcasts_of(old.name), broadcasts_of(panel.name));
-    ASSERT_EQ(old.areas.size(), panel.areas.size());
-    EXPECT_EQ(old.areas[0].readable.last, panel.areas[0].readable.last);
-    EXPECT_EQ(old.areas[0].writable->first, panel.areas[0].writable->first);
-    EXPECT_EQ(old.serial.default_format, panel.serial.default_format);
-    for (const auto& [name, profile] : catalogue().all())
-        EXPECT_TRUE(profile.crc_order == modbus::CrcOrder::low_first || name == old.name) << name;
-}
-
 TEST(ShippedProfiles, CiteASourceForEveryFigure) {
     for (const auto& [name, profile] : catalogue().all()) {
         EXPECT_FALSE(profile.manual.empty()) << name;
@@ -68,79 +46,88 @@ TEST(ShippedProfiles, CiteASourceForEveryFigure) {
             EXPECT_FALSE(rule.source.empty()) << name << " function " << unsigned{rule.code};
         for (const Area& area : profile.areas)
             EXPECT_FALSE(area.source.empty()) << name << " area " << area.name;
-        if (name != "generic") {
-            EXPECT_FALSE(profile.serial.source.empty()) << name;
-        }
+        EXPECT_TRUE(name == "generic" || !profile.serial.source.empty()) << name;
     }
 }
 
-TEST(ShippedProfiles, HaveTheFunctionsOfTheManuals) {
-    EXPECT_THAT(functions_of("autonics-gplp-s"), ElementsAre(1, 3, 15, 16));
-    EXPECT_THAT(functions_of("autonics-gplp-a"), ElementsAre(1, 3, 15, 16));
-    EXPECT_THAT(functions_of("autonics-gp-2005"), ElementsAre(3, 16));
-    EXPECT_THAT(functions_of("autonics-arm"), ElementsAre(1, 2, 3, 4, 5, 6, 16));
-    EXPECT_THAT(functions_of("panasonic-gt"), ElementsAre(1, 3, 4, 5, 6, 15, 16));
-    EXPECT_THAT(functions_of("omron-cp2e"), ElementsAre(1, 3, 6, 15, 16));
-    EXPECT_THAT(functions_of("generic"),
-                ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 11, 12, 15, 16, 17, 20, 21, 22, 23, 24, 43));
-}
+struct Row {
+    const char* profile;
+    std::vector<int> functions;
+    std::vector<int> broadcasts;
+    std::vector<std::pair<std::uint8_t, unsigned>> limits;  ///< of a function
+};
 
-TEST(ShippedProfiles, HaveTheBroadcastsOfTheManuals) {
-    EXPECT_THAT(broadcasts_of("autonics-gplp-s"), ElementsAre(15, 16));
-    EXPECT_THAT(broadcasts_of("autonics-gp-2005"), ElementsAre(16));
-    EXPECT_THAT(broadcasts_of("autonics-arm"), ElementsAre());
-    EXPECT_THAT(broadcasts_of("panasonic-gt"), ElementsAre(5, 6, 15, 16));
-    EXPECT_THAT(broadcasts_of("omron-cp2e"), ElementsAre(6, 15, 16));
-}
-
-TEST(ShippedProfiles, HaveTheLimitsOfTheManualsOrTheStandards) {
-    const auto limit = [](std::string_view name, std::uint8_t function) {
-        return catalogue().find(name)->max_count(function);
-    };
-    EXPECT_EQ(limit("panasonic-gt", 1), 2040u);
-    EXPECT_EQ(limit("panasonic-gt", 3), 127u);
-    EXPECT_EQ(limit("panasonic-gt", 4), 127u);
-    EXPECT_EQ(limit("panasonic-gt", 15), 2040u);
-    EXPECT_EQ(limit("panasonic-gt", 16), 127u);
-    EXPECT_EQ(limit("omron-cp2e", 1), 2000u);
-    EXPECT_EQ(limit("omron-cp2e", 3), 125u);
-    EXPECT_EQ(limit("autonics-gplp-s", 1), 2000u);
-    EXPECT_EQ(limit("autonics-gplp-s", 15), 1968u);
-    EXPECT_EQ(limit("autonics-gplp-s", 16), 123u);
-    EXPECT_EQ(limit("autonics-arm", 6), 1u);
+TEST(ShippedProfiles, HaveFunctionsBroadcastsAndLimitsOfTheManualsOrTheStandards) {
+    for (const Row& row :
+         {Row{"autonics-gplp-s", {1, 3, 15, 16}, {15, 16}, {{1, 2000}, {15, 1968}, {16, 123}}},
+          Row{"autonics-gplp-a", {1, 3, 15, 16}, {15, 16}, {}},
+          Row{"autonics-gp-2005", {3, 16}, {16}, {}},
+          Row{"autonics-gp-2005-old", {3, 16}, {16}, {}},
+          Row{"autonics-arm", {1, 2, 3, 4, 5, 6, 16}, {}, {{6, 1}}},
+          Row{"panasonic-gt",
+              {1, 3, 4, 5, 6, 15, 16},
+              {5, 6, 15, 16},
+              {{1, 2040}, {3, 127}, {4, 127}, {15, 2040}, {16, 127}}},
+          Row{"omron-cp2e", {1, 3, 6, 15, 16}, {6, 15, 16}, {{1, 2000}, {3, 125}}},
+          Row{"generic",
+              {1, 2, 3, 4, 5, 6, 7, 8, 11, 12, 15, 16, 17, 20, 21, 22, 23, 24, 43},
+              {5, 6, 15, 16},
+              {}}}) {
+        std::vector<int> functions;
+        std::vector<int> broadcasts;
+        for (const FunctionRule& rule : shipped(row.profile).functions) {
+            functions.push_back(rule.code);
+            if (rule.broadcast) broadcasts.push_back(rule.code);
+        }
+        EXPECT_EQ(functions, row.functions) << row.profile;
+        EXPECT_EQ(broadcasts, row.broadcasts) << row.profile;
+        for (const auto& [function, limit] : row.limits)
+            EXPECT_EQ(shipped(row.profile).max_count(function), limit) << row.profile;
+    }
 }
 
 TEST(ShippedProfiles, HaveTheWritableRangesOfTheManuals) {
     const auto writable = [](std::string_view name, std::string_view area) {
-        const AddressRange range = catalogue().find(name)->find_area(area)->writable.value();
-        return std::pair(range.first, range.last);
+        return shipped(name).find_area(area)->writable.value();
     };
-    EXPECT_EQ(writable("autonics-gplp-s", "UW"), std::pair(15u, 6047u));
-    EXPECT_EQ(writable("autonics-gplp-s", "UB"), std::pair(240u, 65535u));
-    EXPECT_EQ(writable("autonics-gplp-a", "UW"), std::pair(81u, 65535u));
-    EXPECT_EQ(writable("autonics-gplp-a", "UB"), std::pair(1296u, 65535u));
-    EXPECT_EQ(writable("autonics-gp-2005", "UW"), std::pair(15u, 6047u));
-    EXPECT_EQ(writable("panasonic-gt", "GDT"), std::pair(0u, 2047u));
-    EXPECT_FALSE(catalogue().find("panasonic-gt")->find_area("clock")->writable);
+    EXPECT_EQ(writable("autonics-gplp-s", "UW"), (AddressRange{15, 6047}));
+    EXPECT_EQ(writable("autonics-gplp-s", "UB"), (AddressRange{240, 65535}));
+    EXPECT_EQ(writable("autonics-gplp-a", "UW"), (AddressRange{81, 65535}));
+    EXPECT_EQ(writable("autonics-gplp-a", "UB"), (AddressRange{1296, 65535}));
+    EXPECT_EQ(writable("autonics-gp-2005", "UW"), (AddressRange{15, 6047}));
+    EXPECT_EQ(writable("panasonic-gt", "GDT"), (AddressRange{0, 2047}));
+    EXPECT_FALSE(shipped("panasonic-gt").find_area("clock")->writable);
 }
 
 TEST(ShippedProfiles, HaveTheSerialSettingsOfTheManuals) {
     for (const char* name : {"autonics-gplp-s", "autonics-gplp-a", "autonics-gp-2005"}) {
-        const Serial& serial = catalogue().find(name)->serial;
+        const Serial& serial = shipped(name).serial;
         EXPECT_THAT(serial.baud, ElementsAre(38400)) << name;
         EXPECT_THAT(serial.parity, ElementsAre(Parity::none)) << name;
         EXPECT_THAT(serial.stop_bits, ElementsAre(1)) << name;
         EXPECT_EQ(to_string(serial.default_format), "38400 8N1") << name;
     }
-    EXPECT_THAT(catalogue().find("autonics-arm")->serial.baud,
+    EXPECT_THAT(shipped("autonics-arm").serial.baud,
                 ElementsAre(2400, 4800, 9600, 19200, 38400, 57600, 115200));
-    EXPECT_THAT(catalogue().find("panasonic-gt")->serial.baud,
+    EXPECT_THAT(shipped("panasonic-gt").serial.baud,
                 ElementsAre(9600, 19200, 38400, 57600, 115200));
-    EXPECT_THAT(catalogue().find("panasonic-gt")->serial.stop_bits, ElementsAre());
-    EXPECT_THAT(catalogue().find("omron-cp2e")->serial.baud, ElementsAre());
-    EXPECT_THAT(catalogue().find("generic")->serial.baud, ElementsAre());
-    EXPECT_EQ(catalogue().find("panasonic-gt")->timing.frame_gap_characters, 4);
-    EXPECT_EQ(catalogue().find("panasonic-gt")->timing.max_gap_bits, 24u);
+    EXPECT_THAT(shipped("panasonic-gt").serial.stop_bits, ElementsAre());
+    EXPECT_THAT(shipped("omron-cp2e").serial.baud, ElementsAre());
+    EXPECT_THAT(shipped("generic").serial.baud, ElementsAre());
+    EXPECT_EQ(shipped("panasonic-gt").timing.frame_gap_characters, 4);
+    EXPECT_EQ(shipped("panasonic-gt").timing.max_gap_bits, 24u);
+}
+
+TEST(ShippedProfiles, OldFirmwareDiffersInTheOrderOfTheCrcOnly) {
+    const PanelProfile& old = shipped("autonics-gp-2005-old");
+    const PanelProfile& panel = shipped("autonics-gp-2005");
+    EXPECT_EQ(old.crc_order, modbus::CrcOrder::high_first);
+    ASSERT_EQ(old.areas.size(), panel.areas.size());
+    EXPECT_EQ(old.areas[0].readable, panel.areas[0].readable);
+    EXPECT_EQ(old.areas[0].writable, panel.areas[0].writable);
+    EXPECT_EQ(old.serial.default_format, panel.serial.default_format);
+    for (const auto& [name, profile] : catalogue().all())
+        EXPECT_TRUE(profile.crc_order == modbus::CrcOrder::low_first || name == old.name) << name;
 }
 
 TEST(Catalogue, LetsAUserReplaceAndAdd) {

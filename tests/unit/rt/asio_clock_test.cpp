@@ -4,8 +4,10 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
+#include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 
 namespace panelgate::rt::asio_clock_test {
 namespace {
@@ -15,20 +17,28 @@ class AsioClockTest : public testing::Test {
     auto ring(const char* what) {
         return [this, what] { rung += what; };
     }
+    /// Runs until no alarm is armed; returns what has rung since the last call.
+    std::string run() {
+        io.restart();
+        io.run();
+        return std::exchange(rung, {});
+    }
 
     boost::asio::io_context io{1};
     AsioClock clock{io.get_executor()};
     std::unique_ptr<Alarm> alarm = clock.make_alarm();
+    std::unique_ptr<Alarm> other = clock.make_alarm();
     std::string rung;
 };
 
 TEST_F(AsioClockTest, RingsOnceNotBeforeItsTimeAndNotFromInside) {
-    const TimePoint when = clock.now() + 1ms;
-    alarm->arm(when, ring("a"));
-    EXPECT_EQ(rung, "");
-    io.run();
-    EXPECT_EQ(rung, "a");
-    EXPECT_GE(clock.now(), when);
+    for (const Duration in : {Duration(1ms), Duration(-1h)}) {
+        const TimePoint when = clock.now() + in;
+        alarm->arm(when, ring("a"));
+        EXPECT_EQ(rung, "");
+        EXPECT_EQ(run(), "a");
+        EXPECT_GE(clock.now(), when);
+    }
 }
 
 TEST_F(AsioClockTest, ASharpAlarmRingsNeverBeforeItsTimeEither) {
@@ -36,81 +46,62 @@ TEST_F(AsioClockTest, ASharpAlarmRingsNeverBeforeItsTimeEither) {
         const TimePoint when = clock.now() + 300us;
         bool early = false;
         alarm->arm_sharp(when, [&] { early = clock.now() < when; });
-        io.restart();
-        io.run();
+        run();
         EXPECT_FALSE(early);
     }
 }
 
-TEST_F(AsioClockTest, WhatIsArmedForLaterRingsOnceAndThen) {
-    const TimePoint later = clock.now() + 3ms;
-    alarm->arm(clock.now() + 1ms, ring("a"));
-    alarm->arm(later, ring("b"));
-    io.run();
-    EXPECT_EQ(rung, "b");
-    EXPECT_GE(clock.now(), later);
-}
-
-TEST_F(AsioClockTest, ATimeThatHasPassedRingsFromTheLoop) {
-    alarm->arm(clock.now() - 1h, ring("a"));
-    EXPECT_EQ(rung, "");
-    io.run();
-    EXPECT_EQ(rung, "a");
-}
-
 TEST_F(AsioClockTest, WhatIsArmedAnewReplacesWhatWasArmed) {
-    alarm->arm(clock.now(), ring("a"));
-    alarm->arm(clock.now(), ring("b"));
-    io.run();
-    EXPECT_EQ(rung, "b");
+    for (const Duration in : {Duration(3ms), Duration(0)}) {
+        const TimePoint later = clock.now() + in;
+        alarm->arm(clock.now() + in / 3, ring("a"));
+        alarm->arm(later, ring("b"));
+        EXPECT_EQ(run(), "b");
+        EXPECT_GE(clock.now(), later);
+    }
 }
 
 /// Both timers are due, so both completions wait in the loop when the first one cancels.
-TEST_F(AsioClockTest, ACancelledAlarmDoesNotRingThoughItIsDue) {
-    const auto other = clock.make_alarm();
+TEST_F(AsioClockTest, ACancelledAlarmOrOneThatIsGoneDoesNotRingThoughItIsDue) {
     alarm->arm(clock.now() - 2s, [&] {
         rung += "a";
         other->cancel();
     });
     other->arm(clock.now() - 1s, ring("b"));
-    io.run();
-    EXPECT_EQ(rung, "a");
+    EXPECT_EQ(run(), "a");
     other->arm(clock.now(), ring("c"));
-    io.restart();
-    io.run();
-    EXPECT_EQ(rung, "ac");
-}
-
-TEST_F(AsioClockTest, AnAlarmThatIsGoneDoesNotRing) {
-    auto other = clock.make_alarm();
+    EXPECT_EQ(run(), "c");
     other->arm(clock.now() - 1s, ring("b"));
     alarm->arm(clock.now() - 2s, [&] { other.reset(); });
-    io.run();
-    EXPECT_EQ(rung, "");
+    EXPECT_EQ(run(), "");
 }
 
 TEST_F(AsioClockTest, AlarmsRingInTheOrderOfTheirTimesWhateverTheyWereArmedFor) {
     const TimePoint now = clock.now();
-    const auto second = clock.make_alarm();
     const auto third = clock.make_alarm();
     third->arm_sharp(now + 3ms, ring("c"));
     alarm->arm(now + 1ms, ring("a"));
-    second->arm(now + 9ms, ring("-"));
-    second->arm(now + 2ms, ring("b"));
-    io.run();
-    EXPECT_EQ(rung, "abc");
+    other->arm(now + 9ms, ring("-"));
+    other->arm(now + 2ms, ring("b"));
+    EXPECT_EQ(run(), "abc");
 }
 
 TEST_F(AsioClockTest, ALoopWithoutAnArmedAlarmEnds) {
     alarm->arm(clock.now() + 1h, ring("a"));
-    const auto other = clock.make_alarm();
     other->arm(clock.now(), [&] { alarm->cancel(); });
-    io.run();
-    EXPECT_EQ(rung, "");
-    io.restart();
+    EXPECT_EQ(run(), "");
     alarm->arm(clock.now() + 1ms, ring("b"));
-    io.run();
-    EXPECT_EQ(rung, "b") << "and it can be used again";
+    EXPECT_EQ(run(), "b") << "and it can be used again";
+}
+
+TEST_F(AsioClockTest, AHandlerMayArmItsOwnAlarm) {
+    int left = 3;
+    std::function<void()> again = [&] {
+        rung += "a";
+        if (--left > 0) alarm->arm(clock.now(), again);
+    };
+    alarm->arm(clock.now(), again);
+    EXPECT_EQ(run(), "aaa");
 }
 
 TEST(AsioClockEnd, AnAlarmMayOutliveItsClockInAHandlerThatTheLoopHolds) {
@@ -121,15 +112,40 @@ TEST(AsioClockEnd, AnAlarmMayOutliveItsClockInAHandlerThatTheLoopHolds) {
     boost::asio::post(io, [alarm] {});
 }
 
-TEST_F(AsioClockTest, AHandlerMayArmItsOwnAlarm) {
-    int left = 3;
-    std::function<void()> again = [&] {
-        rung += "a";
-        if (--left > 0) alarm->arm(clock.now(), again);
-    };
-    alarm->arm(clock.now(), again);
-    io.run();
-    EXPECT_EQ(rung, "aaa");
+TEST(LeadTime, FollowsWhatTwoOfThreeAreLateUpToABound) {
+    LeadTime lead;
+    LeadTime most;
+    TimePoint now{};
+    for (int i = 0; i < 10000; ++i) {
+        now += 10ms;
+        lead.on_rung(now, i % 4 == 0 ? 2ms : 15us, 0us);
+        most.on_rung(now, 5ms, 0us);
+    }
+    EXPECT_GE(lead.lead(), 14us);
+    EXPECT_LE(lead.lead(), 17us);
+    EXPECT_EQ(most.lead(), LeadTime::kMost);
+}
+
+TEST(LeadTime, WatchesTheClockForAThirtiethOfTheTimeAtMost) {
+    LeadTime lead;
+    TimePoint now{};
+    Duration watched{};
+    for (int i = 0; i < 100000; ++i) {
+        const Duration watch = lead.lead();
+        lead.on_rung(now += 500us, LeadTime::kMost, watch);
+        watched += watch;
+    }
+    EXPECT_LE(watched, 50000ms / 30 + 20ms);
+    EXPECT_GE(watched, 50000ms / 40);
+}
+
+TEST(LeadTime, ALongRestSavesNoMoreThanAMoment) {
+    LeadTime lead;
+    TimePoint now{};
+    lead.on_rung(now += 1h, 80us, 11ms);
+    EXPECT_EQ(lead.lead(), 0us);
+    lead.on_rung(now += 1h, 80us, 0us);
+    EXPECT_GT(lead.lead(), 0us);
 }
 
 }  // namespace

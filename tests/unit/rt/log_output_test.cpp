@@ -9,11 +9,14 @@
 
 #include <array>
 #include <csignal>
+#include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <sstream>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace panelgate::rt::log_output_test {
 namespace {
@@ -43,25 +46,26 @@ struct Way {
     }
 };
 
+using Ends = std::array<int, 2>;
+
 Way pipe_channel() {
-    std::array<int, 2> ends{};
+    Ends ends{};
     if (::pipe(ends.data()) != 0) std::abort();
     return {ends[0], ends[1]};
 }
 
 Way socket_channel() {
-    std::array<int, 2> ends{};
+    Ends ends{};
     if (::socketpair(AF_UNIX, SOCK_STREAM, 0, ends.data()) != 0) std::abort();
     return {ends[0], ends[1]};
 }
 
 Way terminal_channel() {
-    int master = -1;
-    int slave = -1;
+    Ends ends{};
     termios raw{};
     ::cfmakeraw(&raw);
-    if (::openpty(&master, &slave, nullptr, &raw, nullptr) != 0) std::abort();
-    return {master, slave};
+    if (::openpty(&ends[0], &ends[1], nullptr, &raw, nullptr) != 0) std::abort();
+    return {ends[0], ends[1]};
 }
 
 std::string line_of(int number) { return std::to_string(number) + std::string(60, '.') + '\n'; }
@@ -122,11 +126,13 @@ TEST_P(LogOutputTest, ExcessLinesAreDroppedCountedAndReported) {
     EXPECT_EQ(drain(output), "and on\n");
 }
 
-TEST_P(LogOutputTest, CallsOnPendingWhenLinesAreQueued) {
+TEST_P(LogOutputTest, CallsOnPendingWhenLinesAreQueuedAndLeavesTheDescriptorOfOthersAsItWas) {
+    const int before = ::fcntl(way_.writer, F_GETFL);
     LogOutput output(way_.writer);
     int told = 0;
     output.on_pending([&] { ++told; });
     output.write(line_of(0));
+    EXPECT_EQ(::fcntl(way_.writer, F_GETFL), before);
     EXPECT_EQ(told, 0);
     while (!output.pending()) output.write(line_of(1));
     EXPECT_EQ(told, 1);
@@ -138,13 +144,6 @@ TEST_P(LogOutputTest, AReaderThatClosedCostsNothing) {
     ::close(std::exchange(way_.reader, -1));
     for (int i = 0; i < 10000; ++i) output.write(line_of(i));
     EXPECT_FALSE(output.pending());
-}
-
-TEST_P(LogOutputTest, TheDescriptorOfOthersStaysAsItWas) {
-    const int before = ::fcntl(way_.writer, F_GETFL);
-    LogOutput output(way_.writer);
-    output.write("x\n");
-    EXPECT_EQ(::fcntl(way_.writer, F_GETFL), before);
 }
 
 TEST(LogOutput, WhatADeviceRefusesIsCounted) {
@@ -170,6 +169,53 @@ TEST(LogOutput, WritersOfOneFileDoNotOverwriteEachOther) {
     const ssize_t size = ::pread(descriptor, text.data(), text.size(), 0);
     EXPECT_EQ(std::string(text.data(), static_cast<std::size_t>(size)), "before\nlog\nafter\n");
     std::fclose(file);
+}
+
+TEST(Journal, NamesFieldsAfterThoseOfTheEvent) {
+    const std::vector<LogField> fields{{"line", "floor1"}, {"modbus_tcp", "a=b"}, {"why", ""}};
+    EXPECT_EQ(journal_fields(LogLevel::warn, "line down", fields),
+              "PRIORITY=4\nSYSLOG_IDENTIFIER=panelgate\nPANELGATE_EVENT=line down\n"
+              "PANELGATE_LINE=floor1\nPANELGATE_MODBUS_TCP=a=b\nPANELGATE_WHY=\n");
+    std::string lines;  // a value of several lines goes behind its length
+    append_journal_field(lines, "why", "one\ntwo");
+    using namespace std::string_literals;
+    EXPECT_EQ(lines, "PANELGATE_WHY\n\x07\0\0\0\0\0\0\0one\ntwo\n"s);
+    std::string name;  // that journald would drop
+    append_journal_field(name, "a b-c." + std::string(100, 'x'), "1");
+    EXPECT_EQ(name, "PANELGATE_A_B_C_" + std::string(48, 'X') + "=1\n");
+}
+
+TEST(Journal, HasThePrioritiesOfSyslog) {
+    EXPECT_EQ(journal_priority(LogLevel::error), 3);
+    EXPECT_EQ(journal_priority(LogLevel::warn), 4);
+    EXPECT_EQ(journal_priority(LogLevel::info), 6);
+    EXPECT_EQ(journal_priority(LogLevel::debug), 7);
+    EXPECT_EQ(journal_priority(LogLevel::trace), 7);
+}
+
+TEST(Journal, IsStderrOnlyIfDeviceAndInodeAreItsOwn) {
+    EXPECT_TRUE(is_journal_stream("9:12345", 9, 12345));
+    for (const char* other : {"9:1234", "8:12345", "9", "", "9:12345 ", "09:12345"})
+        EXPECT_FALSE(is_journal_stream(other, 9, 12345)) << other;
+}
+
+TEST(Journal, TakesEachEntryAsOneDatagramAndWhatItDoesNotTakeWaits) {
+    Ends ends{};
+    ASSERT_EQ(::socketpair(AF_UNIX, SOCK_DGRAM, 0, ends.data()), 0);
+    const Way way(ends[0], ends[1]);
+    LogOutput output(way.writer);
+    constexpr int kEntries = 2000;  // more than a socket keeps
+    for (int i = 0; i < kEntries; ++i) output.write("MESSAGE=" + std::to_string(i) + '\n');
+    EXPECT_TRUE(output.pending());
+    for (int i = 0; i < kEntries; ++i) {
+        std::array<char, 4096> datagram{};
+        const ssize_t got = ::recv(way.reader, datagram.data(), datagram.size(), MSG_DONTWAIT);
+        ASSERT_GT(got, 0);
+        EXPECT_EQ(std::string(datagram.data(), static_cast<std::size_t>(got)),
+                  "MESSAGE=" + std::to_string(i) + '\n');
+        output.flush();
+    }
+    EXPECT_EQ(output.dropped(), 0u);
 }
 
 }  // namespace

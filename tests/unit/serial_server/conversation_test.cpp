@@ -2,235 +2,142 @@
 
 #include <gmock/gmock.h>
 
+#include <optional>
+
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/modbus/ascii.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "talk.hpp"
 
 namespace panelgate::serial_server::test::conversation_test {
 namespace {
 
-using modbus::encode_adu;
+using testing::AnyOf;
+using testing::Each;
 using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-const Bytes kRequest = encode_adu(kOurs, kReadOne);
-const Bytes kReply = encode_adu(kOurs, kOneValue);
-const Duration kSilence = silent_interval(Talk::rtu().device.serial);
+struct Row {
+    const char* script;
+    const char* told;
+};
 
-TEST(Conversation, AsksAtTheLastByteOfARequest) {
+void expect(const Row& row, EchoMode echo) {
+    SCOPED_TRACE(row.script);
+    Talk talk(Talk::rtu(echo));
+    talk.play(row.script);
+    EXPECT_EQ(talk.told, row.told);
+    EXPECT_THAT(talk.sent, Each(AnyOf(kReply, modbus::encode_adu(kOurs + 1, kOneValue),
+                                      modbus::encode_adu(kOurs, kWrite))));
+}
+
+constexpr Row kRows[] = {
+    // An answer is given once, to a retry the answer of the first.
+    {"read 50 answer answer 10000", "ask 31, reply 31"},
+    {"read 300 read 20 answer 1000", "ask 31, reply 31"},
+    // The master has asked for something else: an answer would be taken for the other's.
+    {"read 300 next old 1000", "ask 31, withdraw, ask 32"},
+    {"read 300 next old 1000 answer", "ask 31, withdraw, ask 32, reply 32"},
+    {"read 300 foreign 50 answer 1000", "ask 31, withdraw"},
+    {"read 300 damaged 100 answer 1000", "ask 31, withdraw"},
+    // The answer comes while the master transmits; 16 ms are an adapter's pause.
+    {"read 300 write/5 answer 16 rest 1000", "ask 31, withdraw, ask 31"},
+    // A glitch of the transceiver is no request.
+    {"read glitch 1 answer 100", "ask 31, reply 31"},
+    // A request whose function has come is waited for.
+    {"read/2 50 rest", "ask 31"},
+    // A pause in the header of another unit's data, in which there is a request.
+    {"foreign-data/2 50 rest 1000", ""},
+    {"foreign-data/3 50 rest 1000", ""},
+    {"foreign-data/4 50 rest 1000", ""},
+    {"foreign-data/2 50 rest 1000 read", "ask 31"},
+    {"foreign-data/3 50 rest 1000 read", "ask 31"},
+    {"foreign-data/4 50 rest 1000 read", "ask 31"},
+    // Unobserved time is no silence, behind which the request would be valid.
+    {"noise-read +10 noise 1000", ""},
+    {"noise-read +5000 noise 1000", ""},
+    // Everything is forgotten when the device goes.
+    {"read read/4 lost answer back read 1000", "ask 31, withdraw, ask 31"},
+};
+
+TEST(Conversation, AnswersWhatTheMasterStillWaitsFor) {
+    for (const Row& row : kRows) expect(row, EchoMode::off);
+}
+
+constexpr Row kEchoRows[] = {
+    // The echo of a write is not a request.
+    {"write 10 answer echo~ 1000", "ask 31, reply 31"},
+    {"write 10 answer echo~ 1000 write 10 answer", "ask 31, reply 31, ask 31, reply 31"},
+    // ... when the process was stalled, too.
+    {"write 10 answer +5000 echo 1000", "ask 31, reply 31"},
+    // One that collided with the master is not absent.
+    {"read 10 answer collided-echo~ 1000 write 10 answer echo~ 1000",
+     "ask 31, reply 31, ask 31, reply 31"},
+    // One that is known to be absent hides no retry: the reply was damaged at the master.
+    {"read 10 answer 1000 write 10 answer 15 write", "ask 31, reply 31, ask 31, reply 31, ask 31"},
+    // One that may be a retry hides it once at most.
+    {"write 10 answer 15 write", "ask 31, reply 31"},
+    {"write 10 answer 15 write 500 write", "ask 31, reply 31, ask 31"},
+};
+
+TEST(Conversation, TakesItsOwnEchoForNoRequest) {
+    for (const Row& row : kEchoRows) expect(row, EchoMode::automatic);
+    // An echo only begun: the master's request begins as the reply did.
+    expect({"read 10 answer 20 read~", "ask 31, reply 31, ask 31"}, EchoMode::on);
+    Talk talk(Talk::rtu(EchoMode::automatic));
+    for (int i = 0; i < 3; ++i) talk.play("read 10 answer echo~ 100");
+    EXPECT_THAT(talk.sent, SizeIs(3));
+    EXPECT_EQ(talk.machine.counters().damaged, 0u);
+}
+
+TEST(Conversation, AsksAtTheLastByteAndRepliesBehindTheSilence) {
     Talk talk;
-    talk.hear(kRequest);
+    talk.play("read");
     ASSERT_THAT(talk.asks, SizeIs(1));
-    EXPECT_EQ(talk.asks[0].adu.station, kOurs);
-    EXPECT_EQ(talk.asks[0].adu.pdu, kReadOne);
-}
-
-TEST(Conversation, RepliesNotBeforeTheSilenceBehindTheRequest) {
-    Talk talk;
-    talk.hear(kRequest);
+    EXPECT_EQ(talk.asks[0].adu, (modbus::SerialAdu{kOurs, kReadOne}));
     const TimePoint ended = talk.now;
-    talk.answer(kOneValue);
+    talk.play("answer");
     EXPECT_THAT(talk.sent, IsEmpty());
-    talk.pass(1s);
-    ASSERT_THAT(talk.sent, ElementsAre(kReply));
-    EXPECT_EQ(talk.sent_at[0], ended + kSilence);
-}
-
-TEST(Conversation, RepliesAtOnceWhenTheSilenceHasPassed) {
-    Talk talk;
-    talk.hear(kRequest);
-    talk.pass(50ms);
-    talk.answer(kOneValue);
-    ASSERT_THAT(talk.sent, ElementsAre(kReply));
-    EXPECT_EQ(talk.sent_at[0], talk.now);
-}
-
-TEST(Conversation, GivesAnswersOnce) {
-    Talk talk;
-    talk.hear(kRequest);
-    talk.pass(50ms);
-    talk.answer(kOneValue);
-    talk.answer(kOneValue);
-    talk.pass(10s);
-    EXPECT_THAT(talk.sent, SizeIs(1));
-}
-
-TEST(Conversation, DropsAnAnswerWhenTheMasterAsksForSomethingElse) {
-    Talk talk;
-    talk.hear(kRequest);
-    talk.pass(300ms);
-    talk.hear(encode_adu(kOurs + 1, kReadOne));
-    EXPECT_EQ(talk.withdrawals, 1);
-    ASSERT_THAT(talk.asks, SizeIs(2));
-    talk.machine.on_answer(talk.now, talk.asks[0].ticket, kOneValue);
-    talk.pass(1s);
-    EXPECT_THAT(talk.sent, IsEmpty());
-    talk.answer(kOneValue);
-    EXPECT_THAT(talk.sent, ElementsAre(encode_adu(kOurs + 1, kOneValue)));
-}
-
-TEST(Conversation, GivesARetryTheAnswerOfTheFirst) {
-    Talk talk;
-    talk.hear(kRequest);
-    talk.pass(300ms);
-    talk.hear(kRequest);
-    EXPECT_THAT(talk.asks, SizeIs(1));
-    EXPECT_EQ(talk.withdrawals, 0);
-    talk.pass(20ms);
-    talk.answer(kOneValue);
-    talk.pass(1s);
-    EXPECT_THAT(talk.sent, ElementsAre(kReply));
-    EXPECT_EQ(talk.machine.counters().repeated, 1u);
-}
-
-TEST(Conversation, DefersAReplyWhileTheMasterTransmits) {
-    Talk talk;
-    talk.hear(kRequest);
-    talk.pass(300ms);
-    const Bytes next = encode_adu(kOurs, modbus::encode_read(modbus::Table::coils, 7, 3));
-    talk.hear(Bytes(next.begin(), next.begin() + 5));
-    talk.answer(kOneValue);
-    talk.pass(16ms);  // an adapter's pause
-    talk.hear(Bytes(next.begin() + 5, next.end()));
-    talk.pass(1s);
-    EXPECT_THAT(talk.sent, IsEmpty());
-    EXPECT_THAT(talk.asks, SizeIs(2));
-}
-
-TEST(Conversation, RepliesBehindAGlitchOfTheTransceiver) {
-    Talk talk;
-    talk.hear(kRequest);
-    talk.hear({0x00});
-    talk.pass(1ms);
-    talk.answer(kOneValue);
-    talk.pass(100ms);
-    EXPECT_THAT(talk.sent, ElementsAre(kReply));
-}
-
-TEST(Conversation, FindsNoRequestInAnotherUnitsDataBehindAPauseInItsHeader) {
-    Bytes pdu{0x03, 0x08};
-    pdu.insert(pdu.end(), kRequest.begin(), kRequest.end());
-    const Bytes reply = encode_adu(kOther, pdu);
-    for (const std::size_t first : {2u, 3u, 4u}) {
-        Talk talk;
-        talk.hear({reply.begin(), reply.begin() + static_cast<std::ptrdiff_t>(first)});
-        talk.pass(50ms);
-        talk.hear({reply.begin() + static_cast<std::ptrdiff_t>(first), reply.end()});
-        talk.pass(1s);
-        EXPECT_THAT(talk.asks, IsEmpty()) << first;
-        talk.hear(kRequest);
-        EXPECT_THAT(talk.asks, SizeIs(1)) << first;
-    }
-}
-
-TEST(Conversation, CountsNoUnobservedTimeAsASilence) {
-    for (const Duration late : {10ms, 5000ms}) {
-        Talk talk;
-        talk.hear(joined({{0x55, 0xAA}, kRequest}));  // valid after noise if a silence follows
-        talk.now += late;
-        talk.hear({0xC8, 0x57});
-        talk.pass(1s);
-        EXPECT_THAT(talk.asks, IsEmpty());
-    }
-}
-
-TEST(Conversation, WaitsForTheRestOfARequestWhoseFunctionHasCome) {
-    Talk talk;
-    talk.hear({kRequest.begin(), kRequest.begin() + 2});
-    talk.pass(50ms);
-    talk.hear({kRequest.begin() + 2, kRequest.end()});
-    EXPECT_THAT(talk.asks, SizeIs(1));
-}
-
-TEST(Conversation, TakesDamageForTheMastersNextRequest) {
-    Talk talk;
-    talk.hear(kRequest);
-    talk.pass(300ms);
-    Bytes next = encode_adu(kOurs, modbus::encode_read(modbus::Table::holding_registers, 9, 1));
-    next[4] ^= 0x10;
-    talk.hear(next);
-    talk.pass(100ms);
-    talk.answer(kOneValue);  // would be taken for the answer of the other
-    talk.pass(1s);
-    EXPECT_THAT(talk.sent, IsEmpty());
-    EXPECT_EQ(talk.withdrawals, 1);
+    talk.play("1000 read 50 answer");
+    ASSERT_THAT(talk.sent, ElementsAre(kReply, kReply));
+    EXPECT_EQ(talk.sent_at[0], ended + silent_interval(Talk::rtu().device.serial));
+    EXPECT_EQ(talk.sent_at[1], talk.now) << "at once: the silence has passed";
 }
 
 TEST(Conversation, SendsNothingBehindTheMastersTimeout) {
     Settings settings = Talk::rtu();
     settings.response_timeout = 200ms;
     Talk talk(settings);
-    talk.hear(kRequest);
-    talk.pass(200ms);
-    talk.answer(kOneValue);
-    talk.pass(1s);
-    EXPECT_THAT(talk.sent, IsEmpty());
+    talk.play("read 200 answer 1000");
+    EXPECT_EQ(talk.told, "ask 31");
     EXPECT_EQ(talk.machine.counters().late, 1u);
-    talk.hear(kRequest);
-    talk.pass(190ms);
-    talk.answer(kOneValue);
-    EXPECT_THAT(talk.sent, ElementsAre(kReply));
+    talk.play("read 190 answer");
+    EXPECT_EQ(talk.told, "ask 31, ask 31, reply 31");
 }
 
 TEST(Conversation, AnswersFailuresWithSilence) {
     Talk talk;
-    talk.hear(kRequest);
-    talk.answer(std::nullopt);
-    talk.pass(1s);
-    EXPECT_THAT(talk.sent, IsEmpty());
+    talk.play("read 10 read fail 1000");
+    EXPECT_EQ(talk.told, "ask 31");
+    EXPECT_EQ(talk.machine.counters().repeated, 1u);
     EXPECT_EQ(talk.machine.counters().silent, 1u);
     EXPECT_FALSE(talk.machine.busy());
 }
 
 TEST(Conversation, ForwardsABroadcastOnceAndSendsNoReply) {
     Talk talk;
-    const Bytes write = modbus::encode_write_register(1, 2);
-    talk.hear(encode_adu(0, write));
-    talk.pass(1s);
-    ASSERT_THAT(talk.spreads, SizeIs(1));
-    EXPECT_EQ(talk.spreads[0].adu.pdu, write);
-    EXPECT_THAT(talk.asks, IsEmpty());
-    EXPECT_THAT(talk.sent, IsEmpty());
-}
-
-TEST(Conversation, GivesUpWhatTheMasterHasLeftForAnotherUnit) {
-    Talk talk;
-    talk.hear(kRequest);
-    talk.pass(300ms);
-    talk.hear(encode_adu(kOther, kReadOne));
-    talk.pass(50ms);
-    talk.answer(kOneValue);
-    talk.pass(1s);
-    EXPECT_THAT(talk.sent, IsEmpty());
-    EXPECT_EQ(talk.withdrawals, 1);
-}
-
-TEST(Conversation, ForgetsEverythingWhenTheDeviceGoes) {
-    Talk talk;
-    talk.hear(kRequest);
-    talk.hear(Bytes(kRequest.begin(), kRequest.begin() + 4));
-    talk.machine.on_line_down();
-    talk.answer(kOneValue);
-    talk.machine.on_line_up();
-    talk.hear(kRequest);
-    EXPECT_THAT(talk.asks, SizeIs(2));
-    talk.pass(1s);
-    EXPECT_THAT(talk.sent, IsEmpty());
+    talk.play("broadcast 1000");
+    EXPECT_EQ(talk.told, "forward");
+    EXPECT_EQ(talk.spreads.at(0).adu.pdu, kWrite);
 }
 
 TEST(Conversation, AsksNothingMoreOnceItFinishes) {
     Talk talk;
-    talk.hear(kRequest);
+    talk.play("read");
     talk.machine.finish();
-    talk.pass(10ms);
-    talk.answer(kOneValue);
-    talk.pass(10ms);
-    EXPECT_THAT(talk.sent, SizeIs(1));
-    talk.hear(kRequest);
-    talk.hear(encode_adu(0, modbus::encode_write_register(1, 2)));
-    EXPECT_THAT(talk.asks, SizeIs(1));
-    EXPECT_THAT(talk.spreads, IsEmpty());
+    talk.play("10 answer 10 read broadcast");
+    EXPECT_EQ(talk.told, "ask 31, reply 31");
     EXPECT_FALSE(talk.machine.busy());
 }
 
@@ -240,8 +147,7 @@ TEST(Conversation, SpeaksAscii) {
     Talk talk(settings);
     talk.hear_slowly(modbus::encode_ascii(kOurs, kReadOne), 300ms);
     ASSERT_THAT(talk.asks, SizeIs(1));
-    talk.answer(kOneValue);
-    talk.pass(1s);
+    talk.play("answer 1000");
     EXPECT_THAT(talk.sent, ElementsAre(modbus::encode_ascii(kOurs, kOneValue)));
     talk.hear({':', '1'});
     talk.pass(10s);

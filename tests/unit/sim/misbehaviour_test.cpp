@@ -2,75 +2,55 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "panelgate/profile/load_profile.hpp"
-#include "panelgate/sim/station.hpp"
 #include "support/hex.hpp"
 
 namespace panelgate::sim::misbehaviour_test {
 namespace {
 
-const Bytes kReply = modbus::encode_adu(20, "03 02 00 07"_hex);
+const SerialFormat k8n1{38400, 8, Parity::none, 1};
+const SerialFormat k8e1{9600, 8, Parity::even, 1};
+const SerialFormat kAscii{9600, 7, Parity::even, 1, SerialMode::ascii};
+const Bytes kPdu = "03 02 12 34"_hex;
+const Bytes kReply = modbus::encode_adu(20, kPdu);
 
-Spoken once(const Misbehaviour& faults) {
+Spoken once(const Misbehaviour& faults, const SerialFormat& format = {}) {
     std::mt19937 chance(1);
-    return misbehave(faults, kReply, chance);
-}
-
-TEST(Misbehaviour, NoneLeavesTheReplyAsItIs) {
-    EXPECT_EQ(once({}).adu, kReply);
-    EXPECT_EQ(once({}).delay, Duration::zero());
+    return misbehave(faults, kReply, chance, format);
 }
 
 TEST(Misbehaviour, EachFaultHasTheEffectOfItsName) {
-    Misbehaviour faults;
-    faults.dead = true;
-    EXPECT_TRUE(once(faults).adu.empty());
-    faults = {};
-    faults.drop = 1;
-    EXPECT_TRUE(once(faults).adu.empty());
-    faults = {};
-    faults.slow = 20ms;
-    faults.late = 1;
-    faults.late_by = 600ms;
-    EXPECT_EQ(once(faults).delay, Duration(620ms));
-    EXPECT_EQ(once(faults).adu, kReply);
-    faults = {};
-    faults.damage = 1;
-    EXPECT_FALSE(modbus::crc_ok(once(faults).adu));
-    EXPECT_EQ(once(faults).adu.size(), kReply.size());
-    faults = {};
-    faults.truncate = 1;
-    EXPECT_EQ(once(faults).adu, Bytes(kReply.begin(), kReply.begin() + 4));
-    faults = {};
-    faults.foreign_id = 1;
-    EXPECT_EQ(once(faults).adu[0], 21);
-    EXPECT_TRUE(modbus::crc_ok(once(faults).adu));
+    EXPECT_EQ(once({}).adu, kReply);
+    EXPECT_EQ(once({}).delay, Duration::zero());
+    EXPECT_TRUE(once({.dead = true}).adu.empty());
+    EXPECT_TRUE(once({.drop = 1}).adu.empty());
+    const Spoken late = once({.slow = 20ms, .late_by = 600ms, .late = 1});
+    EXPECT_EQ(late.delay, Duration(620ms));
+    EXPECT_EQ(late.adu, kReply);
+    const Bytes damaged = once({.damage = 1}).adu;
+    EXPECT_FALSE(modbus::crc_ok(damaged));
+    EXPECT_EQ(damaged.size(), kReply.size());
+    EXPECT_EQ(once({.truncate = 1}).adu, Bytes(kReply.begin(), kReply.begin() + 4));
+    EXPECT_EQ(once({.foreign_id = 1}).adu, modbus::encode_adu(21, kPdu));
 }
 
 TEST(Misbehaviour, IsEncodedInTheModeOfTheLine) {
-    const SerialFormat format{9600, 7, Parity::even, 1, SerialMode::ascii};
-    std::mt19937 chance(1);
     const Bytes good = modbus::to_ascii(kReply);
-    EXPECT_EQ(misbehave({}, kReply, chance, format).adu, good);
-    Misbehaviour faults;
-    faults.damage = 1;
-    const Bytes damaged = misbehave(faults, kReply, chance, format).adu;
+    EXPECT_EQ(once({}, kAscii).adu, good);
+    const Bytes damaged = once({.damage = 1}, kAscii).adu;
     EXPECT_EQ(damaged.size(), good.size());
     EXPECT_NE(damaged, good);
-    faults = {};
-    faults.foreign_id = 1;
-    EXPECT_EQ(misbehave(faults, kReply, chance, format).adu,
-              modbus::encode_ascii(21, "03 02 00 07"_hex));
+    EXPECT_EQ(once({.foreign_id = 1}, kAscii).adu, modbus::encode_ascii(21, kPdu));
 }
 
 TEST(Misbehaviour, AShareIsOfManyAnswers) {
-    Misbehaviour faults;
-    faults.drop = 0.25;
     std::mt19937 chance(7);
     int silent = 0;
-    for (int i = 0; i < 10'000; ++i) silent += misbehave(faults, kReply, chance).adu.empty();
+    for (int i = 0; i < 10'000; ++i)
+        silent += misbehave({.drop = 0.25}, kReply, chance).adu.empty() ? 1 : 0;
     EXPECT_NEAR(silent, 2500, 200);
 }
 
@@ -93,15 +73,50 @@ TEST(Misbehaviour, ConvertsFromAndToNumbers) {
     EXPECT_TRUE(faults.dead) << "a bad set changes nothing";
 }
 
-TEST(Misbehaviour, OnlyThePanasonicMindsAPauseOfMoreThan24BitTimes) {
-    const profile::Catalogue shipped = profile::Catalogue::shipped();
-    const SerialFormat format{9600, 8, Parity::none, 1};
-    const Duration bits24 = Duration(1s) * 24 / 9600;
-    const Station gt(*shipped.find("panasonic-gt"), 20);
-    EXPECT_FALSE(gt.rejects_gap(bits24, format));
-    EXPECT_TRUE(gt.rejects_gap(bits24 + 1us, format));
-    const Station gp(*shipped.find("autonics-gplp-s"), 31);
-    EXPECT_FALSE(gp.rejects_gap(1s, format));
+Bytes twice(const Bytes& bytes) {
+    Bytes both = bytes;
+    both.insert(both.end(), bytes.begin(), bytes.end());
+    return both;
+}
+
+TEST(Collision, TwoEqualRepliesAtOnceAreOne) {
+    const HeardBytes heard = collide(kReply, kReply, 0, k8n1);
+    EXPECT_EQ(heard.bytes, kReply);
+    EXPECT_EQ(heard.ends.front(), 10u);
+    EXPECT_EQ(heard.ends.back(), 70u);
+}
+
+TEST(Collision, OneAfterTheOtherBothComeCleanWithThePauseBetweenThem) {
+    for (const SerialFormat& format : {k8n1, k8e1}) {
+        const auto bits = static_cast<std::uint32_t>(format.bits_per_character());
+        const HeardBytes heard = collide(kReply, kReply, std::size_t{7} * bits + 5, format);
+        EXPECT_EQ(heard.bytes, twice(kReply));
+        EXPECT_EQ(heard.ends[7], 8 * bits + 5);
+    }
+}
+
+TEST(Collision, WhatOverlapsIsGarbledAndWhatDoesNotIsClean) {
+    const Bytes reply = modbus::encode_adu(7, kPdu);
+    const HeardBytes heard = collide(reply, reply, 30, k8n1);  // three characters later
+    ASSERT_EQ(heard.bytes.size(), 10u);
+    EXPECT_EQ(Bytes(heard.bytes.begin(), heard.bytes.begin() + 3), "07 03 02"_hex);
+    EXPECT_EQ(heard.bytes[3], 0x12 & 0x07);
+    EXPECT_EQ(Bytes(heard.bytes.end() - 3, heard.bytes.end()), Bytes(reply.end() - 3, reply.end()));
+}
+
+TEST(Collision, ADuplicatePanelComesTwiceADamagedOrASingleTime) {
+    std::mt19937 chance(3);
+    int doubled = 0;
+    int damaged = 0;
+    constexpr int kReplies = 3000;
+    for (int i = 0; i < kReplies; ++i) {
+        const Spoken spoken = misbehave({.duplicate = 1}, kReply, chance, k8n1);
+        ASSERT_EQ(spoken.ends.size(), spoken.adu.size());
+        doubled += spoken.adu == twice(kReply) ? 1 : 0;
+        damaged += spoken.adu != twice(kReply) && spoken.adu != kReply ? 1 : 0;
+    }
+    EXPECT_NEAR(doubled, kReplies / 3, kReplies / 20);
+    EXPECT_NEAR(damaged, kReplies * 2 / 3, kReplies / 20);
 }
 
 }  // namespace

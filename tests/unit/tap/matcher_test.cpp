@@ -1,297 +1,253 @@
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "panelgate/tap/matcher.hpp"
 
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <map>
+#include <random>
+#include <string>
 #include <string_view>
-#include <vector>
 
 #include "heard_line.hpp"
-#include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/base/bytes.hpp"
 
-using namespace panelgate;
-using namespace panelgate::tap;
-using panelgate::tap::test::Line;
-using panelgate::tap::test::pdu;
-
+namespace panelgate::tap::test::matcher_test {
 namespace {
 
-Bytes operator+(Bytes a, const Bytes& b) {
-    a.insert(a.end(), b.begin(), b.end());
-    return a;
-}
-
-Bytes adu(std::uint8_t station, std::string_view hex) {
-    return modbus::encode_adu(station, pdu(hex));
-}
-
-constexpr const char* kRead = "0300640001";
-constexpr const char* kReply = "03020005";
-
 using testing::ElementsAre;
-using testing::IsEmpty;
 
-}  // namespace
+struct Row {
+    const char* heard;
+    const char* told;
+};
 
-TEST(Matcher, PairsARequestWithTheReplyAfterIt) {
+constexpr Row kRows[] = {
+    // A request is open until its reply comes, normal or an exception.
+    {"10 31:read", ""},
+    {"10 31:read, 3 31:value", "31: read -> value"},
+    {"10 31:read, 3 31:8302", "31: read -> 8302"},
+    // Writes of several items have short replies.
+    {"10 5:100064000204000a0102, 3 5:1000640002, 3 5:0f0013000a02cd01, 3 5:0f0013000a",
+     "5: 100064000204000a0102 -> 1000640002; 5: 0f0013000a02cd01 -> 0f0013000a"},
+    // The reply to other writes is their echo.
+    {"10 5:write, 3 5:write, 50 5:read", "5: write -> write"},
+    {"10 5:0500b4ff00, 3 5:0500b4ff00, 50 5:read", "5: 0500b4ff00 -> 0500b4ff00"},
+    {"10 5:16000400f20025, 3 5:16000400f20025, 50 5:read", "5: 16000400f20025 -> 16000400f20025"},
+    {"10 5:0800001234, 3 5:0800001234, 50 5:read", "5: 0800001234 -> 0800001234"},
+    // A broadcast has no reply, nor has 08/0004.
+    {"10 0:write", "0: write -> unasked"},
+    {"10 5:0800040000", "5: 0800040000 -> unasked"},
+    // An adapter joins frames.
+    {"10 31:read+31:value+5:write+5:write+0:write+31:read",
+     "31: read -> value; 5: write -> write; 0: write -> unasked"},
+    // This CRC ends with 00: without that it is a reply of one register.
+    {"10 4:0302a6000f, 3 4:831e", "4: 0302a6000f -> 831e"},
+    // No reply: it is told when the next request comes, or after a while.
+    {"10 31:read, 500 5:read", "31: read -> silent"},
+    {"10 31:read, 500 5:read, 3 5:value", "31: read -> silent; 5: read -> value"},
+    {"10 31:read, 9000 silence", ""},
+    {"10 31:read, 11000 silence", "31: read -> silent"},
+    // A damaged reply.
+    {"10 31:read, 3 31:value!, 500 31:read, 3 31:value", "31: read -> damaged; 31: read -> value"},
+    // Bytes that belong to no frame.
+    {"10 ~ff00+31:read+~55+31:value+~00fe1f, 20 +5:read, 3 +5:value, 1000 silence",
+     "31: read -> value; 5: read -> value"},
+    // Whose reply is it? A late one is not given to the next request without a doubt.
+    {"10 31:read, 200 31:other, 30 31:value", "31: read -> silent; 31: other -> value ?"},
+    // The master has given up after 300 ms three times: then this is no echo.
+    {"10 9:read, 300 5:read, 3 5:value, 10 9:read, 300 5:read, 3 5:value, 10 9:read, 300 5:read, "
+     "3 5:value, 10 5:write, 300 5:write, 3 5:write",
+     "9: read -> silent; 5: read -> value; 9: read -> silent; 5: read -> value; "
+     "9: read -> silent; 5: read -> value; 5: write -> silent; 5: write -> write"},
+    // Where the time does not tell an echo, what follows does: no master gives up after 5 ms.
+    {"10 5:write, 150 5:write", ""},
+    {"10 5:write, 150 5:write, 5 31:read", "5: write -> write"},
+    {"10 5:write, 150 5:write, 5 5:write", "5: write -> silent; 5: write -> write ?"},
+    // An echo whose request came damaged.
+    {"10 5:write!, 3 5:write, 10 31:read", "5: write -> silent ?"},
+    // Functions without a length end by the silence behind them.
+    {"10 5:410102, 3 5:41aabbcc, 10 31:read, 3 31:value",
+     "5: 410102 -> 41aabbcc; 31: read -> value"},
+    {"10 5:410102+5:41aabbcc, 1000 silence", "5: 410102 -> 41aabbcc"},
+};
+
+void expect(const std::string& heard, const std::string& told) {
     Line line;
-    line.say(10ms, 31, kRead);
-    EXPECT_THAT(line.told(), IsEmpty());
-    line.say(3ms, 31, kReply);
-    EXPECT_THAT(line.told(), ElementsAre("31: 0300640001 -> 03020005"));
-    const Transaction& made = line.transactions[0];
+    line.play(heard);
+    EXPECT_EQ(line.told(), told) << heard;
+}
+
+TEST(Matcher, TellsWhatBelongsTogether) {
+    for (const Row& row : kRows) expect(row.heard, row.told);
+    // A hole in a reply, and a frame inside one.
+    const std::string reply = to_hex(bytes_of("31:value"), "");
+    expect("10 31:read, 3 ~" + reply.substr(0, 6) + ", 50 ~" + reply.substr(6),
+           "31: read -> value");
+    const std::string values = "0308" + to_hex(bytes_of("5:write"), "");
+    expect("10 31:0300640004, 3 +31:" + values, "31: 0300640004 -> " + values);
+}
+
+TEST(Matcher, TellsWhenItWas) {
+    Line line;
+    line.play("10 31:read, 3 31:value");
+    const Transaction& made = line.transactions.at(0);
     EXPECT_EQ(made.replied - made.sent, 3ms);
     EXPECT_EQ(made.sampled, made.asked);
     EXPECT_THAT(line.frames, ElementsAre(FrameKind::heard_request, FrameKind::reply));
-}
-
-TEST(Matcher, PairsAnExceptionToo) {
-    Line line;
-    line.say(10ms, 31, kRead);
-    line.say(3ms, 31, "8302");
-    EXPECT_THAT(line.told(), ElementsAre("31: 0300640001 -> 8302"));
-}
-
-TEST(Matcher, TakesAnEchoForTheReplyToAWrite) {
-    for (const char* write : {"0500B4FF00", "0600640007", "160004 00F2 0025", "0800001234"}) {
-        Line line;
-        line.say(10ms, 5, write);
-        line.say(3ms, 5, write);
-        line.say(50ms, 5, kRead);
-        EXPECT_THAT(line.told(), testing::SizeIs(1)) << write;
-        EXPECT_EQ(line.transactions.at(0).end, End::answered) << write;
-        EXPECT_FALSE(line.transactions.at(0).doubtful) << write;
-    }
-}
-
-TEST(Matcher, PairsSeveralWritesWithTheirShortReplies) {
-    Line line;
-    line.say(10ms, 5, "10 0064 0002 04 000A 0102");
-    line.say(3ms, 5, "10 0064 0002");
-    line.say(3ms, 5, "0F 0013 000A 02 CD01");
-    line.say(3ms, 5, "0F 0013 000A");
-    EXPECT_THAT(line.told(), ElementsAre("5: 100064000204000a0102 -> 1000640002",
-                                         "5: 0f0013000a02cd01 -> 0f0013000a"));
-}
-
-TEST(Matcher, FindsFramesThatAnAdapterHasJoined) {
-    Line line;
-    line.hear(10ms, adu(31, kRead) + adu(31, kReply) + adu(5, "0600640007") + adu(5, "0600640007") +
-                        adu(0, "0600640007") + adu(31, kRead));
-    EXPECT_THAT(line.told(),
-                ElementsAre("31: 0300640001 -> 03020005", "5: 0600640007 -> 0600640007",
-                            "0: 0600640007 -> unasked"));
-}
-
-TEST(Matcher, DoesNotTakeTheBeginningOfARequestForAReply) {
-    Line line;
-    line.say(10ms, 4, "0302A6000F");  // its CRC ends with 00: without that a reply of one register
-    line.say(3ms, 4, "831E");
-    EXPECT_THAT(line.told(), ElementsAre("4: 0302a6000f -> 831e"));
-}
-
-TEST(Matcher, KnowsThatABroadcastHasNoAnswer) {
-    Line line;
-    line.say(10ms, 0, "0600640007");
-    EXPECT_THAT(line.told(), ElementsAre("0: 0600640007 -> unasked"));
-    line.say(100ms, 5, "0800040000");
-    EXPECT_THAT(line.told(), ElementsAre("5: 0800040000 -> unasked"));
-}
-
-TEST(Matcher, ReportsARequestWithoutAReplyWhenTheNextOneComes) {
-    Line line;
-    line.say(10ms, 31, kRead);
-    line.say(500ms, 5, kRead);
-    EXPECT_THAT(line.told(), ElementsAre("31: 0300640001 -> silent"));
-    line.say(3ms, 5, kReply);
-    EXPECT_THAT(line.told(), ElementsAre("5: 0300640001 -> 03020005"));
-}
-
-TEST(Matcher, ReportsItAfterAWhileWhenNoneComes) {
-    Line line;
-    line.say(10ms, 31, kRead);
-    line.wait(9s);
-    EXPECT_THAT(line.told(), IsEmpty());
-    line.wait(2s);
-    EXPECT_THAT(line.told(), ElementsAre("31: 0300640001 -> silent"));
-}
-
-TEST(Matcher, ReportsADamagedReply) {
-    Line line;
-    Bytes reply = adu(31, kReply);
-    reply[4] ^= 1;
-    line.say(10ms, 31, kRead);
-    line.hear(3ms, reply);
-    line.say(500ms, 31, kRead);
-    line.say(3ms, 31, kReply);
-    EXPECT_THAT(line.told(),
-                ElementsAre("31: 0300640001 -> damaged", "31: 0300640001 -> 03020005"));
-}
-
-TEST(Matcher, StepsOverBytesThatBelongToNoFrame) {
-    Line line;
-    line.hear(10ms, Bytes{0xFF, 0x00} + adu(31, kRead) + Bytes{0x55} + adu(31, kReply) +
-                        Bytes{0x00, 0xFE, 0x1F});
-    line.hear(20ms, adu(5, kRead));
-    line.hear(3ms, adu(5, kReply));
-    line.wait(1s);
-    EXPECT_THAT(line.told(),
-                ElementsAre("31: 0300640001 -> 03020005", "5: 0300640001 -> 03020005"));
+    Line again;
+    again.play("10 31:read, 200 31:read, 3 31:value");
+    EXPECT_EQ(again.told(), "31: read -> silent; 31: read -> value");
+    EXPECT_EQ(again.transactions[1].sampled, again.transactions[0].asked) << "not newer than that";
 }
 
 TEST(Matcher, ListensOnBehindAHeaderThatPromisesTooMuch) {
     Line line;
-    line.say(10ms, 31, kRead);
-    line.hear(3ms, Bytes{31, 0x10, 0, 0, 0, 100, 200, 1, 2, 3});  // would take 209 bytes
-    for (int i = 0; i < 20; ++i) {
-        line.say(4ms, 5, kRead);
-        line.say(3ms, 5, kReply);
-    }
+    line.play("10 31:read, 3 ~1f1000000064c8010203");  // would take 209 bytes
+    for (int i = 0; i < 20; ++i) line.play("4 5:read, 3 5:value");
     line.wait(1s);
     EXPECT_EQ(line.transactions.front().end, End::damaged);
     EXPECT_EQ(line.transactions.size(), 21u);
 }
 
-TEST(Matcher, WaitsForTheRestOfAReplyWithAHole) {
-    Line line;
-    const Bytes reply = adu(31, kReply);
-    line.say(10ms, 31, kRead);
-    line.hear(3ms, Bytes(reply.begin(), reply.begin() + 3));
-    line.hear(50ms, Bytes(reply.begin() + 3, reply.end()));
-    EXPECT_THAT(line.told(), ElementsAre("31: 0300640001 -> 03020005"));
-}
-
-TEST(Matcher, DoesNotTakeAFrameInsideAReplyForOne) {
-    Line line;
-    const Bytes inner = adu(5, "0600640007");
-    Bytes outer{3, 8};
-    outer = outer + inner;
-    line.say(10ms, 31, "0300640004");
-    line.hear(3ms, modbus::encode_adu(31, outer));
-    EXPECT_EQ(line.told().size(), 1u);
-    EXPECT_EQ(line.transactions[0].reply, outer);
-}
-
-TEST(Matcher, DoesNotGiveALateReplyToTheNextRequest) {
-    Line line;
-    line.say(10ms, 31, "0300640001");
-    line.say(200ms, 31, "0300C80001");
-    line.say(30ms, 31, "03020064");  // which of them?
-    EXPECT_THAT(line.told(),
-                ElementsAre("31: 0300640001 -> silent", "31: 0300c80001 -> 03020064 ?"));
-}
-
-TEST(Matcher, GivesAReplyToTheSameRequestOnceMore) {
-    Line line;
-    line.say(10ms, 31, kRead);
-    line.say(200ms, 31, kRead);
-    line.say(3ms, 31, kReply);
-    EXPECT_THAT(line.told(), ElementsAre("31: 0300640001 -> silent", "31: 0300640001 -> 03020005"));
-    EXPECT_EQ(line.transactions[1].sampled, line.transactions[0].asked);  // not newer than that
-}
-
 TEST(Matcher, IsSureAgainWhenRepliesKeepTheUsualTime) {
     Line line;
-    for (int i = 0; i < 3; ++i) {
-        line.say(10ms, 31, "0300640001");
-        line.say(3ms, 31, "03020064");
-    }
-    line.say(10ms, 31, "0300640001");
-    line.say(200ms, 31, "0300C80001");
+    for (int i = 0; i < 3; ++i) line.play("10 31:read, 3 31:03020064");
+    line.play("10 31:read, 200 31:other");
     line.told();
-    line.say(3ms, 31, "030200C8");
-    line.say(10ms, 31, "0300640001");
-    line.say(3ms, 31, "03020064");
-    line.say(10ms, 31, "0300C80001");
-    line.say(3ms, 31, "030200C8");
-    EXPECT_THAT(line.told(),
-                ElementsAre("31: 0300c80001 -> 030200c8 ?", "31: 0300640001 -> 03020064",
-                            "31: 0300c80001 -> 030200c8"));
+    line.play("3 31:030200c8, 10 31:read, 3 31:03020064, 10 31:other, 3 31:030200c8");
+    EXPECT_EQ(line.told(), "31: other -> 030200c8 ?; 31: read -> 03020064; 31: other -> 030200c8");
 }
 
 TEST(Matcher, DistinguishesALateReplyAndADuplicateFromOthers) {
     Line line;
-    line.say(10ms, 31, "0300640001");
-    line.say(200ms, 31, "0300C80002");
-    line.say(3ms, 31, "03020005");  // of one register
-    line.say(3ms, 31, "030400050006");
-    line.say(3ms, 31, "030400050006");
-    line.say(3ms, 7, "03020001");
-    line.wait(1s);  // it could go on as a request
-    EXPECT_THAT(line.told(),
-                ElementsAre("31: 0300640001 -> silent", "31: 0300c80002 -> 030400050006"));
+    line.play("10 31:read, 200 31:0300c80002, 3 31:value, 3 31:030400050006, 3 31:030400050006");
+    line.play("3 7:03020001, 1000 silence");  // it could go on as a request
+    EXPECT_EQ(line.told(), "31: read -> silent; 31: 0300c80002 -> 030400050006");
     EXPECT_THAT(line.frames,
                 ElementsAre(FrameKind::heard_request, FrameKind::heard_request, FrameKind::late,
                             FrameKind::reply, FrameKind::copy, FrameKind::foreign));
 }
 
-TEST(Matcher, DistinguishesARepeatedWriteFromItsEchoByTheTime) {
-    Line line;
-    for (int i = 0; i < 3; ++i) {  // this master gives up after 300 ms
-        line.say(10ms, 9, kRead);
-        line.say(300ms, 5, kRead);
-        line.say(3ms, 5, kReply);
-    }
-    line.told();
-    line.say(10ms, 5, "0600640007");
-    line.say(300ms, 5, "0600640007");
-    line.say(3ms, 5, "0600640007");
-    EXPECT_THAT(line.told(), ElementsAre("5: 0600640007 -> silent", "5: 0600640007 -> 0600640007"));
-}
-
-TEST(Matcher, DecidesByWhatFollowsWhereTheTimeDoesNot) {
-    Line line;
-    line.say(10ms, 5, "0600640007");
-    line.say(150ms, 5, "0600640007");
-    EXPECT_THAT(line.told(), IsEmpty());
-    line.say(5ms, 31, kRead);  // no master gives up after that
-    EXPECT_THAT(line.told(), ElementsAre("5: 0600640007 -> 0600640007"));
-    Line other;
-    other.say(10ms, 5, "0600640007");
-    other.say(150ms, 5, "0600640007");
-    other.say(5ms, 5, "0600640007");
-    EXPECT_THAT(other.told(),
-                ElementsAre("5: 0600640007 -> silent", "5: 0600640007 -> 0600640007 ?"));
-}
-
-TEST(Matcher, IsInDoubtOfAnEchoWhoseRequestCameDamaged) {
-    Line line;
-    Bytes request = adu(5, "0600640007");
-    request[4] ^= 0x10;
-    line.hear(10ms, request);
-    line.say(3ms, 5, "0600640007");
-    line.say(10ms, 31, kRead);
-    EXPECT_THAT(line.told(), ElementsAre("5: 0600640007 -> silent ?"));
-}
-
-TEST(Matcher, CutsFunctionsWithoutALengthByTheSilenceBehindThem) {
-    Line line;
-    line.say(10ms, 5, "41 0102");
-    line.say(3ms, 5, "41 AABBCC");
-    line.say(10ms, 31, kRead);
-    line.say(3ms, 31, kReply);
-    EXPECT_THAT(line.told(), ElementsAre("5: 410102 -> 41aabbcc", "31: 0300640001 -> 03020005"));
-    Line joined;
-    joined.hear(10ms, adu(5, "41 0102") + adu(5, "41 AABBCC"));
-    joined.wait(1s);
-    EXPECT_THAT(joined.told(), ElementsAre("5: 410102 -> 41aabbcc"));
-}
-
 TEST(Matcher, ForgetsWhatIsOpenWhenTheLineIsLost) {
     Line line;
-    line.say(10ms, 31, kRead);
-    line.lose();
-    line.say(3ms, 31, kReply);
-    line.wait(1s);
-    EXPECT_THAT(line.told(), ElementsAre("31: 0300640001 -> silent ?"));
+    line.play("10 31:read, 0 lost, 3 31:value, 1000 silence");
+    EXPECT_EQ(line.told(), "31: read -> silent ?");
     EXPECT_EQ(line.frames.back(), FrameKind::foreign);
 }
 
 TEST(Matcher, HoldsLittleOfALineThatBabbles) {
     Line line;
-    Bytes noise(5000, 0x11);  // station 17, function 17: a request's length is known
-    line.hear(10ms, noise);
+    line.hear(10ms, Bytes(5000, 0x11));  // station 17, function 17: a request's length is known
     line.wait(1s);
-    std::size_t told = 0;
-    for (const FrameKind kind : line.frames) told += kind == FrameKind::damaged ? 1u : 0u;
-    EXPECT_GE(told, 9u);
-    EXPECT_THAT(line.told(), IsEmpty());
+    EXPECT_GE(std::ranges::count(line.frames, FrameKind::damaged), 9);
+    EXPECT_EQ(line.told(), "");
 }
+
+/// As many of them, apart by "; ".
+std::string times(int count, const std::string& what) {
+    std::string all = what;
+    for (int i = 1; i < count; ++i) all += "; " + what;
+    return all;
+}
+
+TEST(Patience, AMasterThatALateReplyDisturbsHasNotGivenUpByTime) {
+    Line line;
+    for (int i = 0; i < 4; ++i) {
+        line.play("10 31:read, 5 31:value, 10 31:read, 500 31:0300c80002");  // its timeout
+        line.play("50 31:03020065");  // late, and no answer to that: it is an error at once
+        line.play("80 5:read, 5 5:value");
+    }
+    line.wait(6s);
+    line.told();
+    line.play("10 31:read, 150 31:value, 10 31:read, 170 31:value");
+    line.play("10 31:read, 200 31:value, 10 31:read, 160 31:value");
+    EXPECT_EQ(line.told(), times(4, "31: read -> value"));
+}
+
+TEST(Patience, FollowsAMasterThatWaitsLongerThanItDid) {
+    Line line;
+    for (int i = 0; i < 10; ++i) line.play("10 31:read, 140 5:read, 5 5:value");  // given up
+    line.wait(6s);
+    line.told();
+    for (const char* think : {"150", "160", "170", "150", "160", "170", "150", "160"})
+        line.play(std::string("10 31:read, ") + think + " 31:value");
+    EXPECT_EQ(line.told(), times(3, "31: read -> value ?") + "; " + times(5, "31: read -> value"));
+}
+
+/// A master that waits for 500 ms, takes what has the right length, and a panel that is silent or
+/// late as often as not.
+class Trouble {
+  public:
+    Trouble(Line& line, unsigned seed) : line_(line), random_(seed) {}
+
+    void go_on() {
+        for (int i = 0; i < 120; ++i) {
+            const Exchange& asked = next();
+            line_.say(1ms * (5 + random_() % 60), asked.request);
+            let_answer(asked.reply);
+            hear(asked.reply, line_.now() + 500ms);
+        }
+        while (!coming_.empty()) hear("", line_.now() + 1s);
+        line_.wait(100ms);
+    }
+    /// Each reply comes late, and in time.
+    void calm_down(int exchanges) {
+        for (int i = 0; i < exchanges; ++i) {
+            const Exchange& asked = next();
+            line_.say(20ms, asked.request);
+            line_.say(1ms * (150 + random_() % 50), asked.reply);
+        }
+    }
+
+  private:
+    struct Exchange {
+        std::string_view request;
+        std::string_view reply;
+    };
+    static constexpr Exchange kExchanges[] = {
+        {"31:0300640001", "31:03020064"},
+        {"31:0300c80002", "31:030400c800c9"},
+        {"31:03012c0001", "31:0302012c"},
+    };
+
+    /// Not the last request's: a late reply belongs to another request.
+    const Exchange& next() { return kExchanges[last_ = (last_ + 1 + random_() % 2) % 3]; }
+    void let_answer(std::string_view reply) {
+        const unsigned fate = random_() % 10;
+        if (fate < 2) return;
+        const Duration think =
+            fate < 6 ? 1ms * (5 + random_() % 60) : 1ms * (500 + random_() % 400);
+        coming_.emplace(line_.now() + think, reply);
+    }
+    void hear(std::string_view expected, TimePoint until) {
+        while (!coming_.empty() && coming_.begin()->first < until) {
+            const auto [at, reply] = *coming_.begin();
+            coming_.erase(coming_.begin());
+            line_.say(std::max<Duration>(at - line_.now(), 2ms), reply);
+            if (reply.size() == expected.size() || random_() % 2 == 0) return;
+        }
+        line_.wait(std::max<Duration>(until - line_.now(), Duration::zero()));
+    }
+
+    Line& line_;
+    std::mt19937 random_;
+    std::size_t last_ = 0;
+    std::multimap<TimePoint, std::string_view> coming_;
+};
+
+TEST(Patience, BelievesSlowRepliesAgainWhateverTroubleThereWas) {
+    for (unsigned seed = 0; seed < 100; ++seed) {
+        Line line;
+        Trouble trouble(line, seed);
+        trouble.go_on();
+        trouble.calm_down(60);
+        line.transactions.clear();
+        trouble.calm_down(50);
+        ASSERT_EQ(line.transactions.size(), 50u) << seed;
+        EXPECT_EQ(std::ranges::count(line.transactions, true, &Transaction::doubtful), 0) << seed;
+    }
+}
+
+}  // namespace
+}  // namespace panelgate::tap::test::matcher_test

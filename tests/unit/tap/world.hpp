@@ -8,6 +8,7 @@
 #include <optional>
 #include <random>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "panelgate/base/bytes.hpp"
@@ -17,9 +18,7 @@
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
-namespace tap_world {
-
-using namespace panelgate;
+namespace panelgate::tap::test {
 
 /// Chances per request, and what the tap hears of it.
 struct Manner {
@@ -40,12 +39,13 @@ struct Asked {
     std::uint8_t station = 0;
     Bytes pdu;
     TimePoint begin;
-    std::set<Bytes> replies;     ///< PDUs that its panel has really sent for it
-    bool answered_well = false;  ///< its master received them, and nothing was wrong
+    std::set<Bytes> replies{};  ///< PDUs that its panel has really sent for it
 };
 
 class World {
   public:
+    static constexpr SerialFormat kSerial{38400, 8, Parity::none, 1};
+
     explicit World(const Manner& manner) : manner_(manner), random_(manner.seed) {}
 
     /// One request and its outcome, with the pause after it.
@@ -54,12 +54,24 @@ class World {
         ask(station, pdu);
     }
     const std::vector<Asked>& asked() const { return asked_; }
+
     /// What the tap receives, in order.
     struct Chunk {
         TimePoint at;
         Bytes bytes;
     };
-    std::vector<Chunk> take_chunks();
+    std::vector<Chunk> take_chunks() {
+        std::vector<Chunk> chunks;
+        for (const auto& [at, byte] : heard_) {
+            TimePoint handed = at;
+            if (manner_.latency > Duration::zero())
+                handed += manner_.latency - at.time_since_epoch() % manner_.latency;
+            if (chunks.empty() || chunks.back().at != handed) chunks.push_back({handed, {}});
+            chunks.back().bytes.push_back(byte);
+        }
+        heard_.clear();
+        return chunks;
+    }
 
   private:
     struct Speech {
@@ -67,9 +79,8 @@ class World {
         Bytes bytes;
         std::size_t to = 0;  ///< the request that it answers
         bool good = true;
-        TimePoint end() const { return begin + wire_time(kFormat, bytes.size()); }
+        TimePoint end() const { return begin + wire_time(kSerial, bytes.size()); }
     };
-    static constexpr SerialFormat kFormat{38400, 8, Parity::none, 1};
 
     bool chance(double p) { return std::uniform_real_distribution<>(0, 1)(random_) < p; }
     Duration between(Duration low, Duration high) {
@@ -77,35 +88,36 @@ class World {
             std::uniform_int_distribution<std::int64_t>(low.count(), high.count())(random_));
     }
     unsigned number(unsigned below) { return static_cast<unsigned>(random_() % below); }
+    std::uint16_t word(unsigned below) { return static_cast<std::uint16_t>(number(below)); }
 
     std::pair<std::uint8_t, Bytes> choose() {
         if (!asked_.empty() && chance(0.2)) return {asked_.back().station, asked_.back().pdu};
         const auto station = static_cast<std::uint8_t>(1 + number(4));
+        const unsigned kind = number(12);
+        const bool everyone = kind == 3 && chance(0.3);
+        return {everyone ? std::uint8_t{0} : station, make_request(kind)};
+    }
+
+    Bytes make_request(unsigned kind) {
         Writer out;
-        switch (number(12)) {
+        switch (kind) {
             case 0:
-                return {station,
-                        modbus::encode_write_register(100, static_cast<std::uint16_t>(number(3)))};
+                return modbus::encode_write_register(100, word(3));
             case 1:
-                return {station, modbus::encode_write_coil(7, chance(0.5))};
+                return modbus::encode_write_coil(7, chance(0.5));
             case 2:
-                return {station, modbus::encode_write_registers(
-                                     200, {1, static_cast<std::uint16_t>(number(99))})};
+                return modbus::encode_write_registers(200, {1, word(99)});
             case 3:
-                return {chance(0.3) ? std::uint8_t{0} : station,
-                        modbus::encode_write_coils(50, {true, false, chance(0.5)})};
+                return modbus::encode_write_coils(50, {true, false, chance(0.5)});
             case 4:
-                return {station, modbus::encode_read(modbus::Table::coils,
-                                                     static_cast<std::uint16_t>(number(1000)), 20)};
+                return modbus::encode_read(modbus::Table::coils, word(1000), 20);
             case 5:
-                return {station, out.u8(0x16).u16(4).u16(0xF2).u16(number(3)).take()};
+                return out.u8(0x16).u16(4).u16(0xF2).u16(number(3)).take();
             case 6:
-                return {station, out.u8(0x41).u16(number(5)).take()};
+                return out.u8(0x41).u16(number(5)).take();
             default:
-                return {station, modbus::encode_read(modbus::Table::holding_registers,
-                                                     static_cast<std::uint16_t>(number(2) * 100),
-                                                     static_cast<std::uint16_t>(
-                                                         number(2) == 0 ? 10 : 2 + number(20)))};
+                out.u8(0x03).u16(number(2) * 100);
+                return out.u16(number(2) == 0 ? 10 : 2 + number(20)).take();
         }
     }
 
@@ -123,11 +135,94 @@ class World {
         return out.take();
     }
 
-    void ask(std::uint8_t station, const Bytes& pdu);
-    void let_answer(std::size_t which, TimePoint heard);
-    std::optional<TimePoint> listen(std::size_t which, TimePoint until);
-    void collide(Speech& speech);
-    void put(Speech speech);
+    /// Sends a request, whatever is still on the wire; its master listens until it has an answer or
+    /// gives up.
+    void ask(std::uint8_t station, const Bytes& pdu) {
+        const std::size_t which = asked_.size();
+        asked_.push_back({station, pdu, now_});
+        Speech request{now_, modbus::encode_adu(station, pdu), which};
+        if (chance(manner_.damaged / 4)) request.good = false;
+        collide(request);
+        const bool taken = request.good;
+        const TimePoint end = request.end();
+        put(std::move(request));
+        if (taken && station != 0) let_answer(which, end);
+        const TimePoint until = end + (station == 0 ? Duration(20ms) : manner_.give_up);
+        const auto done = station == 0 ? std::nullopt : listen(which, until);
+        now_ = done ? *done + between(2ms, chance(0.05) ? 400ms : 12ms) : until + between(1ms, 5ms);
+        if (station == 0) listen(which, now_);
+    }
+
+    void let_answer(std::size_t which, TimePoint heard) {
+        const Asked& asked = asked_[which];
+        if (chance(manner_.silent)) return;
+        if (busy_[asked.station] > heard) return;  // it hears nothing while it is at work
+        Duration think = between(2ms, 6ms);
+        if (chance(manner_.slow)) think = between(6ms, manner_.give_up / 2);
+        if (chance(manner_.late)) think = manner_.give_up + between(5ms, manner_.give_up);
+        Speech reply{heard + think, modbus::encode_adu(asked.station, reply_to(asked.pdu)), which};
+        if (chance(manner_.damaged)) reply.good = false;
+        busy_[asked.station] = reply.end();
+        if (chance(manner_.noise))
+            coming_.push_back({reply.begin - 2ms, {0xFF, 0x00}, which, false});
+        if (chance(manner_.doubled)) {
+            Speech again = reply;
+            again.begin = reply.end() + 1ms;
+            coming_.push_back(again);
+        }
+        coming_.push_back(std::move(reply));
+        std::ranges::sort(coming_, {}, &Speech::begin);
+    }
+
+    /// When the master has its answer, or what it takes for it.
+    std::optional<TimePoint> listen(std::size_t which, TimePoint until) {
+        const Asked& asked = asked_[which];
+        while (!coming_.empty() && coming_.front().begin < until) {
+            Speech speech = std::move(coming_.front());
+            coming_.erase(coming_.begin());
+            collide(speech);
+            const TimePoint end = speech.end();
+            if (speech.bytes.size() < modbus::kMinAdu) {
+                put(std::move(speech));
+                continue;
+            }
+            const Bytes pdu(speech.bytes.begin() + 1, speech.bytes.end() - 2);
+            const bool fits =
+                speech.good && speech.bytes[0] == asked.station && modbus::answers(asked.pdu, pdu);
+            if (speech.good) asked_[speech.to].replies.insert(pdu);
+            put(std::move(speech));
+            if (fits && asked.station != 0) return end;
+        }
+        return std::nullopt;
+    }
+
+    /// Two simultaneous senders damage both frames.
+    void collide(Speech& speech) {
+        if (speech.begin < said_until_) speech.good = false;
+        for (Speech& other : coming_) {
+            if (other.begin >= speech.end() || other.end() <= speech.begin) continue;
+            other.good = false;
+            speech.good = false;
+        }
+    }
+
+    void put(Speech speech) {
+        said_until_ = std::max(said_until_, speech.end());
+        const bool unheard = chance(manner_.unheard);
+        const bool misheard = chance(manner_.misheard);
+        if (!speech.good || misheard) {
+            const std::size_t first = number(static_cast<unsigned>(speech.bytes.size()));
+            for (std::size_t i = first; i < std::min(speech.bytes.size(), first + 1 + number(3));
+                 ++i)
+                speech.bytes[i] = static_cast<std::uint8_t>(speech.bytes[i] ^ (1 + number(255)));
+            if (chance(0.3)) speech.bytes.resize(first);
+        }
+        TimePoint at = speech.begin;
+        for (const std::uint8_t byte : speech.bytes) {
+            at += character_time(kSerial);
+            if (!unheard) heard_.emplace(at, byte);
+        }
+    }
 
     Manner manner_;
     std::mt19937 random_;
@@ -140,104 +235,4 @@ class World {
     TimePoint said_until_{};  ///< on the wire
 };
 
-/// Sends a request, whatever is still on the wire; its master listens until it has an answer or
-/// gives up.
-inline void World::ask(std::uint8_t station, const Bytes& pdu) {
-    const std::size_t which = asked_.size();
-    asked_.push_back({station, pdu, now_, {}, false});
-    Speech request{now_, modbus::encode_adu(station, pdu), which};
-    if (chance(manner_.damaged / 4)) request.good = false;
-    collide(request);
-    const bool taken = request.good;
-    const TimePoint end = request.end();
-    put(std::move(request));
-    if (taken && station != 0) let_answer(which, end);
-    const TimePoint until = end + (station == 0 ? Duration(20ms) : manner_.give_up);
-    const auto done = station == 0 ? std::nullopt : listen(which, until);
-    now_ = done ? *done + between(2ms, chance(0.05) ? 400ms : 12ms) : until + between(1ms, 5ms);
-    if (station == 0) listen(which, now_);
-}
-
-inline void World::let_answer(std::size_t which, TimePoint heard) {
-    const Asked& asked = asked_[which];
-    if (chance(manner_.silent)) return;
-    if (busy_[asked.station] > heard) return;  // it hears nothing while it is at work
-    Duration think = between(2ms, 6ms);
-    if (chance(manner_.slow)) think = between(6ms, manner_.give_up / 2);
-    if (chance(manner_.late)) think = manner_.give_up + between(5ms, manner_.give_up);
-    Speech reply{heard + think, modbus::encode_adu(asked.station, reply_to(asked.pdu)), which};
-    if (chance(manner_.damaged)) reply.good = false;
-    busy_[asked.station] = reply.end();
-    if (chance(manner_.noise)) coming_.push_back({reply.begin - 2ms, {0xFF, 0x00}, which, false});
-    if (chance(manner_.doubled)) {
-        Speech again = reply;
-        again.begin = reply.end() + 1ms;
-        coming_.push_back(again);
-    }
-    coming_.push_back(std::move(reply));
-    std::ranges::sort(coming_, {}, &Speech::begin);
-}
-
-/// When the master has its answer, or what it takes for it.
-inline std::optional<TimePoint> World::listen(std::size_t which, TimePoint until) {
-    const Asked& asked = asked_[which];
-    while (!coming_.empty() && coming_.front().begin < until) {
-        Speech speech = std::move(coming_.front());
-        coming_.erase(coming_.begin());
-        collide(speech);
-        const TimePoint end = speech.end();
-        if (speech.bytes.size() < modbus::kMinAdu) {
-            put(std::move(speech));
-            continue;
-        }
-        const Bytes pdu(speech.bytes.begin() + 1, speech.bytes.end() - 2);
-        const bool fits =
-            speech.good && speech.bytes[0] == asked.station && modbus::answers(asked.pdu, pdu);
-        if (speech.good) asked_[speech.to].replies.insert(pdu);
-        put(std::move(speech));
-        if (fits && asked.station != 0) return end;
-    }
-    return std::nullopt;
-}
-
-/// Two simultaneous senders damage both frames.
-inline void World::collide(Speech& speech) {
-    if (speech.begin < said_until_) speech.good = false;
-    for (Speech& other : coming_) {
-        if (other.begin >= speech.end() || other.end() <= speech.begin) continue;
-        other.good = false;
-        speech.good = false;
-    }
-}
-
-inline void World::put(Speech speech) {
-    said_until_ = std::max(said_until_, speech.end());
-    const bool unheard = chance(manner_.unheard);
-    const bool misheard = chance(manner_.misheard);
-    if (!speech.good || misheard) {
-        const std::size_t first = number(static_cast<unsigned>(speech.bytes.size()));
-        for (std::size_t i = first; i < std::min(speech.bytes.size(), first + 1 + number(3)); ++i)
-            speech.bytes[i] = static_cast<std::uint8_t>(speech.bytes[i] ^ (1 + number(255)));
-        if (chance(0.3)) speech.bytes.resize(first);
-    }
-    TimePoint at = speech.begin;
-    for (const std::uint8_t byte : speech.bytes) {
-        at += character_time(kFormat);
-        if (!unheard) heard_.emplace(at, byte);
-    }
-}
-
-inline std::vector<World::Chunk> World::take_chunks() {
-    std::vector<Chunk> chunks;
-    for (const auto& [at, byte] : heard_) {
-        TimePoint handed = at;
-        if (manner_.latency > Duration::zero())
-            handed += manner_.latency - at.time_since_epoch() % manner_.latency;
-        if (chunks.empty() || chunks.back().at != handed) chunks.push_back({handed, {}});
-        chunks.back().bytes.push_back(byte);
-    }
-    heard_.clear();
-    return chunks;
-}
-
-}  // namespace tap_world
+}  // namespace panelgate::tap::test

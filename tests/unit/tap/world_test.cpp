@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
 #include <cstdlib>
 #include <deque>
 #include <iostream>
@@ -11,12 +14,7 @@
 
 #include "panelgate/tap/matcher.hpp"
 
-using namespace panelgate;
-using namespace panelgate::tap;
-using tap_world::Asked;
-using tap_world::Manner;
-using tap_world::World;
-
+namespace panelgate::tap::test::world_test {
 namespace {
 
 struct Score {
@@ -26,37 +24,43 @@ struct Score {
     std::size_t doubtful = 0;
     std::size_t wrong = 0;
     std::size_t invented = 0;  ///< reported without doubt, but never asked
-    std::string example;
+    std::string example{};
 };
+
+std::ostream& operator<<(std::ostream& out, const Score& score) {
+    return out << score.asked << " asked, " << score.answerable << " answered, " << score.right
+               << " right, " << score.doubtful << " in doubt, " << score.wrong << " wrong, "
+               << score.invented << " invented; " << score.example;
+}
 
 /// Compares what is reported with what really happened.
 class Judge {
   public:
     Judge(const World& world, Duration latency) : world_(world), slack_(latency + 2ms) {}
 
-    void hear(const Frame& frame) {
+    void hear(const Event& event) {
+        if (const auto* made = std::get_if<Transaction>(&event)) return judge(*made);
+        const auto& frame = std::get<Frame>(event);
         history_.push_back(std::to_string(to_seconds(frame.at.time_since_epoch())) + ' ' +
                            std::string(label(frame.kind)) + ' ' + to_hex(frame.bytes, ""));
         constexpr std::size_t kKept = 8;
         if (history_.size() > kKept) history_.pop_front();
     }
+    Score score;
+
+  private:
     void judge(const Transaction& made) {
         if (made.doubtful) {
             ++score.doubtful;
             return;
         }
         const Asked* asked = find(made);
-        if (asked == nullptr) return complain(score.invented, made);
+        if (asked == nullptr) return complain(score.invented, "invented", made);
         if (made.end != End::answered) return;
-        if (asked->replies.contains(made.reply) || answers_same(made)) {
-            ++score.right;
-        } else {
-            complain(score.wrong, made);
-        }
+        if (!asked->replies.contains(made.reply) && !answers_same(made))
+            return complain(score.wrong, "wrong", made);
+        ++score.right;
     }
-    Score score;
-
-  private:
     /// The request that was asked then.
     const Asked* find(const Transaction& made) {
         const auto& all = world_.asked();
@@ -76,13 +80,12 @@ class Judge {
         }
         return false;
     }
-    void complain(std::size_t& count, const Transaction& made) {
+    void complain(std::size_t& count, const char* word, const Transaction& made) {
         constexpr std::size_t kShown = 3;
         if (++count > kShown) return;
         for (const std::string& frame : history_) score.example += "\n    " + frame;
-        score.example += &count == &score.wrong ? "\n  wrong " : "\n  invented ";
-        score.example += std::to_string(made.station) + ": " + to_hex(made.request, "") + " -> " +
-                         to_hex(made.reply, "") + " asked at " +
+        score.example += std::string("\n  ") + word + ' ' + std::to_string(made.station) + ": " +
+                         to_hex(made.request, "") + " -> " + to_hex(made.reply, "") + " asked at " +
                          std::to_string(to_seconds(made.asked.time_since_epoch()));
     }
 
@@ -94,12 +97,9 @@ class Judge {
 Score play(const Manner& manner, std::size_t turns) {
     World world(manner);
     Judge judge(world, manner.latency);
-    Matcher matcher(Settings{SerialFormat{38400, 8, Parity::none, 1}});
+    Matcher matcher(Settings{World::kSerial});
     const auto collect = [&] {
-        while (const auto event = matcher.poll_action()) {
-            if (const auto* made = std::get_if<Transaction>(&*event)) judge.judge(*made);
-            if (const auto* frame = std::get_if<Frame>(&*event)) judge.hear(*frame);
-        }
+        while (const auto event = matcher.poll_action()) judge.hear(*event);
     };
     TimePoint last{};
     for (std::size_t i = 0; i < turns; ++i) {
@@ -122,24 +122,14 @@ Score play(const Manner& manner, std::size_t turns) {
     return judge.score;
 }
 
-std::ostream& operator<<(std::ostream& out, const Score& score) {
-    return out << score.asked << " asked, " << score.answerable << " answered, " << score.right
-               << " right, " << score.doubtful << " in doubt, " << score.wrong << " wrong, "
-               << score.invented << " invented; " << score.example;
-}
-
 std::size_t turns() {
     const char* const set = std::getenv("PANELGATE_TAP_TURNS");
     return set != nullptr ? std::stoul(set) : 100'000;
 }
 
-}  // namespace
-
 TEST(TapWorld, EachPairIsFoundOnAHealthyLine) {
     for (const Duration latency : {0ms, 4ms, 16ms}) {
-        Manner manner;
-        manner.latency = latency;
-        const Score score = play(manner, 20'000);
+        const Score score = play({.latency = latency}, 20'000);
         EXPECT_EQ(score.wrong + score.invented, 0u) << score;
         EXPECT_LE(score.doubtful, 2u) << score;
         // Frames of no known length, joined: only a silence or what follows can end them.
@@ -150,15 +140,10 @@ TEST(TapWorld, EachPairIsFoundOnAHealthyLine) {
 }
 
 TEST(TapWorld, NoPairIsWrongAmongPanelsWithFaults) {
+    Manner manner{.silent = 0.02, .late = 0.02, .damaged = 0.02, .doubled = 0.01, .slow = 0.02};
+    manner.noise = 0.01;
     for (const Duration latency : {0ms, 16ms}) {
-        Manner manner;
         manner.latency = latency;
-        manner.silent = 0.02;
-        manner.late = 0.02;
-        manner.damaged = 0.02;
-        manner.doubled = 0.01;
-        manner.slow = 0.02;
-        manner.noise = 0.01;
         const Score score = play(manner, turns());
         EXPECT_EQ(score.wrong, 0u) << score;
         EXPECT_LT(score.invented * 2000, score.asked) << score;
@@ -170,16 +155,15 @@ TEST(TapWorld, NoPairIsWrongAmongPanelsWithFaults) {
 
 /// A frame that the tap does not hear at all it cannot miss: then an echo is taken for the request.
 TEST(TapWorld, HardlyAPairIsWrongForATapThatMishears) {
+    Manner manner{.silent = 0.01, .late = 0.01, .misheard = 0.02, .unheard = 0.002};
     for (const unsigned seed : {1u, 2u}) {
-        Manner manner;
         manner.seed = seed;
-        manner.silent = 0.01;
-        manner.late = 0.01;
-        manner.misheard = 0.02;
-        manner.unheard = 0.002;
         const Score score = play(manner, turns());
         EXPECT_LT(score.wrong * 10'000, score.asked) << score;
         EXPECT_LT(score.invented * 300, score.asked) << score;
         std::cout << score << '\n';
     }
 }
+
+}  // namespace
+}  // namespace panelgate::tap::test::world_test

@@ -1,6 +1,10 @@
+#include <gtest/gtest.h>
+
 #include <boost/asio/ip/udp.hpp>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <system_error>
 #include <vector>
 
 #include "loopback.hpp"
@@ -26,6 +30,7 @@ class Sender {
     void request(std::uint16_t transaction, std::uint8_t unit, const Bytes& pdu) {
         send(modbus::encode_mbap(transaction, unit, pdu));
     }
+    void read(std::uint16_t number) { request(number, 1, read_pdu(number)); }
     /// Returns the next datagram; nullopt after a generous timeout.
     std::optional<Bytes> receive() {
         Bytes datagram(1024, 0);
@@ -47,19 +52,27 @@ class Sender {
 class DatagramsTest : public Loopback {
   protected:
     DatagramsTest() { settings.udp = true; }
-    Sender sender(const char* own_address = "127.0.0.1") {
-        return Sender(context, listener->port(), own_address);
-    }
-    bool run_until_dropped(std::uint64_t count) {
-        return run_until([&] { return listener->counters().protocol_errors == count; });
+    /// Starts the listener if there is none.
+    Sender sender(const char* own_address = "127.0.0.1", const char* server = "127.0.0.1") {
+        if (!listener) start();
+        return Sender(context, listener->port(), own_address, server);
     }
     static Bytes adu(std::uint16_t transaction, std::uint8_t unit, const Bytes& pdu) {
         return modbus::encode_mbap(transaction, unit, pdu);
     }
+    static Bytes read_adu(std::uint16_t number) { return adu(number, 1, reply_to_read(number)); }
+    static Bytes busy(std::uint16_t number) { return adu(number, 1, "83 06"_hex); }
+    void read(Sender& client, std::uint16_t number, std::size_t pending) {
+        client.read(number);
+        ASSERT_TRUE(run_until_pending(pending));
+    }
+    bool is_served(Sender& client) {
+        client.read(1);
+        return client.receive() == adu(1, 1, bus1.instant.value());
+    }
 };
 
 TEST_F(DatagramsTest, OneDatagramIsOneAduAndItsSenderIsAnswered) {
-    start();
     Sender first = sender();
     Sender second = sender();
     first.request(1, 1, read_pdu(10));
@@ -76,12 +89,10 @@ TEST_F(DatagramsTest, OneDatagramIsOneAduAndItsSenderIsAnswered) {
 
 TEST_F(DatagramsTest, ConnectionsAreServedOnTheSamePort) {
     bus1.instant = reply_to_read(7);
-    start();
     Client client = connect();
-    EXPECT_EQ(client.ask(1, read_pdu(7)), reply_to_read(7));
+    EXPECT_TRUE(Loopback::is_served(client));
     Sender other = sender();
-    other.request(1, 1, read_pdu(7));
-    EXPECT_EQ(other.receive(), adu(1, 1, reply_to_read(7)));
+    EXPECT_TRUE(is_served(other));
 }
 
 TEST_F(DatagramsTest, WithoutTheKeyThereIsNoUdpSocket) {
@@ -93,7 +104,6 @@ TEST_F(DatagramsTest, WithoutTheKeyThereIsNoUdpSocket) {
 
 TEST_F(DatagramsTest, WhatIsNoAduIsDroppedAndCounted) {
     bus1.instant = reply_to_read(7);
-    start();
     Sender client = sender();
     const Bytes good = adu(1, 1, read_pdu(7));
     const std::vector<Bytes> bad = {{},                                    // nothing in it
@@ -106,47 +116,43 @@ TEST_F(DatagramsTest, WhatIsNoAduIsDroppedAndCounted) {
                                     Bytes(1000, 0x41)};
     for (std::size_t i = 0; i < bad.size(); ++i) {
         client.send(bad[i]);
-        ASSERT_TRUE(run_until_dropped(i + 1)) << i;
+        ASSERT_TRUE(run_until_errors(i + 1)) << i;
     }
-    client.send(good);
-    EXPECT_EQ(client.receive(), adu(1, 1, reply_to_read(7)));
+    EXPECT_TRUE(is_served(client));
     EXPECT_EQ(bus1.seen.size(), 1U);
 }
 
 TEST_F(DatagramsTest, P2ADatagramThatComesTwiceHasOneAnswer) {
-    start();
     Sender client = sender();
-    for (int i = 0; i < 3; ++i) client.request(1, 1, read_pdu(7));
+    for (int i = 0; i < 3; ++i) client.read(1);
     for (int i = 0; i < 3; ++i) client.request(2, 1, "06 0001 0002"_hex);
-    client.request(3, 1, read_pdu(8));
-    ASSERT_TRUE(run_until_pending(3));
-    bus1.answer(0, reply_to_read(7));
+    read(client, 3, 3);
+    bus1.answer(0, reply_to_read(1));
     bus1.answer(0, "06 0001 0002"_hex);
-    bus1.answer(0, reply_to_read(8));
-    EXPECT_EQ(client.receive(), adu(1, 1, reply_to_read(7)));
+    bus1.answer(0, reply_to_read(3));
+    EXPECT_EQ(client.receive(), read_adu(1));
     EXPECT_EQ(client.receive(), adu(2, 1, "06 0001 0002"_hex));
-    EXPECT_EQ(client.receive(), adu(3, 1, reply_to_read(8)));
+    EXPECT_EQ(client.receive(), read_adu(3));
     EXPECT_FALSE(client.has_input());
 }
 
 TEST_F(DatagramsTest, P9APeerOverItsLimitIsAnsweredBusy) {
     settings.in_flight = 2;
     settings.waiting = 3;
-    start();
     Sender client = sender();
-    for (std::uint16_t i = 0; i < 8; ++i) client.request(i, 1, read_pdu(i));
-    client.request(4, 1, read_pdu(4));  // already queued; gets one answer
-    for (std::uint16_t i = 5; i < 8; ++i) EXPECT_EQ(client.receive(), adu(i, 1, "83 06"_hex));
+    for (std::uint16_t i = 0; i < 8; ++i) client.read(i);
+    client.read(4);  // already queued; gets one answer
+    for (std::uint16_t i = 5; i < 8; ++i) EXPECT_EQ(client.receive(), busy(i));
     for (std::uint16_t i = 0; i < 5; ++i) {
         ASSERT_TRUE(run_until([&] { return !bus1.held.empty(); }));
         ASSERT_LE(bus1.held.size(), 2U);
         bus1.answer(0, reply_to_read(i));
-        EXPECT_EQ(client.receive(), adu(i, 1, reply_to_read(i)));
+        EXPECT_EQ(client.receive(), read_adu(i));
     }
     EXPECT_EQ(bus1.seen.size(), 5U);
     EXPECT_FALSE(client.has_input());
-    EXPECT_EQ(listener->counters().protocol_errors, 0U);
-    EXPECT_EQ(listener->counters().busy, 3U);
+    EXPECT_EQ(counters().protocol_errors, 0U);
+    EXPECT_EQ(counters().busy, 3U);
 }
 
 TEST_F(DatagramsTest, P9BusyAnswersWaitForTheirTurnAmongOwnAnswers) {
@@ -154,76 +160,78 @@ TEST_F(DatagramsTest, P9BusyAnswersWaitForTheirTurnAmongOwnAnswers) {
     settings.waiting = 0;
     settings.own_answers = 2;
     settings.udp_busy_answers = 3;
-    start();
     Sender client = sender();
-    for (std::uint16_t i = 0; i < 8; ++i) client.request(i, 1, read_pdu(i));
-    for (std::uint16_t i = 1; i < 3; ++i) EXPECT_EQ(client.receive(), adu(i, 1, "83 06"_hex));
+    for (std::uint16_t i = 0; i < 8; ++i) client.read(i);
+    for (std::uint16_t i = 1; i < 3; ++i) EXPECT_EQ(client.receive(), busy(i));
     EXPECT_FALSE(client.has_input());
     clock.advance(settings.own_answers_period);
-    for (std::uint16_t i = 3; i < 5; ++i) EXPECT_EQ(client.receive(), adu(i, 1, "83 06"_hex));
+    for (std::uint16_t i = 3; i < 5; ++i) EXPECT_EQ(client.receive(), busy(i));
     clock.advance(settings.own_answers_period);
-    EXPECT_EQ(client.receive(), adu(5, 1, "83 06"_hex));
+    EXPECT_EQ(client.receive(), busy(5));
     clock.advance(settings.own_answers_period);
     EXPECT_FALSE(client.has_input()) << "the others were dropped";
-    EXPECT_EQ(listener->counters().protocol_errors, 0U);
+    EXPECT_EQ(counters().protocol_errors, 0U);
 }
 
 TEST_F(DatagramsTest, AnotherFramingIsNamedInTheLog) {
-    start();
     Sender client = sender();
     client.send(modbus::encode_adu(1, read_pdu(7)));
-    ASSERT_TRUE(run_until_dropped(1));
+    ASSERT_TRUE(run_until_errors(1));
     EXPECT_EQ(log.count("it speaks Modbus RTU, and datagrams are for Modbus/TCP"), 1);
     Sender other = sender("127.0.0.2");
     other.send(modbus::encode_ascii(1, read_pdu(7)));
-    ASSERT_TRUE(run_until_dropped(2));
+    ASSERT_TRUE(run_until_errors(2));
     EXPECT_EQ(log.count("with framing: ascii"), 1);
     EXPECT_TRUE(bus1.seen.empty());
 }
 
 TEST_F(DatagramsTest, P9AnAddressHasAFewPeersAndAnIdleOneIsEvicted) {
     settings.udp_peers_per_address = 2;
-    start();
     Sender first = sender();
     Sender second = sender();
     Sender third = sender();
     Sender elsewhere = sender("127.0.0.2");
-    first.request(1, 1, read_pdu(1));
-    second.request(1, 1, read_pdu(2));
-    ASSERT_TRUE(run_until_pending(2));
-    third.request(1, 1, read_pdu(3));
-    EXPECT_EQ(third.receive(), adu(1, 1, "83 06"_hex)) << "both places are taken";
-    elsewhere.request(1, 1, read_pdu(4));
-    ASSERT_TRUE(run_until_pending(3));
+    first.read(1);
+    read(second, 2, 2);
+    third.read(3);
+    EXPECT_EQ(third.receive(), busy(3)) << "both places are taken";
+    read(elsewhere, 4, 3);
     bus1.answer(0, reply_to_read(1));
-    EXPECT_EQ(first.receive(), adu(1, 1, reply_to_read(1)));
-    third.request(2, 1, read_pdu(3));
-    ASSERT_TRUE(run_until_pending(3));
+    EXPECT_EQ(first.receive(), read_adu(1));
+    read(third, 5, 3);
     EXPECT_EQ(bus1.cancelled.size(), 1U) << "the first has asked for nothing else";
 }
 
 TEST_F(DatagramsTest, P9AllOfThemTogetherAreBoundedToo) {
     settings.max_connections = 2;
-    start();
     std::vector<Sender> senders;
     for (const char* address : {"127.0.0.2", "127.0.0.3", "127.0.0.4"})
         senders.push_back(sender(address));
-    for (Sender& one : senders) one.request(1, 1, read_pdu(1));
-    EXPECT_EQ(senders[2].receive(), adu(1, 1, "83 06"_hex));
+    for (Sender& one : senders) one.read(1);
+    EXPECT_EQ(senders[2].receive(), busy(1));
     EXPECT_EQ(bus1.seen.size(), 2U);
-    EXPECT_EQ(listener->counters().protocol_errors, 0U);
+    EXPECT_EQ(counters().protocol_errors, 0U);
+}
+
+TEST_F(DatagramsTest, P9OneAddressNeverHasThemAll) {
+    settings.max_connections = 4;
+    std::vector<Sender> senders;
+    for (int i = 0; i < 3; ++i) senders.push_back(sender());
+    for (Sender& one : senders) one.read(1);
+    EXPECT_EQ(senders[2].receive(), busy(1));
+    ASSERT_EQ(bus1.held.size(), 2U);
+    Sender elsewhere = sender("127.0.0.2");
+    read(elsewhere, 1, 3);
+    EXPECT_TRUE(bus1.cancelled.empty());
 }
 
 TEST_F(DatagramsTest, AnIdlePeerIsDropped) {
     bus1.instant = reply_to_read(1);
-    start();
     Sender first = sender();
-    first.request(1, 1, read_pdu(1));
-    EXPECT_TRUE(first.receive());
+    EXPECT_TRUE(is_served(first));
     clock.advance(settings.udp_idle);
     Sender second = sender();
-    second.request(1, 1, read_pdu(1));
-    EXPECT_TRUE(second.receive());
+    EXPECT_TRUE(is_served(second));
     EXPECT_EQ(bus1.cancelled.size(), 1U);
 }
 
@@ -232,49 +240,41 @@ TEST_F(DatagramsTest, TheAddressThatWasAskedAnswers) {
     for (const char* all : {"0.0.0.0", "::"}) {
         settings.address = all;
         start();
-        Sender client(context, listener->port(), "127.0.0.1", "127.0.0.9");
-        client.request(1, 1, read_pdu(1));
-        EXPECT_EQ(client.receive(), adu(1, 1, reply_to_read(1))) << all;
+        Sender client = sender("127.0.0.1", "127.0.0.9");
+        EXPECT_TRUE(is_served(client)) << all;
     }
 }
 
 TEST_F(DatagramsTest, APeerThatIsNotAllowedIsNotAnswered) {
     settings.allow = {{"127.0.0.1", 32}};
     bus1.instant = reply_to_read(1);
-    start();
     Sender stranger = sender("127.0.0.2");
-    stranger.request(1, 1, read_pdu(1));
+    stranger.read(1);
     ASSERT_TRUE(run_until([&] { return log.count("datagram refused") == 1; }));
     Sender known = sender();
-    known.request(1, 1, read_pdu(1));
-    EXPECT_TRUE(known.receive());
+    EXPECT_TRUE(is_served(known));
     EXPECT_FALSE(stranger.has_input());
     EXPECT_EQ(bus1.seen.size(), 1U);
 }
 
 TEST_F(DatagramsTest, P3WhatIsOutstandingAtTheEndIsAnswered) {
     settings.in_flight = 1;
-    start();
     Sender client = sender();
-    client.request(1, 1, read_pdu(1));
-    client.request(2, 1, read_pdu(2));
-    ASSERT_TRUE(run_until_pending(1));
+    client.read(1);
+    read(client, 2, 1);
     bool stopped = false;
     listener->stop([&] { stopped = true; });
-    context.restart();
-    context.poll();
+    do_all_that_is_due();
     EXPECT_FALSE(stopped);
     bus1.answer(0, reply_to_read(1));
-    EXPECT_EQ(client.receive(), adu(1, 1, reply_to_read(1)));
+    EXPECT_EQ(client.receive(), read_adu(1));
     EXPECT_EQ(client.receive(), adu(2, 1, "83 0a"_hex)) << "it has never started";
     EXPECT_TRUE(run_until([&] { return stopped; }));
 }
 
 TEST_F(DatagramsTest, P2CutOffItTakesItsRequestsBack) {
-    start();
     Sender client = sender();
-    client.request(1, 1, read_pdu(1));
-    ASSERT_TRUE(run_until_pending(1));
+    read(client, 1, 1);
     listener->close_now();
     EXPECT_EQ(bus1.cancelled.size(), 1U);
     EXPECT_TRUE(bus1.held.empty());

@@ -2,20 +2,33 @@
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
+#include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <cstddef>
+#include <cstdint>
 #include <list>
+#include <optional>
 #include <system_error>
+#include <vector>
 
 #include "loopback.hpp"
+#include "places.hpp"
 
 namespace panelgate::tcp_server::listener_test {
 namespace {
 
 using ::testing::HasSubstr;
 
-class ListenerTest : public Loopback {};
+class ListenerTest : public Loopback {
+  protected:
+    Client connect_from_elsewhere() { return connect("127.0.0.2"); }
+    void expect_places(std::uint64_t evicted, std::uint64_t refused) {
+        EXPECT_EQ(counters().evicted, evicted);
+        EXPECT_EQ(counters().refused, refused);
+    }
+};
 
 TEST_F(ListenerTest, ReportsTheAddressItCannotBind) {
     start();
@@ -35,48 +48,38 @@ TEST_F(ListenerTest, ReportsTheAddressItCannotBind) {
 }
 
 TEST_F(ListenerTest, CountsItsConnections) {
-    start();
     {
         Client first = connect();
         Client second = connect();
-        ASSERT_TRUE(run_until([&] { return listener->counters().connections == 2; }));
+        ASSERT_TRUE(run_until_connections(2));
     }
-    ASSERT_TRUE(run_until([&] { return listener->counters().connections == 0; }));
-    EXPECT_EQ(listener->counters().connections_total, 2U);
-    EXPECT_EQ(listener->counters().protocol_errors, 0U);
-    EXPECT_EQ(listener->counters().listener, "127.0.0.1:0");
+    ASSERT_TRUE(run_until_connections(0));
+    EXPECT_EQ(counters().connections_total, 2U);
+    EXPECT_EQ(counters().protocol_errors, 0U);
+    EXPECT_EQ(counters().listener, "127.0.0.1:0");
 }
 
-TEST_F(ListenerTest, ClosesAPeerThatIsNotAllowed) {
-    settings.allow = {{"10.0.0.0", 8}};
-    start();
-    Client client = connect();
-    EXPECT_TRUE(client.sees_close());
-    EXPECT_EQ(listener->counters().connections_total, 1U);
-    EXPECT_EQ(listener->counters().connections, 0U);
-    EXPECT_EQ(log.count("allow list"), 1U);
-}
-
-TEST_F(ListenerTest, LetsAnAllowedPeerIn) {
-    settings.allow = {{"10.0.0.0", 8}, {"127.0.0.0", 8}};
+TEST_F(ListenerTest, ClosesAPeerThatIsNotAllowedAndLetsAnAllowedOneIn) {
+    settings.allow = {{"10.0.0.0", 8}, {"127.0.0.1", 32}};
     bus1.instant = reply_to_read(1);
-    start();
+    Client stranger = connect_from_elsewhere();
+    EXPECT_TRUE(stranger.sees_close());
+    EXPECT_EQ(counters().connections_total, 1U);
+    EXPECT_EQ(counters().connections, 0U);
+    EXPECT_EQ(log.count("allow list"), 1U);
     Client client = connect();
-    EXPECT_EQ(client.ask(1, read_pdu(1)), reply_to_read(1));
+    EXPECT_TRUE(is_served(client));
 }
 
 TEST_F(ListenerTest, P9PassesTheClientAndItsAddressToTheBuses) {
     bus1.rights = {};
-    start();
     Client first = connect();
     Client second = connect();
-    Client other(context, listener->port(), 0, "127.0.0.2");
-    first.request(1, 1, read_pdu(1));
-    ASSERT_TRUE(run_until_pending(1));
+    Client other = connect_from_elsewhere();
+    read(first, 1, 1);
     second.request(1, 0, "06 0000 0001"_hex);
     ASSERT_TRUE(run_until_pending(2));
-    other.request(1, 1, read_pdu(1));
-    ASSERT_TRUE(run_until_pending(3));
+    read(other, 1, 3);
     EXPECT_EQ(bus1.seen[0].host, bus::host_of("127.0.0.1"));
     EXPECT_EQ(bus1.seen[1].host, bus1.seen[0].host);
     EXPECT_EQ(bus1.seen[2].host, bus::host_of("127.0.0.2"));
@@ -95,149 +98,180 @@ TEST_F(ListenerTest, P9TakesIpv4ForTheSameAddressOnAnIpv6Listener) {
         GTEST_SKIP() << "no IPv6 here";
     }
     Client client = connect();
-    EXPECT_EQ(client.ask(1, read_pdu(1)), reply_to_read(1));
+    EXPECT_TRUE(is_served(client));
     EXPECT_EQ(bus1.seen[0].host, bus::host_of("127.0.0.1"));
 }
 
 TEST_F(ListenerTest, RefusesTheNewestWhenItIsFullAndNoneIsIdle) {
     settings.max_connections = 2;
-    start();
     Client first = connect();
     Client second = connect();
-    first.request(1, 1, read_pdu(1));
-    second.request(1, 1, read_pdu(1));
-    ASSERT_TRUE(run_until([&] { return bus1.seen.size() == 2; }));
+    first.read(1);
+    second.read(1);
+    ASSERT_TRUE(run_until_pending(2));
     Client third = connect();
     Client fourth = connect();
     EXPECT_TRUE(third.sees_close());
     EXPECT_TRUE(fourth.sees_close());
     EXPECT_EQ(log.count("max_connections reached"), 1U) << "told once";
-    EXPECT_EQ(listener->counters().refused, 2U);
+    expect_places(0, 2);
 }
 
 TEST_F(ListenerTest, TakesNewOnesWhenOneHasLeftAFullHouse) {
     settings.max_connections = 1;
     bus1.instant = reply_to_read(1);
-    start();
     std::optional<Client> first(connect());
-    EXPECT_EQ(first->ask(1, read_pdu(1)), reply_to_read(1));
+    EXPECT_TRUE(is_served(*first));
     first.reset();
-    ASSERT_TRUE(run_until([&] { return listener->counters().connections == 0; }));
+    ASSERT_TRUE(run_until_connections(0));
     Client second = connect();
-    EXPECT_EQ(second.ask(1, read_pdu(1)), reply_to_read(1));
-    EXPECT_EQ(listener->counters().evicted, 0U);
+    EXPECT_TRUE(is_served(second));
+    expect_places(0, 0);
 }
 
 TEST_F(ListenerTest, P9AnAddressThatLeaksConnectionsLosesItsLongestIdleOneAndLocksOutNoOther) {
     settings.max_connections = 6;
     settings.max_connections_per_address = 3;
     bus1.instant = reply_to_read(1);
-    start();
+    const auto ask_and_rest = [&](Client& client) {
+        EXPECT_TRUE(is_served(client));
+        clock.advance(1s);
+    };
     Client first = connect();
-    EXPECT_EQ(first.ask(1, read_pdu(1)), reply_to_read(1));
-    clock.advance(1s);
+    ask_and_rest(first);
     Client second = connect();
-    EXPECT_EQ(second.ask(1, read_pdu(1)), reply_to_read(1));
-    clock.advance(1s);
-    EXPECT_EQ(first.ask(1, read_pdu(1)), reply_to_read(1));
-    clock.advance(1s);
+    ask_and_rest(second);
+    ask_and_rest(first);
     Client third = connect();
-    EXPECT_EQ(third.ask(1, read_pdu(1)), reply_to_read(1));
-    clock.advance(1s);
+    ask_and_rest(third);
     Client fourth = connect();
     EXPECT_TRUE(second.sees_close()) << "it has asked nothing for longest";
-    for (Client* one : {&first, &third, &fourth})
-        EXPECT_EQ(one->ask(1, read_pdu(1)), reply_to_read(1));
-    EXPECT_EQ(listener->counters().evicted, 1U);
-    EXPECT_EQ(listener->counters().refused, 0U);
-    EXPECT_EQ(listener->counters().connections, 3U) << "others have their places";
+    for (Client* one : {&first, &third, &fourth}) EXPECT_TRUE(is_served(*one));
+    expect_places(1, 0);
+    EXPECT_EQ(counters().connections, 3U) << "others have their places";
 }
 
-TEST_F(ListenerTest, P9AConnectionWithSomethingOpenNeverGivesWay) {
+TEST_F(ListenerTest, P9HalfSentRequestsOfOneAddressDoNotLockOutAnother) {
+    settings.max_connections = 2;
+    bus1.instant = reply_to_read(1);
+    Client first = connect();
+    first.send("0001 0000 0006 01"_hex);
+    ASSERT_TRUE(run_until_armed(1));
+    clock.advance(1s);
+    Client second = connect();
+    second.send("0001 0000 0006 01"_hex);
+    ASSERT_TRUE(run_until_armed(2));
+    Client other = connect_from_elsewhere();
+    EXPECT_TRUE(is_served(other));
+    EXPECT_TRUE(first.sees_close()) << "it has sent nothing for longest";
+    EXPECT_EQ(counters().connections, 2U);
+    expect_places(1, 0);
+    EXPECT_EQ(log.count("warn connection gives way"), 1U);
+}
+
+TEST_F(ListenerTest, P9AHalfSentRequestThatDoesNotGoOnIsIdle) {
+    settings.max_connections_per_address = 1;
+    bus1.instant = reply_to_read(1);
+    Client first = connect();
+    first.send("0001 0000 0006 01"_hex);
+    ASSERT_TRUE(run_until_armed());
+    Client second = connect();
+    EXPECT_TRUE(second.sees_close()) << "the first may go on";
+    clock.advance(settings.half_sent_pause);
+    Client third = connect();
+    EXPECT_TRUE(is_served(third));
+    EXPECT_TRUE(first.sees_close());
+    EXPECT_EQ(log.count("info connection gives way"), 1U);
+}
+
+TEST_F(ListenerTest, P9BusyConnectionsOfOneAddressDoNotLockOutAnother) {
+    settings.max_connections = 2;
+    Client first = connect();
+    read(first, 1, 1);
+    clock.advance(1s);
+    Client second = connect();
+    read(second, 2, 2);
+    Client other = connect_from_elsewhere();
+    EXPECT_TRUE(first.sees_close()) << "its request is the oldest";
+    EXPECT_EQ(bus1.cancelled.size(), 1U) << "what it had waiting goes with it";
+    read(other, 3, 2);
+    bus1.answer(1, reply_to_read(3));
+    EXPECT_EQ(other.receive(), read_reply(3));
+    Client third = connect();
+    EXPECT_TRUE(third.sees_close()) << "its address has half of the places";
+    expect_places(1, 1);
+}
+
+TEST_F(ListenerTest, P9AConnectionWithSomethingOpenGivesNoWayToItsOwnAddress) {
     settings.max_connections_per_address = 2;
-    start();
     Client first = connect();
     Client second = connect();
-    first.request(1, 1, read_pdu(1));
-    second.request(2, 1, read_pdu(1));
-    ASSERT_TRUE(run_until([&] { return bus1.seen.size() == 2; }));
+    first.read(1);
+    second.read(2);
+    ASSERT_TRUE(run_until_pending(2));
     Client third = connect();
     EXPECT_TRUE(third.sees_close());
-    EXPECT_EQ(listener->counters().refused, 1U);
+    expect_places(0, 1);
     EXPECT_EQ(log.count("max_connections_per_address reached"), 1U);
 }
 
 TEST_F(ListenerTest, TakesThreeHundredClientsAtOnce) {
     settings.max_connections_per_address = 300;
     bus1.instant = reply_to_read(1);
-    start();
     std::list<Client> clients;
-    for (int i = 0; i < 300; ++i) clients.emplace_back(context, listener->port());
-    for (Client& client : clients) client.request(1, 1, read_pdu(1));
-    for (Client& client : clients) {
-        EXPECT_EQ(client.receive(), (modbus::Adu{1, 1, reply_to_read(1)}));
-    }
-    EXPECT_EQ(listener->counters().connections, 300U);
+    for (int i = 0; i < 300; ++i) clients.push_back(connect());
+    for (Client& client : clients) client.read(1);
+    for (Client& client : clients) EXPECT_EQ(client.receive(), read_reply(1));
+    EXPECT_EQ(counters().connections, 300U);
 }
 
 TEST_F(ListenerTest, AnswersWhatIsOutstandingBeforeItStops) {
-    start();
     Client idle = connect();
     Client busy = connect();
-    busy.request(1, 1, read_pdu(1));
-    ASSERT_TRUE(run_until_pending(1));
+    read(busy, 1, 1);
     bool stopped = false;
     listener->stop([&] { stopped = true; });
     EXPECT_TRUE(idle.sees_close());
-    busy.request(2, 1, read_pdu(2));
-    context.restart();
-    context.poll();
+    busy.read(2);
+    do_all_that_is_due();
     EXPECT_FALSE(stopped);
     EXPECT_EQ(bus1.seen.size(), 1U) << "no new requests";
     bus1.answer(0, reply_to_read(1));
-    EXPECT_EQ(busy.receive(), (modbus::Adu{1, 1, reply_to_read(1)}));
+    EXPECT_EQ(busy.receive(), read_reply(1));
     EXPECT_TRUE(busy.sees_close());
     EXPECT_TRUE(run_until([&] { return stopped; }));
     EXPECT_THROW(connect(), boost::system::system_error);
 }
 
-TEST_F(ListenerTest, StopsAsynchronouslyWhenThereAreNoConnections) {
-    start();
-    bool stopped = false;
-    listener->stop([&] { stopped = true; });
-    EXPECT_FALSE(stopped);
-    EXPECT_TRUE(run_until([&] { return stopped; }));
-}
-
-TEST_F(ListenerTest, CutsConnectionsOnRequest) {
-    start();
-    Client client = connect();
-    client.request(1, 1, read_pdu(1));
-    ASSERT_TRUE(run_until_pending(1));
-    bool stopped = false;
-    listener->stop([&] { stopped = true; });
-    listener->close_now();
-    EXPECT_EQ(bus1.cancelled.size(), 1U);
-    EXPECT_TRUE(client.sees_close());
-    EXPECT_TRUE(run_until([&] { return stopped; }));
+TEST_F(ListenerTest, StopsAsynchronouslyAlsoWithoutConnectionsOrWhenTheyAreCut) {
+    for (const bool connected : {false, true}) {
+        start();
+        std::optional<Client> client;
+        if (connected) read(client.emplace(connect()), 1, 1);
+        bool stopped = false;
+        listener->stop([&] { stopped = true; });
+        EXPECT_FALSE(stopped);
+        if (connected) {
+            listener->close_now();
+            EXPECT_EQ(bus1.cancelled.size(), 1U);
+            EXPECT_TRUE(client->sees_close());
+        }
+        EXPECT_TRUE(run_until([&] { return stopped; }));
+    }
 }
 
 TEST_F(ListenerTest, MayEndWhileRequestsAreOutstanding) {
-    start();
     Client client = connect();
-    client.request(1, 1, read_pdu(1));
-    ASSERT_TRUE(run_until_pending(1));
+    read(client, 1, 1);
     const bus::AnswerHandler late = bus1.held[0].handler;
     listener.reset();
-    context.restart();
-    context.poll();
+    do_all_that_is_due();
     late(bus::Answer{});
     EXPECT_TRUE(client.sees_close());
 }
 
 TEST_F(ListenerTest, RestsWhileThereAreNoDescriptors) {
     bus1.instant = reply_to_read(1);
-    start();
     Client client = connect();  // in the backlog: the loop has not run yet
     rlimit before{};
     ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &before), 0);
@@ -252,9 +286,69 @@ TEST_F(ListenerTest, RestsWhileThereAreNoDescriptors) {
     setrlimit(RLIMIT_NOFILE, &before);
     EXPECT_TRUE(told);
     EXPECT_LE(turns, 2U) << "it spins";
-    EXPECT_EQ(client.ask(1, read_pdu(1)), reply_to_read(1));
+    EXPECT_TRUE(is_served(client));
     EXPECT_EQ(log.count("warn cannot accept listener=127.0.0.1:0 reason=\"Too many open files\""),
               1U);
+}
+
+using Guests = std::vector<Guest>;
+
+/// Heard in this second.
+Guest idle(bus::Host host, int second) { return {host, true, TimePoint(1h) + 1s * second}; }
+Guest busy(bus::Host host, int second) { return {host, false, TimePoint(1h) + 1s * second}; }
+
+struct PlaceCase {
+    const char* why;
+    Guests guests;
+    bus::Host newcomer;
+    std::optional<std::size_t> gives_way;
+    PlaceLimits limits = {4, 4};
+};
+
+void expect_gives_way(const std::vector<PlaceCase>& cases) {
+    for (const auto& [why, guests, newcomer, gives_way, limits] : cases) {
+        const Place place = find_place(guests, newcomer, limits);
+        EXPECT_EQ(place.taken_from, gives_way) << why;
+        EXPECT_EQ(place.found, place.taken_from || guests.size() < limits.in_all) << why;
+    }
+}
+
+TEST(Places, P9AnAddressReplacesItsOwnIdleConnectionsAndThoseOfTheAddressWithMost) {
+    expect_gives_way({
+        {"an empty house", {}, 1, {}},
+        {"a free place", {busy(1, 1), idle(1, 2), idle(2, 3)}, 1, {}},
+        {"one address may have them all, and replaces its longest idle one",
+         {busy(1, 1), idle(1, 3), idle(1, 2), idle(1, 4)},
+         1,
+         2U},
+        {"the address with most loses its longest idle one",
+         {idle(2, 1), busy(1, 2), idle(1, 4), idle(1, 3)},
+         3,
+         3U},
+        {"of several with most, the longest idle gives way",
+         {busy(2, 1), idle(2, 4), busy(1, 2), idle(1, 3)},
+         3,
+         3U},
+        {"its share", {idle(2, 1), idle(1, 2), busy(1, 3)}, 1, 1U, {4, 2}},
+    });
+    const Place place = find_place(Guests{idle(2, 1), busy(1, 2), busy(1, 3)}, 1, {4, 2});
+    EXPECT_FALSE(place.found) << "it takes none of another";
+    EXPECT_TRUE(place.share_used);
+    EXPECT_EQ(place.own, 2U);
+}
+
+TEST(Places, P9AnAddressWithoutAConnectionFindsAPlaceHoweverBusyTheOthersAre) {
+    expect_gives_way({
+        {"busy ones", {busy(1, 3), busy(1, 1), busy(1, 2), busy(1, 4)}, 2, 1U},
+        {"of the address with most, not the idle one of another",
+         {busy(1, 3), busy(1, 2), busy(1, 4), idle(2, 1)},
+         3,
+         1U},
+        {"the only one", {busy(1, 1)}, 2, 0U, {1, 1}},
+        {"with less", {busy(1, 1), busy(1, 2), busy(1, 3), busy(2, 4)}, 2, 0U},
+        {"with the same", {busy(1, 1), busy(1, 2), busy(2, 3), busy(2, 4)}, 2, {}},
+        {"the other would take it back", {busy(1, 1), busy(1, 2), busy(2, 3)}, 2, {}, {3, 3}},
+    });
 }
 
 }  // namespace

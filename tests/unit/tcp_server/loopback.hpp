@@ -45,6 +45,15 @@ inline Bytes operator+(Bytes left, const Bytes& right) {
 /// A request to read one register of a station, identified by its address.
 inline Bytes read_pdu(std::uint16_t address) { return Writer().u8(3).u16(address).u16(1).take(); }
 inline Bytes reply_to_read(std::uint16_t value) { return Writer().u8(3).u8(2).u16(value).take(); }
+/// The reply to Client::read(number).
+inline modbus::Adu read_reply(std::uint16_t number) { return {number, 1, reply_to_read(number)}; }
+/// What Client::read() sends for 0 to `count` - 1.
+inline Bytes reads(std::uint16_t count) {
+    Bytes stream;
+    for (std::uint16_t i = 0; i < count; ++i)
+        stream = stream + modbus::encode_mbap(i, 1, read_pdu(i));
+    return stream;
+}
 
 /// A client in the same thread: it runs the loop while it waits.
 class Client {
@@ -83,6 +92,8 @@ class Client {
     void request(std::uint16_t transaction, std::uint8_t unit, const Bytes& pdu) {
         send(modbus::encode_mbap(transaction, unit, pdu));
     }
+    /// Reads the register of this number from unit 1, with this transaction id.
+    void read(std::uint16_t number) { request(number, 1, read_pdu(number)); }
 
     /// Returns the next reply; nullopt if the connection was closed.
     std::optional<modbus::Adu> receive() {
@@ -132,6 +143,13 @@ class Client {
         return received_ != 0;
     }
 
+    void shutdown_send() { socket_.shutdown(tcp::socket::shutdown_send); }
+    void close() { socket_.close(); }
+    /// Closes with a reset.
+    void reset() {
+        socket_.set_option(asio::socket_base::linger(true, 0));
+        socket_.close();
+    }
     tcp::socket& socket() { return socket_; }
 
   private:
@@ -177,7 +195,13 @@ class Loopback : public ::testing::Test {
                                               UnitMap(settings, lines), "1.2.3");
         listener->start();
     }
-    Client connect() { return Client(context, listener->port()); }
+    /// Starts the listener if there is none.
+    Client connect(const char* own_address = "127.0.0.1", int receive_buffer = 0) {
+        if (!listener) start();
+        return Client(context, listener->port(), receive_buffer, own_address);
+    }
+    Counters counters() const { return listener->counters(); }
+
     bool run_until(const std::function<bool()>& reached) {
         return tcp_server::run_until(context, reached);
     }
@@ -188,6 +212,25 @@ class Loopback : public ::testing::Test {
     bool run_until_pending(std::size_t count) {
         return run_until([&] { return bus1.held.size() == count; });
     }
+    bool run_until_errors(std::uint64_t count) {
+        return run_until([&] { return counters().protocol_errors == count; });
+    }
+    bool run_until_connections(std::uint64_t count) {
+        return run_until([&] { return counters().connections == count; });
+    }
+    /// Runs what is ready, and what that makes ready.
+    void do_all_that_is_due() {
+        context.restart();
+        while (context.poll() != 0) {
+        }
+    }
+    /// Makes a request that is then the last of `pending` on the bus.
+    void read(Client& client, std::uint16_t number, std::size_t pending) {
+        client.read(number);
+        ASSERT_TRUE(run_until_pending(pending));
+    }
+    /// True if the client is answered what the bus says at once.
+    bool is_served(Client& client) { return client.ask(1, read_pdu(1)) == bus1.instant; }
     /// Answers one request on the bus and returns the client's reply.
     Bytes ask_bus(Client& client, std::uint8_t unit, const Bytes& pdu, const Result<Bytes>& answer,
                   bool transmitted = true) {
@@ -197,6 +240,18 @@ class Loopback : public ::testing::Test {
         const auto reply = client.receive();
         return reply ? reply->pdu : Bytes{};
     }
+    /// The bus answers reads `first` to `end` - 1 in turn, and each answer is the client's next
+    /// reply.
+    void expect_values(Client& client, std::uint16_t first, std::uint16_t end) {
+        for (std::uint16_t i = first; i < end; ++i) {
+            ASSERT_TRUE(run_until([&] { return !bus1.held.empty(); }));
+            ASSERT_LE(bus1.held.size(), settings.in_flight);
+            ASSERT_EQ(bus1.held[0].request.request.pdu(), read_pdu(i));
+            bus1.answer(0, reply_to_read(i));
+            ASSERT_EQ(client.receive(), read_reply(i));
+        }
+    }
+
     asio::io_context context;
     test::ManualClock clock;  ///< moved only by the tests
     ManualBus bus1{context};

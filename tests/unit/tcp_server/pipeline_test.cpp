@@ -3,8 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <boost/asio/io_context.hpp>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "held_bus.hpp"
 #include "panelgate/tcp_server/dispatch.hpp"
@@ -15,7 +19,116 @@
 namespace panelgate::tcp_server::pipeline_test {
 namespace {
 
-// A pipeline with two requests in flight and three queued, whose client takes replies on demand.
+using Ticket = ReplyQueue::Ticket;
+
+/// Pops and returns the next reply; nothing if its turn has not come.
+std::optional<Bytes> take(ReplyQueue& queue) {
+    const Bytes* front = queue.front();
+    if (front == nullptr) return std::nullopt;
+    Bytes adu = *front;
+    queue.pop();
+    return adu;
+}
+
+TEST(ReplyQueue, LetsNoReplyOvertakeAnotherAndStepsOverWhatGetsNone) {
+    ReplyQueue queue;
+    const Ticket first = queue.open(1, 5);
+    const Ticket second = queue.open(2, 6);
+    queue.push(3, 7, "83 0a"_hex);
+    queue.settle(second, "03 02 0002"_hex);
+    EXPECT_EQ(take(queue), std::nullopt);
+    queue.settle(first, "03 02 0001"_hex);
+    EXPECT_EQ(take(queue), "0001 0000 0005 05 03 02 0001"_hex);
+    EXPECT_EQ(take(queue), "0002 0000 0005 06 03 02 0002"_hex);
+    EXPECT_EQ(take(queue), "0003 0000 0003 07 83 0a"_hex);
+    EXPECT_EQ(take(queue), std::nullopt);
+    EXPECT_TRUE(queue.empty());
+    const Ticket silent = queue.open(1, 0);
+    const Ticket last = queue.open(2, 0);
+    queue.settle(last, "83 02"_hex);
+    queue.drop(silent);
+    EXPECT_EQ(queue.size(), 1U) << "at once: nobody has to take it";
+    EXPECT_EQ(take(queue), "0002 0000 0003 00 83 02"_hex);
+    queue.drop(queue.open(3, 0));
+    EXPECT_EQ(take(queue), std::nullopt);
+    EXPECT_TRUE(queue.empty());
+}
+
+TEST(ReplyQueue, CountsAReplyUntilItHasLeftAndWhatIsLeavingStaysWhereItIs) {
+    ReplyQueue queue;
+    queue.push(1, 1, "83 0a"_hex);
+    const Ticket slow = queue.open(2, 1);
+    const Ticket quick = queue.open(3, 1);
+    queue.settle(quick, "83 02"_hex);
+    EXPECT_EQ(queue.size(), 3U);
+    EXPECT_EQ(queue.in_flight(), 2U) << "the third only waits for the second";
+    queue.settle(slow, "83 02"_hex);
+    EXPECT_EQ(queue.in_flight(), 3U) << "all wait for the client";
+    for (std::size_t left = 3; left != 0; --left) {
+        EXPECT_EQ(queue.size(), left);
+        EXPECT_TRUE(take(queue));
+        EXPECT_EQ(queue.in_flight(), left - 1);
+    }
+    EXPECT_TRUE(queue.empty());
+    queue.push(1, 1, "83 0a"_hex);
+    const Bytes* leaving = queue.front();
+    for (std::uint16_t i = 0; i < 1000; ++i) queue.push(i, 2, "83 02"_hex);
+    EXPECT_EQ(queue.front(), leaving);
+    EXPECT_EQ(*leaving, "0001 0000 0003 01 83 0a"_hex);
+}
+
+/// Two answers in each millisecond.
+class OwnAnswersTest : public testing::Test {
+  protected:
+    void wait(char name, bool wanted = true) {
+        answers->wait([this, name, wanted] {
+            if (wanted) given += name;
+            return wanted;
+        });
+    }
+
+    test::ManualClock clock;
+    std::shared_ptr<OwnAnswers> answers = std::make_shared<OwnAnswers>(clock, 2, 1ms);
+    std::string given;
+};
+
+TEST_F(OwnAnswersTest, P5AFewAreGivenAtOnceTheOthersInTheNextPeriods) {
+    EXPECT_TRUE(answers->try_acquire());
+    EXPECT_TRUE(answers->try_acquire());
+    EXPECT_FALSE(answers->try_acquire());
+    for (const char name : {'a', 'b', 'c'}) wait(name);
+    EXPECT_EQ(given, "");
+    clock.advance(1ms);
+    EXPECT_EQ(given, "ab");
+    EXPECT_FALSE(answers->try_acquire()) << "one waits";
+    clock.advance(1ms);
+    EXPECT_EQ(given, "abc");
+    EXPECT_TRUE(answers->try_acquire());
+    EXPECT_EQ(clock.armed(), 0u);
+    for (int n = 0; n < 10; ++n) {
+        clock.pass(1ms);
+        EXPECT_TRUE(answers->try_acquire()) << "who asks now and then never waits";
+    }
+}
+
+TEST_F(OwnAnswersTest, P9ClientsThatHaveLeftCostTheOthersNoTurn) {
+    answers->try_acquire();
+    answers->try_acquire();
+    for (int n = 0; n < 1000; ++n) wait('x', false);
+    wait('a');
+    clock.advance(1ms);
+    EXPECT_EQ(given, "a");
+}
+
+TEST_F(OwnAnswersTest, NoAnswerIsRequestedAfterTheEnd) {
+    answers->try_acquire();
+    wait('a');
+    answers.reset();
+    clock.advance(1s);
+    EXPECT_EQ(given, "");
+}
+
+/// A pipeline with two requests in flight and three queued, whose client takes replies on demand.
 class SmallPipeline : public ::testing::Test {
   protected:
     static Settings small() {
@@ -101,6 +214,9 @@ class RepeatedRequests : public SmallPipeline {
         shared->settings.in_flight = 8;
         shared->settings.waiting = 8;
     }
+    void take(const std::vector<modbus::Adu>& adus) {
+        for (const modbus::Adu& adu : adus) pipeline->take(adu);
+    }
     std::size_t answers() {
         std::size_t count = 0;
         do {
@@ -115,7 +231,7 @@ class RepeatedRequests : public SmallPipeline {
 };
 
 TEST_F(RepeatedRequests, P2ARetransmittedWriteGetsTheOneAnswerAndNoSecondFrame) {
-    for (int i = 0; i < 3; ++i) pipeline->take(write);
+    take({write, write, write});
     EXPECT_EQ(bus.seen.size(), 1U);
     EXPECT_EQ(answers(), 1U);
     pipeline->take(write);
@@ -133,9 +249,7 @@ TEST_F(RepeatedRequests, P9EndlessRetransmissionsAreThrottled) {
 
 TEST_F(RepeatedRequests, P2OneThatStillWaitsForItsTurnIsKnownAgain) {
     shared->settings.in_flight = 1;
-    pipeline->take(read);
-    pipeline->take(write);
-    pipeline->take(write);
+    take({read, write, write});
     answer_all();
     pipeline->pop();
     EXPECT_EQ(bus.seen.size(), 2U);
@@ -143,29 +257,19 @@ TEST_F(RepeatedRequests, P2OneThatStillWaitsForItsTurnIsKnownAgain) {
 }
 
 TEST_F(RepeatedRequests, AnotherIdUnitOrValueIsAnotherRequest) {
-    pipeline->take(write);
-    pipeline->take({8, write.unit, write.pdu});
-    pipeline->take({9, 2, write.pdu});
-    pipeline->take({7, 1, "06 0001 0003"_hex});
+    take({write, {8, 1, write.pdu}, {9, 2, write.pdu}, {7, 1, "06 0001 0003"_hex}});
     EXPECT_EQ(bus.seen.size(), 4U);
     EXPECT_EQ(answers(), 4U);
-}
-
-TEST_F(RepeatedRequests, AClientThatReusesOneIdMayWriteOnOffOn) {
-    pipeline->take(write);
-    pipeline->take({7, 1, "06 0001 0000"_hex});
-    pipeline->take(write);
-    EXPECT_EQ(bus.seen.size(), 3U);
+    take({write, {7, 1, "06 0001 0000"_hex}, write});
+    EXPECT_EQ(bus.seen.size(), 7U) << "a client that reuses one id may write on, off, on";
     EXPECT_EQ(answers(), 3U);
 }
 
 TEST_F(RepeatedRequests, ReadsAreAnsweredEachUnlessTheyAreToBeJoined) {
-    pipeline->take(read);
-    pipeline->take(read);
+    take({read, read});
     EXPECT_EQ(answers(), 2U) << "the arbiter shares their transaction";
     shared->settings.retransmissions = Retransmissions::join;
-    pipeline->take(read);
-    pipeline->take(read);
+    take({read, read});
     EXPECT_EQ(answers(), 1U);
 }
 
@@ -174,32 +278,24 @@ TEST_F(RepeatedRequests, P6AReadThatIsRepeatedBehindAWriteOfItsItemsIsAskedAgain
     for (const std::size_t places : {8u, 1u}) {  // in flight and queued
         shared->settings.in_flight = places;
         for (const Bytes& over : {"06 0000 0002"_hex, "0F 0000 0001 01 01"_hex, "41 01"_hex}) {
-            pipeline->take(read);
-            pipeline->take({9, 1, over});
-            pipeline->take(read);
+            take({read, {9, 1, over}, read});
             EXPECT_EQ(answers(), 3U) << over[0];
         }
-        pipeline->take(read);
-        pipeline->take({9, 1, "06 0005 0002"_hex});
-        pipeline->take(read);
+        take({read, {9, 1, "06 0005 0002"_hex}, read});
         EXPECT_EQ(answers(), 2U) << "it has written something else";
     }
     EXPECT_EQ(shared->counters.joined, 2U);
 }
 
-TEST_F(RepeatedRequests, PassGivesEachATurnOfItsOwn) {
+TEST_F(RepeatedRequests, PassOrNoTransactionIdGivesEachATurnOfItsOwn) {
     shared->settings.retransmissions = Retransmissions::pass;
-    pipeline->take(write);
-    pipeline->take(write);
+    take({write, write});
     EXPECT_EQ(bus.seen.size(), 2U);
     EXPECT_EQ(answers(), 2U);
-}
-
-TEST_F(RepeatedRequests, WithoutTransactionIdsNoneIsKnownAgain) {
+    shared->settings.retransmissions = Retransmissions::join_writes;
     shared->settings.framing = modbus::Framing::rtu;
-    pipeline->take({0, 1, write.pdu});
-    pipeline->take({0, 1, write.pdu});
-    EXPECT_EQ(bus.seen.size(), 2U);
+    take({{0, 1, write.pdu}, {0, 1, write.pdu}});
+    EXPECT_EQ(bus.seen.size(), 4U);
 }
 
 }  // namespace

@@ -1,5 +1,12 @@
+#include <gtest/gtest.h>
+
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <random>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "loopback.hpp"
 
@@ -10,7 +17,6 @@ class Session : public Loopback {};
 
 TEST_F(Session, EchoesTransactionAndUnit) {
     settings.units[101] = {"floor1", 1};
-    start();
     Client client = connect();
     client.request(0xBEEF, 101, read_pdu(5));
     ASSERT_TRUE(run_until_pending(1));
@@ -21,34 +27,22 @@ TEST_F(Session, EchoesTransactionAndUnit) {
     EXPECT_EQ(client.receive(), (modbus::Adu{0xBEEF, 101, reply_to_read(42)}));
 }
 
-TEST_F(Session, KeepsTheOrderWhenTheBusDoesNot) {
-    start();
-    Client client = connect();
-    for (std::uint16_t i = 0; i < 8; ++i) client.request(i, 1, read_pdu(i));
-    ASSERT_TRUE(run_until_pending(8));
-    for (std::uint16_t i = 8; i-- > 1;) bus1.answer(i, reply_to_read(i));
-    context.restart();
-    context.poll();
-    EXPECT_FALSE(client.has_input());
-    bus1.answer(0, reply_to_read(0));
-    for (std::uint16_t i = 0; i < 8; ++i) {
-        EXPECT_EQ(client.receive(), (modbus::Adu{i, 1, reply_to_read(i)}));
-    }
-}
-
-TEST_F(Session, DoesNotMindRepeatedTransactionIds) {
-    start();
-    Client client = connect();
-    for (std::uint16_t i = 0; i < 4; ++i) client.request(0, 1, read_pdu(i));
-    ASSERT_TRUE(run_until_pending(4));
-    for (const std::uint8_t value : Bytes{3, 2, 1, 0}) bus1.answer(value, reply_to_read(value));
-    for (std::uint16_t i = 0; i < 4; ++i) {
-        EXPECT_EQ(client.receive(), (modbus::Adu{0, 1, reply_to_read(i)}));
+TEST_F(Session, KeepsTheOrderWhenTheBusDoesNotAlsoWhereTransactionIdsAreTheSame) {
+    for (const bool same : {false, true}) {
+        const auto id = [&](std::uint16_t i) { return same ? std::uint16_t{0} : i; };
+        Client client = connect();
+        for (std::uint16_t i = 0; i < 8; ++i) client.request(id(i), 1, read_pdu(i));
+        ASSERT_TRUE(run_until_pending(8));
+        for (std::uint16_t i = 8; i-- > 1;) bus1.answer(i, reply_to_read(i));
+        do_all_that_is_due();
+        EXPECT_FALSE(client.has_input());
+        bus1.answer(0, reply_to_read(0));
+        for (std::uint16_t i = 0; i < 8; ++i)
+            EXPECT_EQ(client.receive(), (modbus::Adu{id(i), 1, reply_to_read(i)}));
     }
 }
 
 TEST_F(Session, KeepsTwoClientsWithEqualTransactionIdsApart) {
-    start();
     Client first = connect();
     Client second = connect();
     first.request(1, 1, read_pdu(10));
@@ -64,24 +58,21 @@ TEST_F(Session, KeepsTwoClientsWithEqualTransactionIdsApart) {
 
 TEST_F(Session, TakesAdusByteByByteAndManyAtOnce) {
     bus1.instant = reply_to_read(1);
-    start();
     Client client = connect();
     const Bytes adu = modbus::encode_mbap(1, 1, read_pdu(1));
     for (const std::uint8_t byte : adu) {
         client.send(ByteView(&byte, 1));
-        context.restart();
-        context.poll();
+        do_all_that_is_due();
     }
-    EXPECT_EQ(client.receive(), (modbus::Adu{1, 1, reply_to_read(1)}));
+    EXPECT_EQ(client.receive(), read_reply(1));
     client.send(adu + adu + adu);
-    for (int i = 0; i < 3; ++i) EXPECT_EQ(client.receive()->pdu, reply_to_read(1));
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(client.receive(), read_reply(1));
 }
 
 TEST_F(Session, AnswersTheSameHoweverTheStreamIsCut) {
     bus1.instant = reply_to_read(9);
     settings.in_flight = 1000;
     settings.own_answers = 2000;  // the clock does not advance
-    start();
     std::mt19937 chance(20261121);
     Bytes stream;
     std::vector<modbus::Adu> expected;
@@ -95,52 +86,48 @@ TEST_F(Session, AnswersTheSameHoweverTheStreamIsCut) {
     }
     for (int round = 0; round < 5; ++round) {
         Client client = connect();
-        ByteView left(stream);
-        while (!left.empty()) {
+        for (ByteView left(stream); !left.empty();) {
             const std::size_t n = std::min<std::size_t>(left.size(), 1 + chance() % 700);
             client.send(left.first(n));
             left = left.subspan(n);
-            context.restart();
-            context.poll();
+            do_all_that_is_due();
         }
         for (const modbus::Adu& reply : expected) ASSERT_EQ(client.receive(), reply);
     }
-    EXPECT_EQ(listener->counters().protocol_errors, 0U);
+    EXPECT_EQ(counters().protocol_errors, 0U);
 }
 
-TEST_F(Session, RefusesFunctionsThatNoRequestMayCarry) {
-    start();
+// Which requests are refused, and in which order of rules: dispatch_test.
+TEST_F(Session, AnswersWhatNeedsNoLineByItself) {
+    bus1.line.up = true;
+    bus1.line.queue_depth = 5;
+    settings.own_answers = 100;  // the clock does not advance
+    const std::tuple<std::uint8_t, Bytes, Bytes> rows[] = {
+        {248, "ff"_hex, "ff 01"_hex},             // no request may carry it
+        {248, "03 00"_hex, "83 0a"_hex},          // an unrouted unit
+        {1, "03 0000 0001 00"_hex, "83 03"_hex},  // malformed
+        {1, "03 0000 007e"_hex, "83 03"_hex},     // too large
+        {1, "01 0000 07d9"_hex, "81 03"_hex},     // too large
+        {2, "10 00"_hex, "90 01"_hex},            // a write to a read-only station
+        {0, "17 0000 0001 0000 0001 02 0001"_hex, "97 01"_hex},
+        {255, "03 0000 0002"_hex, "03 04 0002 0001"_hex},
+        {255, "04 0004 0002"_hex, "04 04 0001 0005"_hex},
+        {255, "03 0007 0001"_hex, "03 02 0000"_hex},
+        {255, "06 0000 0001"_hex, "86 01"_hex},
+        {255, "2b 0e 04 02"_hex, "2b 0e 04 83 00 00 01 02 05 312e322e33"_hex},
+    };
     Client client = connect();
-    EXPECT_EQ(client.ask(1, "00"_hex), "80 01"_hex);
-    EXPECT_EQ(client.ask(1, "80 01"_hex), "80 01"_hex);
-    EXPECT_EQ(client.ask(248, "ff"_hex), "ff 01"_hex) << "before routing";
-    EXPECT_TRUE(bus1.seen.empty());
-}
-
-TEST_F(Session, RefusesUnroutedUnits) {
-    settings.diagnostics_unit.reset();
+    for (const auto& [unit, request, reply] : rows)
+        EXPECT_EQ(client.ask(unit, request), reply) << int{unit} << ": " << to_hex(request);
+    settings.read_only = true;
     start();
-    Client client = connect();
-    for (const std::uint8_t unit : Bytes{248, 254, 255}) {
-        EXPECT_EQ(client.ask(unit, read_pdu(0)), "83 0a"_hex);
-        EXPECT_EQ(client.ask(unit, "03 00"_hex), "83 0a"_hex) << "before the form is judged";
-    }
+    Client reader = connect();
+    EXPECT_EQ(reader.ask(1, "06 0000 0001"_hex), "86 01"_hex);
     EXPECT_TRUE(bus1.seen.empty());
-}
-
-TEST_F(Session, RefusesMalformedAndTooLargeRequests) {
-    start();
-    Client client = connect();
-    EXPECT_EQ(client.ask(1, "03 0000"_hex), "83 03"_hex);
-    EXPECT_EQ(client.ask(1, "03 0000 0001 00"_hex), "83 03"_hex);
-    EXPECT_EQ(client.ask(1, "03 0000 007e"_hex), "83 03"_hex);
-    EXPECT_EQ(client.ask(1, "01 0000 07d9"_hex), "81 03"_hex);
-    EXPECT_EQ(client.ask(1, "10 0000 0002 02 0001"_hex), "90 03"_hex);
-    EXPECT_TRUE(bus1.seen.empty());
+    EXPECT_EQ(ask_bus(reader, 2, read_pdu(0), reply_to_read(0)), reply_to_read(0));
 }
 
 TEST_F(Session, P3TurnsEveryFaultOfTheBusIntoItsException) {
-    start();
     Client client = connect();
     const std::vector<std::pair<Fault, Bytes>> expected = {
         {Fault::denied, "83 01"_hex},    {Fault::malformed, "83 03"_hex},
@@ -149,30 +136,21 @@ TEST_F(Session, P3TurnsEveryFaultOfTheBusIntoItsException) {
         {Fault::line_lost, "83 0b"_hex}, {Fault::timeout, "83 0b"_hex},
         {Fault::damaged, "83 0b"_hex},   {Fault::offline, "83 0b"_hex},
     };
-    for (const auto& [fault, pdu] : expected) {
+    for (const auto& [fault, pdu] : expected)
         EXPECT_EQ(ask_bus(client, 1, read_pdu(0), fault), pdu) << label(fault);
-    }
 }
 
-TEST_F(Session, PassesRepliesAndExceptionsOfThePanelUnchanged) {
-    start();
+TEST_F(Session, PassesRepliesAndExceptionsOfThePanelUnchangedIfAFrameCanCarryThem) {
     Client client = connect();
-    EXPECT_EQ(ask_bus(client, 1, read_pdu(0), "83 02"_hex), "83 02"_hex);
-    EXPECT_EQ(ask_bus(client, 1, read_pdu(0), "83 c7"_hex), "83 c7"_hex);
     const Bytes large = "41"_hex + Bytes(252, 0xA5);
-    EXPECT_EQ(ask_bus(client, 1, "41 01 02"_hex, large), large);
-}
-
-TEST_F(Session, NeverSendsAReplyThatNoFrameCanCarry) {
-    start();
-    Client client = connect();
+    for (const Bytes& reply : {"83 02"_hex, "83 c7"_hex, large})
+        EXPECT_EQ(ask_bus(client, 1, reply == large ? "41 01 02"_hex : read_pdu(0), reply), reply);
     EXPECT_EQ(ask_bus(client, 1, "41"_hex, "41"_hex + Bytes(253, 0)), "c1 03"_hex);
     EXPECT_EQ(ask_bus(client, 1, "41"_hex, Bytes{}), "c1 03"_hex);
 }
 
 TEST_F(Session, HandsReadsAndWritesOverAsTheyAreAndNeverAsPolls) {
     bus1.instant = "00"_hex;
-    start();
     Client client = connect();
     for (const Bytes& pdu : {read_pdu(0), "06 0000 0001"_hex, "41 00"_hex}) client.ask(1, pdu);
     ASSERT_EQ(bus1.seen.size(), 3U);
@@ -182,48 +160,160 @@ TEST_F(Session, HandsReadsAndWritesOverAsTheyAreAndNeverAsPolls) {
     for (const bus::Request& seen : bus1.seen) EXPECT_FALSE(seen.poll);
 }
 
-TEST_F(Session, RefusesWritesThroughAReadOnlyListener) {
-    settings.read_only = true;
-    bus1.instant = reply_to_read(0);
-    start();
+const Bytes kWrite = "10 0064 0001 02 00ff"_hex;
+const Bytes kWritten = "10 0064 0001"_hex;
+
+// TBC-02 to TBC-06.
+class SessionBroadcast : public Loopback {
+  protected:
+    SessionBroadcast() { bus1.rights = {}; }
+    /// Broadcasts on two lines.
+    void broadcast(Client& client) {
+        client.request(1, 0, kWrite);
+        ASSERT_TRUE(run_until([&] { return bus1.held.size() + bus2.held.size() == 2; }));
+    }
+};
+
+TEST_F(SessionBroadcast, AnswersABroadcastAsSoonAsItHasLeft) {
     Client client = connect();
-    EXPECT_EQ(client.ask(1, "06 0000 0001"_hex), "86 01"_hex);
-    EXPECT_EQ(client.ask(1, "41"_hex), "c1 01"_hex) << "nobody knows what it does";
-    EXPECT_EQ(client.ask(0, "06 0000 0001"_hex), "86 01"_hex);
-    EXPECT_EQ(client.ask(248, "06 0000 0001"_hex), "86 01"_hex) << "policy before routing";
-    EXPECT_TRUE(bus1.seen.empty());
-    EXPECT_EQ(client.ask(1, read_pdu(0)), reply_to_read(0));
+    client.request(1, 0, kWrite);
+    ASSERT_TRUE(run_until_pending(1));
+    EXPECT_EQ(bus1.held[0].request.station, 0);
+    EXPECT_FALSE(bus1.held[0].request.request.is_read());
+    bus1.answer(0, kWritten);
+    EXPECT_EQ(client.receive(), (modbus::Adu{1, 0, kWritten}));
+    EXPECT_TRUE(bus2.seen.empty()) << "a line of another listener";
 }
 
-TEST_F(Session, RefusesWritesToAReadOnlyStation) {
-    bus1.instant = reply_to_read(0);
-    start();
+TEST_F(SessionBroadcast, RefusesAnythingButAWriteToUnitZeroAndEverythingWhereItIsDenied) {
     Client client = connect();
-    EXPECT_EQ(client.ask(2, "10 0000 0001 02 0001"_hex), "90 01"_hex);
-    EXPECT_EQ(client.ask(2, "17 0000 0001 0000 0001 02 0001"_hex), "97 01"_hex);
-    EXPECT_EQ(client.ask(2, "10 00"_hex), "90 01"_hex) << "policy before form";
-    EXPECT_TRUE(bus1.seen.empty());
-    EXPECT_EQ(client.ask(2, read_pdu(0)), reply_to_read(0));
-}
-
-TEST_F(Session, AnswersForItselfAtTheDiagnosticsUnit) {
-    bus1.line.up = true;
-    bus1.line.queue_depth = 5;
+    EXPECT_EQ(client.ask(0, read_pdu(0)), "83 01"_hex);
+    EXPECT_EQ(client.ask(0, "06 0000"_hex), "86 03"_hex);
+    settings.broadcast = BroadcastMode::deny;
     start();
-    Client client = connect();
-    EXPECT_EQ(client.ask(255, "03 0000 0002"_hex), "03 04 0002 0001"_hex);
-    EXPECT_EQ(client.ask(255, "04 0004 0002"_hex), "04 04 0001 0005"_hex);
-    EXPECT_EQ(client.ask(255, "03 0007 0001"_hex), "03 02 0000"_hex);
-    EXPECT_EQ(client.ask(255, "06 0000 0001"_hex), "86 01"_hex);
-    EXPECT_EQ(client.ask(255, "2b 0e 04 02"_hex), "2b 0e 04 83 00 00 01 02 05 312e322e33"_hex);
+    Client denied = connect();
+    EXPECT_EQ(denied.ask(0, kWrite), "90 01"_hex);
     EXPECT_TRUE(bus1.seen.empty());
 }
 
-TEST_F(Session, PrefersAnAliasToTheDiagnosticsUnit) {
-    settings.units[255] = {"floor1", 1};
-    start();
+TEST_F(SessionBroadcast, WaitsForTheLastOfSeveralLinesAndTellsWhatBecameOfIt) {
+    settings.lines = {"floor1", "floor2"};
     Client client = connect();
-    EXPECT_EQ(ask_bus(client, 255, read_pdu(3), reply_to_read(3)), reply_to_read(3));
+    broadcast(client);
+    bus2.answer(0, kWritten);
+    do_all_that_is_due();
+    EXPECT_FALSE(client.has_input());
+    bus1.answer(0, Fault::line_down, false);
+    EXPECT_EQ(client.receive()->pdu, kWritten) << "a line that is down stops nobody";
+    Client second = connect();
+    broadcast(second);
+    bus1.answer(0, Fault::line_down, false);
+    bus2.answer(0, Fault::line_lost, true);
+    EXPECT_EQ(second.receive()->pdu, "90 0b"_hex) << "it may have been sent";
+    for (const BroadcastMode mode : {BroadcastMode::reply, BroadcastMode::silent}) {
+        settings.broadcast = mode;
+        start();
+        Client another = connect();
+        broadcast(another);
+        bus1.answer(0, Fault::line_down, false);
+        bus2.answer(0, Fault::line_down, false);
+        EXPECT_EQ(another.receive()->pdu, "90 0a"_hex) << "no line could send it";
+    }
+}
+
+TEST_F(SessionBroadcast, KeepsSilentWhenItIsAskedTo) {
+    settings.broadcast = BroadcastMode::silent;
+    settings.in_flight = 2;
+    Client client = connect();
+    client.request(1, 0, kWrite);
+    read(client, 2, 2);
+    bus1.answer(1, reply_to_read(2));
+    bus1.answer(0, kWritten);
+    EXPECT_EQ(client.receive(), read_reply(2));
+    EXPECT_EQ(client.ask(0, "06 0000"_hex), "86 03"_hex) << "what is known before is told";
+    EXPECT_EQ(client.ask(0, read_pdu(0)), "83 01"_hex);
+    client.read(3);
+    read(client, 4, 2);  // the silent one's place is free again
+}
+
+// Framing errors: MBAP-05 to MBAP-07.
+class SessionFraming : public Loopback {
+  protected:
+    SessionFraming() { bus1.instant = reply_to_read(1); }
+};
+
+TEST_F(SessionFraming, SkipsAnotherProtocolAndServesTheNextRequest) {
+    Client client = connect();
+    const Bytes foreign = "0001 0001 0006 01 03 0000 0001"_hex;
+    client.send(foreign + foreign);
+    EXPECT_TRUE(is_served(client));
+    EXPECT_EQ(counters().protocol_errors, 2U);
+    client.send(foreign + foreign);
+    EXPECT_TRUE(is_served(client)) << "a good one in between starts anew";
+    client.send(foreign + foreign + foreign);
+    EXPECT_TRUE(client.sees_close());
+    EXPECT_EQ(counters().protocol_errors, 7U);
+}
+
+TEST_F(SessionFraming, ABadLengthClosesOnlyThatConnectionAndTheShortestAndLongestAreGood) {
+    Client bystander = connect();
+    std::uint64_t errors = 0;
+    for (const unsigned length : {0u, 1u, 255u, 65535u}) {
+        Client client = connect();
+        client.send(Writer().u16(1).u16(0).u16(length).u8(1).u8(3).take());
+        EXPECT_TRUE(client.sees_close()) << length;
+        EXPECT_FALSE(client.has_input()) << "closed without a reply";
+        EXPECT_EQ(counters().protocol_errors, ++errors);
+        EXPECT_TRUE(is_served(bystander));
+        EXPECT_EQ(counters().connections, 1U);
+    }
+    EXPECT_EQ(bystander.ask(1, "07"_hex), *bus1.instant);
+    EXPECT_EQ(bystander.ask(1, "41"_hex + Bytes(252, 1)), *bus1.instant);
+    EXPECT_EQ(bus1.seen.back().request.pdu().size(), 253U);
+}
+
+TEST_F(SessionFraming, ClosesAConnectionThatSendsHalfAnAdu) {
+    Client idle = connect();
+    Client client = connect();
+    client.send("0001 0000"_hex);
+    ASSERT_TRUE(run_until_armed());
+    clock.advance(settings.partial_adu_timeout - 1ns);
+    EXPECT_EQ(counters().protocol_errors, 0U);
+    clock.advance(1ns);
+    EXPECT_TRUE(client.sees_close());
+    EXPECT_EQ(counters().protocol_errors, 1U);
+    EXPECT_TRUE(is_served(idle)) << "silence alone is no fault";
+}
+
+TEST_F(SessionFraming, DoesNotLetDribblingBytesStretchTheTime) {
+    settings.partial_adu_timeout = 50ms;
+    Client client = connect();
+    client.send("0001 0000 00fe 01"_hex);
+    ASSERT_TRUE(run_until_armed());
+    const auto end = clock.next();
+    // Sending all 260 bytes would take far longer than an ADU is allowed.
+    for (int i = 0; i < 9; ++i) {
+        client.send("41"_hex);
+        do_all_that_is_due();
+        clock.advance(5ms);
+        ASSERT_EQ(clock.next(), end);
+    }
+    clock.advance(5ms);
+    EXPECT_EQ(counters().protocol_errors, 1U);
+    EXPECT_TRUE(client.sees_close());
+    EXPECT_TRUE(bus1.seen.empty());
+}
+
+TEST_F(SessionFraming, TheNextAduHasATimeOfItsOwn) {
+    Client client = connect();
+    client.send("0001 0000"_hex);
+    ASSERT_TRUE(run_until_armed());
+    const auto first = clock.next();
+    clock.advance(1ms);
+    client.send("0006 01 03 0000 0001 0002"_hex);  // its rest and the start of the next
+    EXPECT_EQ(client.receive()->pdu, reply_to_read(1));
+    ASSERT_TRUE(clock.next());
+    EXPECT_EQ(*clock.next() - *first, 1ms);
 }
 
 }  // namespace

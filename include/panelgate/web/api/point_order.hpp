@@ -1,14 +1,25 @@
 #pragma once
 
 #include <boost/json/object.hpp>
+#include <boost/json/value.hpp>
 #include <cstdint>
+#include <string_view>
 
 #include "panelgate/bus/bus_client.hpp"
-#include "panelgate/points/value.hpp"
+#include "panelgate/points/point.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 #include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::web {
+
+/// A point's value in JSON, with every digit; for json_text().
+boost::json::value json_of(const points::Value& value);
+
+/// Parses any JSON text. 400 with line and column of the error; a duplicate member is an error,
+/// too, at any depth.
+Parsed<boost::json::value> parse_json(std::string_view text);
+/// The new value of a point, as the client has sent it.
+Parsed<points::Value> value_of(const boost::json::value& value);
 
 // Writes of a point: the checks and messages of PUT .../points/{point}, also for clients other than
 // HTTP.

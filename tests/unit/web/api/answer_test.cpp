@@ -2,115 +2,132 @@
 
 #include <gtest/gtest.h>
 
+#include <boost/json/object.hpp>
 #include <boost/json/parse.hpp>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "support/fake_bus.hpp"
 
 namespace panelgate::web::answer_test {
 namespace {
 
+using Headers = std::vector<std::pair<std::string, std::string>>;
+
 boost::json::object told(const Problem& problem) {
     return boost::json::parse(to_response(problem).body).as_object();
 }
 
-TEST(Answer, TellsAFaultWithTheExceptionThatModbusClientsGetAndWhetherItLeft) {
-    const auto object = told(problem_of(Fault::timeout, true));
-    EXPECT_EQ(object.at("type"), "urn:panelgate:problem:timeout");
-    EXPECT_EQ(object.at("status"), 504);
-    EXPECT_EQ(object.at("modbus_exception"), 11);
-    EXPECT_EQ(object.at("transmitted"), true);
-}
-
-TEST(Answer, NeverSoundsAsIfSomethingWasSentThatWasNot) {
+TEST(Answer, OfAFaultHasItsStatusItsExceptionAndWhetherItLeft) {
+    struct Row {
+        Fault fault;
+        bool transmitted;
+        unsigned status;
+        int exception;  ///< that Modbus clients get
+    };
+    constexpr Row kRows[] = {
+        {Fault::denied, false, 403, 1},      {Fault::malformed, false, 400, 3},
+        {Fault::not_routed, false, 404, 10}, {Fault::busy, false, 503, 6},
+        {Fault::expired, false, 503, 6},     {Fault::line_down, false, 502, 10},
+        {Fault::line_lost, true, 502, 11},   {Fault::timeout, true, 504, 11},
+        {Fault::damaged, true, 502, 11},     {Fault::offline, false, 504, 11},
+        {Fault::cancelled, false, 503, 10},
+    };
+    for (const Row& row : kRows) {
+        SCOPED_TRACE(label(row.fault));
+        const Problem problem = problem_of(row.fault, row.transmitted);
+        const Headers later = row.status == 503 ? Headers{{"Retry-After", "1"}} : Headers{};
+        EXPECT_EQ(problem.headers, later);
+        const auto object = told(problem);
+        EXPECT_EQ(object.at("type").as_string(),
+                  "urn:panelgate:problem:" + std::string(label(row.fault)));
+        EXPECT_EQ(object.at("status"), row.status);
+        EXPECT_EQ(object.at("modbus_exception"), row.exception);
+        EXPECT_EQ(object.at("transmitted"), row.transmitted);
+    }
     for (const Fault fault : {Fault::timeout, Fault::damaged, Fault::offline}) {
         EXPECT_TRUE(problem_of(fault, false).detail.starts_with("nothing was sent: "));
         EXPECT_FALSE(problem_of(fault, true).detail.starts_with("nothing was sent"));
     }
 }
 
-TEST(Answer, AsksToTryAgainOnlyWhereThatMayHelp) {
-    ASSERT_EQ(problem_of(Fault::busy, false).headers.size(), 1u);
-    EXPECT_EQ(problem_of(Fault::busy, false).headers[0].first, "Retry-After");
-    EXPECT_TRUE(problem_of(Fault::timeout, true).headers.empty());
-    EXPECT_TRUE(problem_of(Fault::line_down, false).headers.empty());
-}
-
-TEST(Answer, AddsTheManualsWordToAnException) {
+TEST(Answer, OfAnExceptionBlamesTheRequestForOneToFourOnlyAndAddsTheManualsWord) {
     profile::PanelProfile panel;
     panel.exceptions.push_back({2, "Address is outside the range"});
-    const Problem known = problem_of_exception(2, panel);
-    EXPECT_EQ(known.status, 422u);
-    EXPECT_TRUE(known.detail.starts_with("the panel answered exception 2: ")) << known.detail;
-    EXPECT_TRUE(known.detail.ends_with(" (Address is outside the range)")) << known.detail;
-    EXPECT_FALSE(problem_of_exception(3, panel).detail.ends_with(")"));
-    EXPECT_EQ(told(known).at("modbus_exception"), 2);
+    for (unsigned code = 0; code <= 11; ++code) {
+        const Problem problem = problem_of_exception(static_cast<std::uint8_t>(code), panel);
+        EXPECT_EQ(problem.status, code >= 1 && code <= 4 ? 422u : 502u) << code;
+        EXPECT_EQ(told(problem).at("modbus_exception"), code);
+        EXPECT_EQ(problem.detail.ends_with(" (Address is outside the range)"), code == 2) << code;
+    }
+    EXPECT_EQ(
+        problem_of_exception(2, panel).detail,
+        "the panel answered exception 2: illegal data address (Address is outside the range)");
 }
 
-TEST(Answer, BlamesTheRequestForExceptionsOneToFourOnly) {
-    EXPECT_EQ(problem_of_exception(1, {}).status, 422u);
-    EXPECT_EQ(problem_of_exception(4, {}).status, 422u);
-    EXPECT_EQ(problem_of_exception(0, {}).status, 502u);
-    EXPECT_EQ(problem_of_exception(5, {}).status, 502u);
-}
-
-TEST(Answer, TellsWhatTheRightsForbid) {
-    bus::Answer refused = test::FakeBus::fault(Fault::denied, false);
-    refused.refusal = bus::Refusal{bus::Rule::read_only, "meter"};
-    const Problem problem = problem_of(refused);
-    EXPECT_EQ(problem.status, 403u);
-    EXPECT_EQ(problem.detail, "refused here, nothing was sent: station 'meter' is read-only");
-    EXPECT_EQ(told(problem).at("type"), "urn:panelgate:problem:refused");
-    EXPECT_EQ(told(problem).at("rule"), "access");
-    EXPECT_EQ(told(problem).at("transmitted"), false);
-    EXPECT_EQ(problem_of(refused, {}).value().detail, problem.detail);
-    refused.refusal->rule = bus::Rule::broadcast_over_read_only;
-    EXPECT_EQ(problem_of(refused).detail,
-              "refused here, nothing was sent: a broadcast would write to station 'meter', which "
-              "is read-only");
-}
-
-TEST(Answer, OfAGuardSaysThatItWasRefusedHereAndByWhichRule) {
-    bus::Answer guarded = test::FakeBus::reply({0x86, 2});
-    guarded.transmitted = false;
-    guarded.refusal =
-        bus::Refusal{bus::Rule::range, "oven", modbus::ExceptionCode::illegal_data_address,
-                     "coils 9 is no memory of x"};
-    const Problem problem = problem_of(guarded, {}).value();
-    EXPECT_EQ(problem.status, 422u);
-    EXPECT_EQ(problem.detail,
-              "refused here, nothing was sent: the guard of station 'oven' refuses it: coils 9 is "
-              "no memory of x");
-    EXPECT_EQ(told(problem).at("type"), "urn:panelgate:problem:refused");
-    EXPECT_EQ(told(problem).at("rule"), "range");
-    EXPECT_EQ(told(problem).at("modbus_exception"), 2);
-    EXPECT_EQ(told(problem).at("transmitted"), false);
+TEST(Answer, OfARefusalSaysThatNothingWasSentAndByWhichRule) {
+    struct Row {
+        bus::Refusal refusal;
+        unsigned status;
+        const char* rule;
+        const char* detail;
+    };
+    const Row rows[] = {
+        {{bus::Rule::read_only, "meter"}, 403, "access", "station 'meter' is read-only"},
+        {{bus::Rule::broadcast_over_read_only, "meter"},
+         403,
+         "access",
+         "a broadcast would write to station 'meter', which is read-only"},
+        {{bus::Rule::range, "oven", modbus::ExceptionCode::illegal_data_address,
+          "coils 9 is no memory of x"},
+         422,
+         "range",
+         "the guard of station 'oven' refuses it: coils 9 is no memory of x"},
+    };
+    for (const Row& row : rows) {
+        bus::Answer answer = test::FakeBus::reply({0x86, 2});
+        answer.transmitted = false;
+        answer.refusal = row.refusal;
+        const Problem problem = problem_of(answer);
+        EXPECT_EQ(problem.status, row.status);
+        EXPECT_EQ(problem.detail, std::string("refused here, nothing was sent: ") + row.detail);
+        EXPECT_EQ(problem_of(answer, {}).value().detail, problem.detail);
+        EXPECT_EQ(told(problem).at("type"), "urn:panelgate:problem:refused");
+        EXPECT_EQ(told(problem).at("rule"), row.rule);
+        EXPECT_EQ(told(problem).at("modbus_exception"), row.status == 403 ? 1 : 2);
+        EXPECT_EQ(told(problem).at("transmitted"), false);
+    }
 }
 
 TEST(Answer, OfALineThatIsDownSaysWhatIsWrongWithIt) {
     bus::Answer down = test::FakeBus::fault(Fault::line_down, false);
     EXPECT_EQ(problem_of(down).detail, "the line is down");
     down.why = "cannot open /dev/ttyS0: Permission denied";
-    const Problem problem = problem_of(down);
-    EXPECT_EQ(problem.status, 502u);
-    EXPECT_EQ(problem.detail, "the line is down: cannot open /dev/ttyS0: Permission denied");
+    EXPECT_EQ(problem_of(down).status, 502u);
+    EXPECT_EQ(problem_of(down).detail,
+              "the line is down: cannot open /dev/ttyS0: Permission denied");
 }
 
-TEST(Answer, OfABroadcastSaysThatNobodyHasConfirmedIt) {
-    const auto sent = broadcast_answer(test::FakeBus::reply({6, 0, 1, 0, 2}));
-    EXPECT_EQ(sent.status, 202u);
-    EXPECT_EQ(sent.body, "{\"transmitted\":true,\"confirmed\":false}\n");
-    EXPECT_EQ(broadcast_answer(test::FakeBus::fault(Fault::busy, false)).status, 503u);
+TEST(Accept, PrefersATypeWhereItIsNamedAndWeighsNoLess) {
+    EXPECT_TRUE(prefers("text/plain", "text/plain"));
+    for (const char* accept : {"*/*", "text/plain;q=0.5, application/json", "text/csv"})
+        EXPECT_FALSE(prefers(accept, "text/plain")) << accept;
+    for (const char* accept : {"text/csv", "text/csv, */*;q=0.1",
+                               "application/json;q=0.5,text/csv;header=present; q=0.8"})
+        EXPECT_TRUE(prefers_csv(accept)) << accept;
+    for (const char* accept : {"", "*/*", "application/json, text/csv;q=0.8", "text/csv;q=0"})
+        EXPECT_FALSE(prefers_csv(accept)) << accept;
 }
 
-TEST(Answer, RoundsMillisecondsTowardsZero) {
-    EXPECT_EQ(whole_ms(1'999'999ns), 1);
-    EXPECT_EQ(whole_ms(-1'999'999ns), -1);
-}
-
-TEST(Answer, WritesBytesInCapitals) {
-    const Bytes bytes{0x1f, 0x01, 0xff};
-    EXPECT_EQ(upper_hex(bytes), "1F 01 FF");
-    EXPECT_EQ(upper_hex(bytes, ""), "1F01FF");
+TEST(Csv, QuotesWhatHasCommasQuotesOrLines) {
+    constexpr std::string_view columns[] = {"a", "b,c", "d", "e", "f"};
+    EXPECT_EQ(csv_line(columns), "a,\"b,c\",d,e,f\r\n");
+    const auto object =
+        boost::json::parse(R"({"a":"x \"y\"","b,c":1.5,"d":null,"e":true})").as_object();
+    EXPECT_EQ(csv_line(object, columns), "\"x \"\"y\"\"\",1.5,,true,\r\n");
 }
 
 }  // namespace

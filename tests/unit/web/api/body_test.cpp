@@ -3,29 +3,33 @@
 #include <gmock/gmock.h>
 
 #include <boost/json/parse.hpp>
-#include <boost/json/serialize.hpp>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
 
 namespace panelgate::web::body_test {
 namespace {
 
-Parsed<std::vector<std::uint16_t>> cells_of(std::string_view body, modbus::Table table) {
+using modbus::Table;
+using points::Value;
+using ::testing::ElementsAre;
+using ::testing::StartsWith;
+
+Parsed<std::vector<std::uint16_t>> cells_of(std::string_view body, Table table) {
     const auto object = parse_object(body, {"values"});
     if (!object) return object.error();
     return values_member(*object, table);
 }
-Parsed<points::Value> value_of(std::string_view body) {
+Parsed<Value> value_of(std::string_view body) {
     const auto object = parse_object(body, {"value"});
     if (!object) return object.error();
     return value_member(*object);
 }
-
-using modbus::Table;
-using ::testing::ElementsAre;
-using ::testing::StartsWith;
-using Cells = std::vector<std::uint16_t>;
+Parsed<Value> number_of(const std::string& text) { return value_of("{\"value\": " + text + "}"); }
 
 std::string registers_error(const std::string& body) {
     const auto cells = cells_of(body, Table::holding_registers);
@@ -34,7 +38,7 @@ std::string registers_error(const std::string& body) {
     return cells.error().detail;
 }
 
-TEST(Body, TakesRegistersUnsignedOrAsTwosComplement) {
+TEST(Body, TakesRegistersUnsignedOrAsTwosComplementAndBitsAsBooleansOrNumbers) {
     EXPECT_THAT(*cells_of(R"({"values":[0, 65535, -1, -32768, 10.0]})", Table::holding_registers),
                 ElementsAre(0, 0xFFFF, 0xFFFF, 0x8000, 10));
     for (const char* value : {"65536", "-32769", "1.5", "\"1\"", "true", "null", "[1]", "1e16"}) {
@@ -42,14 +46,10 @@ TEST(Body, TakesRegistersUnsignedOrAsTwosComplement) {
                     StartsWith("a register is a whole number from 0 to 65535, or from -32768, not"))
             << value;
     }
-}
-
-TEST(Body, TakesBitsAsBooleansOrNumbers) {
     EXPECT_THAT(*cells_of(R"({"values":[true, false, 1, 0, 1.0]})", Table::coils),
                 ElementsAre(1, 0, 1, 0, 1));
-    const auto two = cells_of(R"({"values":[2]})", Table::coils);
-    ASSERT_FALSE(two);
-    EXPECT_EQ(two.error().detail, "a bit is true, false, 1 or 0, not 2");
+    EXPECT_EQ(cells_of(R"({"values":[2]})", Table::coils).error().detail,
+              "a bit is true, false, 1 or 0, not 2");
 }
 
 TEST(Body, WantsValues) {
@@ -58,38 +58,35 @@ TEST(Body, WantsValues) {
                   R"(the body must be {"values": [...]} with at least one value)")
             << body;
     }
+    EXPECT_EQ(registers_error("[1]"), "the body must be a JSON object");
 }
 
 TEST(Body, SaysWhatAHandTypesThatIsNoJson) {
-    const auto told = [](std::string_view body) {
-        const std::string text = value_of(body).error().detail;
-        return text.substr(std::string_view("the body is not JSON: line 1, ").size());
+    struct Row {
+        const char* body;
+        const char* fault;
     };
-    EXPECT_EQ(told(""), "column 1: it is empty; send an object, such as {\"value\": 1}");
-    EXPECT_EQ(told("\xEF\xBB\xBF{\"value\": 1}"),
-              "column 1: a byte order mark (U+FEFF) precedes the value; send the body without");
-    EXPECT_EQ(told("{\"value\": \"\xFF\"}"), "column 12: this is not UTF-8");
-    EXPECT_EQ(told("{\"value\": +21}"), "column 11: a number of JSON has no '+'; remove it");
-    EXPECT_EQ(told("{\"value\": .5}"),
-              "column 11: a number of JSON has a digit before its '.'; write 0.");
-    EXPECT_EQ(told("{\"value\": 021}"),
-              "column 12: a number of JSON has no leading zeros; write it without");
-    EXPECT_EQ(told("{\"value\": 1} // one"), "column 14: JSON has no comments; remove it");
-    EXPECT_EQ(told("{\"value\": 1,}"), "column 13: a ',' too many before this");
-    EXPECT_EQ(told("{\"value\": True}"), "column 11: it is written true");
-    EXPECT_EQ(told("{\"value\": 1"),
-              "column 12: it ends before it is complete; a bracket or a quote is not closed");
-}
-
-TEST(Body, PointsAtWhatIsNoJson) {
+    constexpr Row kRows[] = {
+        {"", "1: it is empty; send an object, such as {\"value\": 1}"},
+        {"\xEF\xBB\xBF{\"value\": 1}",
+         "1: a byte order mark (U+FEFF) precedes the value; send the body without"},
+        {"{\"value\": \"\xFF\"}", "12: this is not UTF-8"},
+        {"{\"value\": +21}", "11: a number of JSON has no '+'; remove it"},
+        {"{\"value\": .5}", "11: a number of JSON has a digit before its '.'; write 0."},
+        {"{\"value\": 021}", "12: a number of JSON has no leading zeros; write it without"},
+        {"{\"value\": 1} // one", "14: JSON has no comments; remove it"},
+        {"{\"value\": 1,}", "13: a ',' too many before this"},
+        {"{\"value\": True}", "11: it is written true"},
+        {"{\"value\": NaN}", "11: NaN is no number of JSON"},
+        {"{\"value\": 1", "12: it ends before it is complete; a bracket or a quote is not closed"},
+        {"{} x", "4: something follows the value"},
+    };
+    for (const Row& row : kRows) {
+        EXPECT_EQ(value_of(row.body).error().detail,
+                  "the body is not JSON: line 1, column " + std::string(row.fault));
+    }
     EXPECT_THAT(registers_error("{\"values\":\n [1,, 2]}"),
                 StartsWith("the body is not JSON: line 2, column 5: "));
-    EXPECT_THAT(registers_error("{\"values\":[1]"),
-                StartsWith("the body is not JSON: line 1, column 14: "));
-    EXPECT_THAT(registers_error(""), StartsWith("the body is not JSON: line 1, column 1: "));
-    EXPECT_EQ(registers_error("{} x"),
-              "the body is not JSON: line 1, column 4: something follows the value");
-    EXPECT_EQ(registers_error("[1]"), "the body must be a JSON object");
 }
 
 TEST(Body, WithAMemberThatNobodyKnowsIsRefused) {
@@ -106,51 +103,54 @@ TEST(Body, WithAMemberTwiceIsRefusedAtAnyDepth) {
               "the member 'values' comes a second time: line 2, column 1");
     EXPECT_THAT(registers_error(R"({"values":[{"a":1,"a":2}]})"),
                 StartsWith("the member 'a' comes a second time: line 1, "));
+    const auto repeated = [](std::string_view json) { return find_repeated_member(json); };
+    EXPECT_EQ(repeated(R"([{"x":{"a":1,"b":[{"c":1,"d":2,"c":3}]}}])").value().name, "c");
+    EXPECT_EQ(repeated(R"({"a":1,"\u0061":2})").value().name, "a") << "two spellings";
+    EXPECT_EQ(repeated(R"({"a":1, "a":2})").value().at, 8u) << "where the second one begins";
+    for (const char* once :
+         {R"({"a":{"a":[{"a":1},{"a":2}]},"A":1})", R"(["a","a"])", "{}",  // from here on no JSON:
+          "", "{", "[1,,2]", R"({"a":1 x "a":2})", R"({"a":1,"a)"})
+        EXPECT_FALSE(repeated(once)) << once;
+    EXPECT_FALSE(repeated(std::string(60'000, '[')));
 }
 
 TEST(Body, TakesAPointsValueAsItIs) {
-    using points::Value;
-    EXPECT_EQ(*value_of(R"({"value":true})"), Value(true));
-    EXPECT_EQ(*value_of(R"({"value":-5})"), Value(std::int64_t{-5}));
-    EXPECT_EQ(*value_of(R"({"value":18446744073709551615})"), Value(18446744073709551615u));
-    EXPECT_EQ(*value_of(R"({"value":1.5})"), Value(1.5));
-    EXPECT_EQ(*value_of(R"({"value":"Ok"})"), Value(std::string("Ok")));
+    EXPECT_EQ(*number_of("true"), Value(true));
+    EXPECT_EQ(*number_of("-5"), Value(std::int64_t{-5}));
+    EXPECT_EQ(*number_of("18446744073709551615"), Value(18446744073709551615u));
+    EXPECT_EQ(*number_of("1.5"), Value(1.5));
+    EXPECT_EQ(*number_of("\"Ok\""), Value(std::string("Ok")));
     EXPECT_EQ(value_of("{}").error().detail, "the body needs \"value\"");
-    for (const char* body : {R"({"value":null})", R"({"value":[1]})", R"({"value":{}})"}) {
-        EXPECT_EQ(value_of(body).error().detail, "value must be a number, true, false or a text");
+    for (const char* text : {"null", "[1]", "{}"}) {
+        EXPECT_EQ(number_of(text).error().detail, "value must be a number, true, false or a text");
     }
 }
 
 TEST(Body, TakesANumberAsItIsWritten) {
-    using points::Value;
     const std::int64_t beyond_doubles = 9007199254740993;
-    EXPECT_EQ(*value_of(R"({"value":9007199254740993})"), Value(beyond_doubles));
-    EXPECT_EQ(*value_of(R"({"value":-9007199254740993.0})"), Value(-beyond_doubles));
-    EXPECT_EQ(*value_of(R"({"value":9007199254740.9930e+03})"), Value(beyond_doubles));
-    EXPECT_EQ(*value_of(R"({"value":1e19})"), Value(10'000'000'000'000'000'000u));
-    EXPECT_EQ(*value_of(R"({"value":-9223372036854775808})"),
-              Value(std::numeric_limits<std::int64_t>::min()));
+    EXPECT_EQ(*number_of("9007199254740993"), Value(beyond_doubles));
+    EXPECT_EQ(*number_of("-9007199254740993.0"), Value(-beyond_doubles));
+    EXPECT_EQ(*number_of("9007199254740.9930e+03"), Value(beyond_doubles));
+    EXPECT_EQ(*number_of("1e19"), Value(10'000'000'000'000'000'000u));
+    EXPECT_EQ(*number_of("-9223372036854775808"), Value(std::numeric_limits<std::int64_t>::min()));
     for (const char* digits : {"18446744073709551616", "9007199254740.993", "-1234567.00000000001"})
-        EXPECT_EQ(*value_of(std::string("{\"value\":") + digits + "}"),
-                  Value(*Decimal::parse(digits)));
-    EXPECT_EQ(*value_of(R"({"value":1e300})"), Value(1e300));
-    EXPECT_EQ(*value_of(R"({"value":7.0385307e-26})"), Value(7.0385307e-26)) << "nearest";
-    EXPECT_TRUE(std::signbit(std::get<double>(*value_of(R"({"value":-0.0})"))));
+        EXPECT_EQ(*number_of(digits), Value(*Decimal::parse(digits)));
+    EXPECT_EQ(*number_of("1e300"), Value(1e300));
+    EXPECT_EQ(*number_of("7.0385307e-26"), Value(7.0385307e-26)) << "nearest";
+    EXPECT_TRUE(std::signbit(std::get<double>(*number_of("-0.0"))));
 }
 
 TEST(Body, RefusesANumberThatNoneCouldBe) {
     for (const char* number : {"1e400", "-1e400", "1e-400"}) {
-        const auto value = value_of(std::string("{\"value\": ") + number + "}");
+        const auto value = number_of(number);
         ASSERT_FALSE(value) << number;
         EXPECT_EQ(value.error().status, 400u);
         EXPECT_EQ(value.error().detail,
                   std::string("a number that cannot be: line 1, column 11: ") + number +
                       " is beyond what a 64-bit number holds");
     }
-    EXPECT_EQ(value_of("{\"value\": NaN}").error().detail,
-              "the body is not JSON: line 1, column 11: NaN is no number of JSON");
     for (const char* number : {"NaN", "Infinity", "-Infinity", "1e99999999999999999999"})
-        EXPECT_EQ(value_of(std::string("{\"value\": ") + number + "}").error().status, 400u);
+        EXPECT_EQ(number_of(number).error().status, 400u) << number;
 }
 
 TEST(Body, TakesNoNumberOfManyDigitsForAText) {
@@ -159,8 +159,8 @@ TEST(Body, TakesNoNumberOfManyDigitsForAText) {
               "1.00000000000000000001");
     const auto object = parse_object(R"({"t":1.00000000000000000001})");
     EXPECT_EQ(string_member(*object, "t").error().detail, "t must be a string");
-    EXPECT_EQ(value_of("{\"value\":\"\xFF"
-                       "1\"}")
+    EXPECT_EQ(number_of("\"\xFF"
+                        "1\"")
                   .error()
                   .status,
               400u)

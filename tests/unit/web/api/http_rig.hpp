@@ -5,17 +5,29 @@
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <optional>
+#include <sstream>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/fault.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
+#include "panelgate/points/point.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/web/api/server.hpp"
 #include "panelgate/web/api/sources.hpp"
+#include "panelgate/web/http/json_text.hpp"
 #include "support/fake_bus.hpp"
 #include "support/http_client.hpp"
 
@@ -57,6 +69,55 @@ inline profile::PanelProfile test_profile() {
     profile.exceptions.push_back({2, "Address is outside the range"});
     return profile;
 }
+
+/// The writable register UW7, at most 100 bar.
+inline points::Point oil_point() {
+    points::Point oil;
+    oil.name = "oil";
+    oil.at = "UW7";
+    oil.address = 7;
+    oil.unit = "bar";
+    oil.writable = true;
+    oil.max = 100;
+    return oil;
+}
+
+/// A request as text, for clients that do not wait for its reply.
+inline std::string http_text(const std::string& method, const std::string& target,
+                             const std::string& headers = "") {
+    return method + " " + target + " HTTP/1.1\r\nHost: x\r\n" + headers + "\r\n";
+}
+/// PUT of {"values":[1]} to coil 1 of press.
+inline std::string put_coil_text() {
+    return http_text("PUT", "/api/v1/stations/press/coils/1", "Content-Length: 14\r\n") +
+           R"({"values":[1]})";
+}
+
+inline std::string detail_of(const Reply& reply) {
+    return std::string(reply.at("detail").as_string());
+}
+/// "range false": the values of these members, whose names are separated by blanks.
+inline std::string members(const boost::json::object& object, const std::string& names) {
+    std::string text;
+    std::istringstream in(names);
+    for (std::string name; in >> name;) {
+        const boost::json::value& value = object.at(name);
+        if (!text.empty()) text += ' ';
+        text += value.is_string() ? std::string(value.as_string()) : json_text(value);
+    }
+    return text;
+}
+/// "422 range false": the status and these members.
+inline std::string status_and(const Reply& reply, const std::string& names) {
+    return std::to_string(reply.status()) + ' ' + members(reply.json(), names);
+}
+
+/// A row of a table of requests: a path or a body, and the answer to it ("": any detail).
+struct Asked {
+    std::string what;
+    unsigned status;
+    std::string detail{};
+};
 
 /// Serves the same text to all callers, or null if `text` is null.
 class FixedMetrics final : public MetricsSource {
@@ -103,7 +164,7 @@ class HttpRig : public ::testing::Test {
         press.profile = &panel;
         press.unit = 101;
         directory.stations.push_back(std::move(press));
-        bus.script = [](const bus::Request& request) { return answer_from_addresses(request); };
+        answer_normally();
     }
     ~HttpRig() override {
         server.reset();
@@ -150,7 +211,76 @@ class HttpRig : public ::testing::Test {
         return connect().ask(method, target, body, headers);
     }
     Reply get(const std::string& target) { return ask("GET", target); }
+    /// GET with this beginning of the path.
+    void expect_gets(const std::string& base, std::initializer_list<Asked> rows) {
+        for (const Asked& row : rows) expect(row, get(base + row.what));
+    }
+    /// The same with bodies.
+    void expect_bodies(const std::string& method, const std::string& target,
+                       std::initializer_list<Asked> rows) {
+        for (const Asked& row : rows) expect(row, ask(method, target, row.what));
+    }
+    /// The same where all have one status.
+    void expect_gets(const std::string& base, unsigned status,
+                     std::initializer_list<const char*> paths) {
+        for (const char* path : paths) expect({path, status}, get(base + path));
+    }
+    void expect_bodies(const std::string& method, const std::string& target, unsigned status,
+                       std::initializer_list<const char*> bodies) {
+        for (const char* body : bodies) expect({body, status}, ask(method, target, body));
+    }
+    static void expect(const Asked& row, const Reply& reply) {
+        EXPECT_EQ(reply.status(), row.status) << row.what;
+        if (!row.detail.empty()) {
+            EXPECT_EQ(detail_of(reply), row.detail) << row.what;
+        }
+    }
+    /// Sends and runs the server until the bus has the request.
+    void begin(Client& client, const std::string& text) {
+        const std::size_t before = bus.requests.size();
+        client.send(text);
+        while (bus.requests.size() == before) io.run_one();
+    }
+    /// A client that asks this and leaves before the answer.
+    void ask_and_leave(const std::string& text) {
+        Client lost = connect();
+        begin(lost, text);
+    }
+    /// The answer, and how many turns others have had meanwhile.
+    std::pair<Reply, std::size_t> get_among_others(const std::string& target) {
+        Client client = connect();
+        client.send(http_text("GET", target));
+        std::size_t turns = 0;
+        const std::function<void()> turn = [&] {
+            if (++turns < 10'000) boost::asio::post(io, turn);
+        };
+        boost::asio::post(io, turn);
+        Reply reply = client.receive();
+        const std::size_t had = std::exchange(turns, 10'000u);
+        io.poll();  // the pending turn is the last
+        return {std::move(reply), had};
+    }
+
+    void answer_normally() {
+        bus.script = [](const bus::Request& request) { return answer_from_addresses(request); };
+    }
+    void answer_with(Fault fault, bool transmitted) {
+        bus.script = [=](const bus::Request&) { return test::FakeBus::fault(fault, transmitted); };
+    }
+    void answer_with(const Bytes& pdu) {
+        bus.script = [pdu](const bus::Request&) { return test::FakeBus::reply(pdu); };
+    }
+    /// Requests stay open until bus.release().
+    void hold_answers() {
+        bus.script = [](const bus::Request&) { return std::nullopt; };
+    }
     std::string last_pdu() const { return to_hex(bus.requests.back().request.pdu()); }
+    std::vector<std::string> pdus() const {
+        std::vector<std::string> all;
+        for (const bus::Request& request : bus.requests)
+            all.push_back(to_hex(request.request.pdu()));
+        return all;
+    }
 
     /// Register n holds n, bit n is set when n is odd; writes are confirmed.
     static bus::Answer answer_from_addresses(const bus::Request& request) {

@@ -1,7 +1,15 @@
+// Who may use a route, and what each answer has besides its handler's.
+#include <string>
+
+#include "conduct.hpp"
 #include "http_rig.hpp"
 
 namespace panelgate::web::routes_test {
 namespace {
+
+using ::testing::StartsWith;
+
+constexpr const char* kRaw = "/api/v1/lines/floor1/raw";
 
 class Access : public HttpRig {
   protected:
@@ -16,70 +24,40 @@ class Access : public HttpRig {
         const std::string header = token.empty() ? "" : "Authorization: Bearer " + token + "\r\n";
         return ask(method, target, body, header).status();
     }
-    unsigned read(const std::string& token) { return status(token, "GET", "/api/v1/stations"); }
     unsigned write(const std::string& token) {
         return status(token, "PUT", "/api/v1/stations/press/coils/1", R"({"values":[1]})");
     }
-    unsigned broadcast(const std::string& token) {
-        return status(token, "POST", "/api/v1/lines/floor1/broadcast",
-                      R"({"table":"coils","address":1,"values":[1]})");
-    }
-    unsigned raw(const std::string& token) {
-        return status(token, "POST", "/api/v1/lines/floor1/raw",
-                      R"({"station":5,"pdu":"0300010001"})");
-    }
 };
 
-struct RoleCase {
-    Role anonymous;
-    const char* token;
-    unsigned read;
-    unsigned write;  ///< 200: whatever the request returns when it is allowed
-};
-class AccessMatrix : public Access, public ::testing::WithParamInterface<RoleCase> {};
-
-TEST_P(AccessMatrix, Holds) {
-    const RoleCase& c = GetParam();
-    settings.anonymous = c.anonymous;
-    EXPECT_EQ(read(c.token), c.read);
-    EXPECT_EQ(status(c.token, "GET", "/metrics"), c.read);
-    EXPECT_EQ(status(c.token, "GET", "/openapi.json"), c.read);
-    for (const char* page : {"/", "/page/app.js", "/docs"})
-        EXPECT_EQ(status(c.token, "GET", page), 200u) << page << " holds no data";
-    EXPECT_EQ(write(c.token), c.write);
-    EXPECT_EQ(broadcast(c.token), c.write == 200 ? 202 : c.write);
-    EXPECT_EQ(raw(c.token), c.write);
-    EXPECT_EQ(status(c.token, "GET", "/healthz"), 200u);
-    EXPECT_EQ(status(c.token, "GET", "/readyz"), 200u);
-}
-
-INSTANTIATE_TEST_SUITE_P(Roles, AccessMatrix,
-                         ::testing::Values(RoleCase{Role::none, "", 401, 401},
-                                           RoleCase{Role::none, "see-me", 200, 403},
-                                           RoleCase{Role::none, "let-me", 200, 200},
-                                           RoleCase{Role::viewer, "", 200, 401},
-                                           RoleCase{Role::viewer, "see-me", 200, 403},
-                                           RoleCase{Role::viewer, "let-me", 200, 200},
-                                           RoleCase{Role::operator_, "", 200, 200},
-                                           RoleCase{Role::operator_, "see-me", 200, 403},
-                                           RoleCase{Role::operator_, "wrong", 401, 401},
-                                           RoleCase{Role::operator_, "let-m", 401, 401},
-                                           RoleCase{Role::operator_, "let-melet-me", 401, 401}));
-
-TEST_F(Access, AsksForATokenInTheWayClientsKnow) {
-    settings.anonymous = Role::none;
-    const Reply reply = get("/api/v1/lines");
-    EXPECT_EQ(reply.header("WWW-Authenticate"), "Bearer realm=\"panelgate\"");
-    EXPECT_EQ(reply.header("Content-Type"), "application/problem+json");
-}
-
-TEST_F(Access, TakesNoOtherSchemeAndNoEmptyToken) {
-    for (const char* value : {"Basic bGV0LW1l", "Bearer", "Bearer ", "let-me"}) {
-        const Reply reply =
-            ask("GET", "/api/v1/lines", "", std::string("Authorization: ") + value + "\r\n");
-        EXPECT_EQ(reply.status(), 401u) << value;
+TEST_F(Access, IsByRoles) {
+    struct Row {
+        Role anonymous;
+        const char* token;
+        unsigned read;
+        unsigned write;
+    };
+    constexpr Row kRows[] = {
+        {Role::none, "", 401, 401},           {Role::none, "see-me", 200, 403},
+        {Role::none, "let-me", 200, 200},     {Role::viewer, "", 200, 401},
+        {Role::viewer, "see-me", 200, 403},   {Role::viewer, "let-me", 200, 200},
+        {Role::operator_, "", 200, 200},      {Role::operator_, "see-me", 200, 403},
+        {Role::operator_, "wrong", 401, 401},
+    };
+    const char* broadcast = R"({"table":"coils","address":1,"values":[1]})";
+    for (const Row& row : kRows) {
+        SCOPED_TRACE(std::string(label(row.anonymous)) + ' ' + row.token);
+        settings.anonymous = row.anonymous;
+        start();
+        for (const char* path : {"/api/v1/stations", "/metrics", "/openapi.json"})
+            EXPECT_EQ(status(row.token, "GET", path), row.read) << path;
+        for (const char* path : {"/", "/page/app.js", "/docs", "/healthz", "/readyz"})
+            EXPECT_EQ(status(row.token, "GET", path), 200u) << path << " holds no data";
+        EXPECT_EQ(write(row.token), row.write);
+        EXPECT_EQ(status(row.token, "POST", "/api/v1/lines/floor1/broadcast", broadcast),
+                  row.write == 200 ? 202u : row.write);
+        EXPECT_EQ(status(row.token, "POST", kRaw, R"({"station":5,"pdu":"0300010001"})"),
+                  row.write);
     }
-    EXPECT_EQ(ask("GET", "/api/v1/lines", "", "Authorization: bearer let-me\r\n").status(), 200u);
 }
 
 TEST_F(Access, WhoAsksIsCalledByItsAddressAndItsToken) {
@@ -90,19 +68,18 @@ TEST_F(Access, WhoAsksIsCalledByItsAddressAndItsToken) {
 }
 
 TEST_F(Access, KeepsAForeignPageFromWritingThroughABrowser) {
-    const char* body = R"({"station":5,"pdu":"0500010000"})";
-    const std::string origin = "Origin: http://evil.example\r\nContent-Type: ";
+    const std::string foreign = "Origin: http://evil.example\r\nContent-Type: ";
     const auto post = [&](const std::string& headers) {
-        return ask("POST", "/api/v1/lines/floor1/raw", body, headers + "\r\n").status();
+        const char* body = R"({"station":5,"pdu":"0500010000"})";
+        return ask("POST", kRaw, body, headers + "\r\n").status();
     };
-    EXPECT_EQ(post(origin + "text/plain"), 403u);
-    EXPECT_EQ(post(origin + "application/json"), 403u);
+    EXPECT_EQ(post(foreign + "text/plain"), 403u);
+    EXPECT_EQ(post(foreign + "application/json"), 403u);
     const std::string ours = "Origin: http://x:8080\r\nContent-Type: ";
     EXPECT_EQ(post(ours + "text/plain"), 415u);
     EXPECT_TRUE(bus.requests.empty());
     EXPECT_EQ(post(ours + "application/json"), 200u);
-    const Reply preflight =
-        ask("OPTIONS", "/api/v1/lines/floor1/raw", "", origin + "text/plain\r\n");
+    const Reply preflight = ask("OPTIONS", kRaw, "", foreign + "text/plain\r\n");
     EXPECT_EQ(preflight.status(), 204u);
     EXPECT_EQ(preflight.header("Access-Control-Allow-Origin"), "");
 }
@@ -115,14 +92,95 @@ TEST_F(Access, AQueryThatNobodyKnowsIsRefusedOnEveryPath) {
           "/api/v1/stations/press/coils/1/interpretations", "/api/v1/stations/press/devices/UW1"}) {
         const Reply reply = get(std::string(path) + "?cuont=9");
         EXPECT_EQ(reply.status(), 400u) << path;
-        EXPECT_EQ(std::string(reply.at("detail").as_string()).substr(0, 21),
-                  "unknown query 'cuont'")
-            << path;
+        EXPECT_THAT(detail_of(reply), StartsWith("unknown query 'cuont'")) << path;
     }
     EXPECT_EQ(get("/api/v1/stations/press/coils/1?count=1&count=2").at("detail"),
               "the query 'count' is given twice");
-    EXPECT_EQ(ask("POST", "/api/v1/lines/floor1/raw?count=1", "{}").status(), 400u);
+    EXPECT_EQ(ask("POST", std::string(kRaw) + "?count=1", "{}").status(), 400u);
     EXPECT_TRUE(bus.requests.empty());
+}
+
+TEST(Tag, DoesNotCountWhatOnlyTimeChanges) {
+    EXPECT_EQ(tag_of(R"({"a":1,"age_ms":5})"), tag_of(R"({"a":1,"age_ms":17})"));
+    EXPECT_NE(tag_of(R"({"a":1,"age_ms":5})"), tag_of(R"({"a":2,"age_ms":5})"));
+    EXPECT_NE(tag_of(R"({"a":1,"age_ms":5,"b":1})"), tag_of(R"({"a":1,"age_ms":5,"b":2})"));
+    EXPECT_THAT(tag_of(""), StartsWith("W/\""));
+    for (const char* named : {"W/\"7\"", "\"7\"", "\"6\", W/\"7\", \"8\"", "*"})
+        EXPECT_TRUE(names_tag(named, "W/\"7\"")) << named << ", strong or weak, in a list";
+    for (const char* other : {"", "\"77\""}) EXPECT_FALSE(names_tag(other, "W/\"7\"")) << other;
+}
+
+using ApiManners = HttpRig;
+
+TEST_F(ApiManners, P10StatusThatHasNotChangedIsNotSentAgain) {
+    bus.stations[31].last_success = 5ms;
+    const Reply first = get("/api/v1/stations");
+    const std::string tag = first.header("ETag");
+    bus.stations[31].last_success = 80ms;
+    const Reply same = ask("GET", "/api/v1/stations", "", "If-None-Match: " + tag + "\r\n");
+    EXPECT_EQ(same.status(), 304u);
+    EXPECT_EQ(same.header("ETag"), tag);
+    EXPECT_EQ(same.body(), "");
+    bus.stations[31].state = Health::offline;
+    const Reply other = ask("GET", "/api/v1/stations", "", "If-None-Match: " + tag + "\r\n");
+    EXPECT_EQ(other.status(), 200u);
+    EXPECT_NE(other.header("ETag"), tag);
+    EXPECT_EQ(get("/api/v1/stations/press/coils/1").header("ETag"), "");
+}
+
+TEST_F(ApiManners, WhatIsLongerThanAPacketIsPackedForWhoeverTakesIt) {
+    const std::string path = "/api/v1/stations/floor1:9/holding-registers/0?count=";
+    const Reply packed = ask("GET", path + "2000", "", "Accept-Encoding: gzip\r\n");
+    EXPECT_EQ(packed.header("Content-Encoding"), "gzip");
+    EXPECT_EQ(packed.header("Vary"), "Accept-Encoding");
+    EXPECT_THAT(packed.body(), StartsWith("\x1f\x8b"));
+    const Reply plain = get(path + "2000");
+    EXPECT_EQ(plain.header("Content-Encoding"), "");
+    EXPECT_EQ(plain.header("Vary"), "Accept-Encoding");
+    EXPECT_LT(packed.body().size() * 2, plain.body().size());
+    const Reply small = ask("GET", path + "2", "", "Accept-Encoding: gzip\r\n");
+    EXPECT_EQ(small.header("Content-Encoding"), "");
+}
+
+TEST_F(ApiManners, APreferenceThatWasHeededIsSaid) {
+    const auto applied = [&](const char* path, const char* headers) {
+        return ask("GET", path, "", headers).header("Preference-Applied");
+    };
+    EXPECT_EQ(applied("/api/v1/stations/press/coils/1", "Prefer: wait=1\r\n"), "wait=1");
+    EXPECT_EQ(applied("/api/v1/stations", "Prefer: wait=1\r\n"), "");
+    EXPECT_EQ(applied("/api/v1/stations/press/coils/1", ""), "");
+}
+
+TEST_F(ApiManners, EveryPathTellsWhatItUnderstandsAndNothingToOtherSites) {
+    struct Row {
+        const char* method;
+        const char* path;
+        unsigned status;
+        const char* allow;
+    };
+    constexpr Row kRows[] = {
+        {"OPTIONS", "/api/v1/stations/press/devices/UW1", 204, "GET, HEAD, PUT, OPTIONS"},
+        {"OPTIONS", "/api/v1/read", 204, "POST, OPTIONS"},
+        {"OPTIONS", "/openapi.json", 204, "GET, HEAD, OPTIONS"},
+        {"OPTIONS", "*", 204, "GET, HEAD, POST, DELETE, PUT, OPTIONS"},
+        {"POST", "/api/v1/stations", 405, "GET, HEAD"},
+        {"DELETE", "/api/v1/stations/press/coils/1", 405, "GET, HEAD, PUT"},
+        {"GET", kRaw, 405, "POST"},
+        {"GET", "/nothing", 404, ""},
+        {"GET", "/api/v1/stations/press/coils", 404, ""},
+        {"GET", "/api/v1/stations/press/coils/1/2", 404, ""},
+        {"GET", "/%zz", 400, ""},
+        {"GET", "*", 400, ""},
+        {"GET", "/api/v1/stations/", 200, ""},
+    };
+    for (const Row& row : kRows) {
+        SCOPED_TRACE(std::string(row.method) + ' ' + row.path);
+        const Reply reply = ask(row.method, row.path);
+        EXPECT_EQ(reply.status(), row.status);
+        EXPECT_EQ(reply.header("Allow"), row.allow);
+        EXPECT_EQ(reply.header("Access-Control-Allow-Origin"), "");
+        EXPECT_EQ(reply.header("Content-Length").empty(), row.status == 204);
+    }
 }
 
 }  // namespace

@@ -1,4 +1,12 @@
+#include "panelgate/web/api/server.hpp"
+
 #include <sys/socket.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <stdexcept>
+#include <string>
 
 #include "http_rig.hpp"
 
@@ -9,6 +17,13 @@ using ::testing::HasSubstr;
 using WebServer = HttpRig;
 
 constexpr const char* kRead = "/api/v1/stations/press/holding-registers/1";
+std::string read_text() { return http_text("GET", kRead); }
+
+/// A client that closes its sending side behind this text.
+void send_and_close(Client& client, const std::string& text) {
+    client.send(text);
+    client.socket().shutdown(tcp::socket::shutdown_send);
+}
 
 TEST_F(WebServer, AnswersProbesMetricsAndTheIndex) {
     EXPECT_EQ(get("/healthz").body(), "ok\n");
@@ -17,85 +32,53 @@ TEST_F(WebServer, AnswersProbesMetricsAndTheIndex) {
     EXPECT_EQ(get("/readyz").status(), 503u);
     missing = "modbus_tcp 192.0.2.7:502 (late)";
     EXPECT_EQ(get("/readyz").body(), "not ready: modbus_tcp 192.0.2.7:502 (late)\n");
-    const Reply metrics = get("/metrics");
-    EXPECT_EQ(metrics.body(), "up 1\n");
-    EXPECT_EQ(metrics.header("Content-Type"), "text/plain; version=0.0.4; charset=utf-8");
-    EXPECT_EQ(metrics.header("Server"), "panelgate/1.2.3");
+    const Reply text = get("/metrics");
+    EXPECT_EQ(text.body(), "up 1\n");
+    EXPECT_EQ(text.header("Content-Type"), "text/plain; version=0.0.4; charset=utf-8");
+    EXPECT_EQ(text.header("Server"), "panelgate/1.2.3");
     EXPECT_THAT(get("/").body(), HasSubstr("/api/v1/stations"));
-}
-
-TEST_F(WebServer, AnswersHeadWithTheLengthAndNoBody) {
-    Client client = connect();
-    const Reply head = client.ask("HEAD", "/healthz");
-    EXPECT_EQ(head.status(), 200u);
-    EXPECT_EQ(head.header("Content-Length"), "3");
-    EXPECT_EQ(client.ask("GET", "/healthz").body(), "ok\n");
-}
-
-TEST_F(WebServer, KnowsWhatIsThereAndHowItMayBeAsked) {
-    EXPECT_EQ(get("/nothing").status(), 404u);
-    EXPECT_EQ(get("/api/v1/stations/press/coils").status(), 404u);
-    EXPECT_EQ(get("/api/v1/stations/press/coils/1/2").status(), 404u);
-    EXPECT_EQ(ask("POST", "/api/v1/stations").status(), 405u);
-    EXPECT_EQ(ask("POST", "/api/v1/stations").header("Allow"), "GET, HEAD");
-    EXPECT_EQ(ask("DELETE", "/api/v1/stations/press/coils/1").header("Allow"), "GET, HEAD, PUT");
-    EXPECT_EQ(ask("GET", "/api/v1/lines/floor1/raw").header("Allow"), "POST");
-    EXPECT_EQ(get("/%zz").status(), 400u);
-    EXPECT_EQ(get("/api/v1/stations/").status(), 200u);
 }
 
 TEST_F(WebServer, KeepsAConnectionAndAnswersPipelinedRequestsInOrder) {
     Client client = connect();
-    client.send(std::string("GET ") + kRead + " HTTP/1.1\r\nHost: x\r\n\r\n" +
-                "GET /healthz HTTP/1.1\r\nHost: x\r\n\r\nGET /readyz HTTP/1.1\r\nHost: x\r\n\r\n");
+    client.send(read_text() + http_text("GET", "/healthz") + http_text("GET", "/readyz"));
     EXPECT_EQ(client.receive().at("values"), json_of("[1]"));
     EXPECT_EQ(client.receive().body(), "ok\n");
     EXPECT_EQ(client.receive().body(), "ready\n");
+    const Reply head = client.ask("HEAD", "/healthz");
+    EXPECT_EQ(head.status(), 200u);
+    EXPECT_EQ(head.header("Content-Length"), "3");
     EXPECT_EQ(server->connections(), 1u);
+    const Reply last = client.ask("GET", "/healthz", "", "Connection: close\r\n");
+    EXPECT_EQ(last.body(), "ok\n");
+    EXPECT_EQ(last.header("Connection"), "close");
+    EXPECT_EQ(client.receive().error, http::error::end_of_stream);
 }
 
-TEST_F(WebServer, UnderstandsARequestThatArrivesByteByByte) {
+TEST_F(WebServer, UnderstandsARequestThatArrivesByteByByteAndABodyThatWaits) {
     Client client = connect();
-    const std::string text =
-        "PUT /api/v1/stations/press/coils/1 HTTP/1.1\r\nHost: x\r\nContent-Length: 14\r\n\r\n"
-        "{\"values\":[1]}";
-    for (const char c : text) {
+    for (const char c : put_coil_text()) {
         client.send(std::string(1, c));
         io.poll();
     }
     EXPECT_EQ(client.receive().status(), 200u);
-}
-
-TEST_F(WebServer, ClosesWhenTheClientAsksForIt) {
-    Client client = connect();
-    const Reply reply = client.ask("GET", "/healthz", "", "Connection: close\r\n");
-    EXPECT_EQ(reply.header("Connection"), "close");
-    EXPECT_EQ(client.receive().error, http::error::end_of_stream);
-}
-
-TEST_F(WebServer, InvitesABodyThatWaitsForIt) {
-    Client client = connect();
-    client.send(
-        "PUT /api/v1/stations/press/coils/1 HTTP/1.1\r\nHost: x\r\nExpect: 100-continue\r\n"
-        "Content-Length: 14\r\n\r\n");
+    client.send(http_text("PUT", "/api/v1/stations/press/coils/1",
+                          "Expect: 100-continue\r\nContent-Length: 14\r\n"));
     EXPECT_EQ(client.receive().status(), 100u);
     client.send("{\"values\":[1]}");
     EXPECT_EQ(client.receive().status(), 200u);
 }
 
-TEST_F(WebServer, RefusesABodyThatIsTooLarge) {
+TEST_F(WebServer, RefusesWhatIsTooLargeAndWhatIsNotHttp) {
     settings.max_body = 100;
     const Reply reply = ask("PUT", "/api/v1/stations/press/coils/1", std::string(101, ' '));
     EXPECT_EQ(reply.status(), 413u);
     EXPECT_EQ(reply.header("Connection"), "close");
     EXPECT_EQ(reply.at("detail"), "a body has at most 100 bytes");
     Client chunked = connect();
-    chunked.send("PUT / HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n80\r\n" +
+    chunked.send(http_text("PUT", "/", "Transfer-Encoding: chunked\r\n") + "80\r\n" +
                  std::string(128, ' ') + "\r\n0\r\n\r\n");
     EXPECT_EQ(chunked.receive().status(), 413u);
-}
-
-TEST_F(WebServer, RefusesAHeaderThatIsTooLargeAndWhatIsNotHttp) {
     EXPECT_EQ(ask("GET", "/healthz", "", "X: " + std::string(20'000, 'x') + "\r\n").status(), 431u);
     Client client = connect();
     client.send("\x01\x03 modbus?\r\n\r\n");
@@ -103,30 +86,33 @@ TEST_F(WebServer, RefusesAHeaderThatIsTooLargeAndWhatIsNotHttp) {
     EXPECT_EQ(client.receive().error, http::error::end_of_stream);
 }
 
-TEST_F(WebServer, EndsAConnectionThatIsIdleForTooLong) {
-    settings.idle_timeout = 1ms;
-    Client client = connect();
-    EXPECT_EQ(client.ask("GET", "/healthz").status(), 200u);
-    EXPECT_TRUE(client.receive().error);
-    EXPECT_EQ(server->connections(), 0u);
-}
-
-TEST_F(WebServer, EndsAConnectionWhoseRequestNeverEnds) {
-    settings.request_timeout = 1ms;
-    Client client = connect();
-    client.send("GET /healthz HTTP/1.1\r\nHost:");
-    EXPECT_TRUE(client.receive().error);
-    EXPECT_EQ(server->connections(), 0u);
+TEST_F(WebServer, EndsAConnectionThatKeepsItWaiting) {
+    struct Row {
+        Duration Settings::*patience;
+        std::string text;
+    };
+    const Row rows[] = {{&Settings::first_request_timeout, ""},
+                        {&Settings::request_timeout, "GET /healthz HTTP/1.1\r\nHost:"},
+                        {&Settings::idle_timeout, http_text("GET", "/healthz")}};
+    const Settings usual = settings;
+    for (const Row& row : rows) {
+        settings = usual;
+        settings.*row.patience = 1ms;
+        start();
+        Client client = connect();
+        client.send(row.text);
+        if (row.patience == &Settings::idle_timeout) {
+            EXPECT_EQ(client.receive().status(), 200u);
+        }
+        EXPECT_TRUE(client.receive().error) << row.text;
+        EXPECT_EQ(server->connections(), 0u) << row.text;
+    }
 }
 
 TEST_F(WebServer, P2ForgetsTheRequestsOfAClientThatGoesAway) {
     settings.half_close_grace = 1ms;
-    bus.script = [](const bus::Request&) { return std::nullopt; };
-    {
-        Client client = connect();
-        client.send(std::string("GET ") + kRead + " HTTP/1.1\r\nHost: x\r\n\r\n");
-        while (bus.open() == 0) io.run_one();
-    }
+    hold_answers();
+    ask_and_leave(read_text());
     while (server->connections() > 0) io.run_one();
     EXPECT_EQ(bus.open(), 0u);
     ASSERT_EQ(bus.cancelled.size(), 1u);
@@ -135,11 +121,9 @@ TEST_F(WebServer, P2ForgetsTheRequestsOfAClientThatGoesAway) {
 
 TEST_F(WebServer, P2ForgetsTheRequestsOfAClientThatIsReset) {
     settings.half_close_grace = 1h;
-    bus.script = [](const bus::Request&) { return std::nullopt; };
+    hold_answers();
     Client client = connect();
-    const std::string ask = std::string("GET ") + kRead + " HTTP/1.1\r\nHost: x\r\n\r\n";
-    client.send(ask + ask);  // unread input hides nothing
-    while (bus.open() == 0) io.run_one();
+    begin(client, read_text() + read_text());  // unread input hides nothing
     client.socket().set_option(boost::asio::socket_base::linger(true, 0));
     client.socket().close();
     while (server->connections() > 0) io.run_one();
@@ -147,13 +131,9 @@ TEST_F(WebServer, P2ForgetsTheRequestsOfAClientThatIsReset) {
 }
 
 TEST_F(WebServer, P3AnswersAClientThatHasClosedItsSendingSide) {
-    bus.script = [](const bus::Request&) { return std::nullopt; };
+    hold_answers();
     Client client = connect();
-    const std::string write =
-        "PUT /api/v1/stations/press/coils/1 HTTP/1.1\r\nHost: x\r\n"
-        "Content-Length: 14\r\n\r\n{\"values\":[1]}";
-    client.send(write + write);
-    client.socket().shutdown(tcp::socket::shutdown_send);
+    send_and_close(client, put_coil_text() + put_coil_text());
     for (std::size_t i = 0; i < 2; ++i) {
         while (bus.open() == 0) io.run_one();
         while (io.poll_one() > 0) {
@@ -167,18 +147,16 @@ TEST_F(WebServer, P3AnswersAClientThatHasClosedItsSendingSide) {
 
 TEST_F(WebServer, TellsAClientThatClosesItsSendingSideTooEarly) {
     Client client = connect();
-    client.send("GET /healthz HTTP/1.1\r\nHost: x\r\n");
-    client.socket().shutdown(tcp::socket::shutdown_send);
+    send_and_close(client, "GET /healthz HTTP/1.1\r\nHost: x\r\n");
     EXPECT_EQ(client.receive().status(), 400u);
     EXPECT_EQ(client.receive().error, http::error::end_of_stream);
 }
 
 TEST_F(WebServer, P3AsksAClientThatHasClosedItsSendingSideWhetherItIsStillThere) {
     settings.half_close_grace = 1ms;
-    bus.script = [](const bus::Request&) { return std::nullopt; };
+    hold_answers();
     Client client = connect();
-    client.send(std::string("GET ") + kRead + " HTTP/1.1\r\nHost: x\r\n\r\n");
-    client.socket().shutdown(tcp::socket::shutdown_send);
+    send_and_close(client, read_text());
     EXPECT_EQ(client.receive().status(), 100u);
     EXPECT_EQ(client.receive().status(), 100u);
     EXPECT_EQ(bus.open(), 1u);
@@ -190,10 +168,9 @@ TEST_F(WebServer, P3AsksAClientThatHasClosedItsSendingSideWhetherItIsStillThere)
 
 TEST_F(WebServer, AsksAListenerThatHasClosedItsSendingSideWhetherItIsStillThere) {
     settings.half_close_grace = 1ms;
-    const std::string listen = "GET /api/v1/events HTTP/1.1\r\nHost: x\r\n\r\n";
+    const std::string listen = http_text("GET", "/api/v1/events");
     Client stays = connect();
-    stays.send(listen);
-    stays.socket().shutdown(tcp::socket::shutdown_send);
+    send_and_close(stays, listen);
     {
         Client leaves = connect();
         leaves.send(listen);
@@ -205,31 +182,24 @@ TEST_F(WebServer, AsksAListenerThatHasClosedItsSendingSideWhetherItIsStillThere)
     EXPECT_FALSE(events.is_idle());
 }
 
-TEST_F(WebServer, GivesEverySessionItsOwnClientId) {
+TEST_F(WebServer, P9GivesEverySessionItsOwnClientIdAndTellsTheBusesItsAddress) {
     Client first = connect();
     Client second = connect();
-    for (Client* client : {&first, &second, &first}) {
+    for (Client* client : {&first, &second, &first})
         EXPECT_EQ(client->ask("GET", kRead).status(), 200u);
-    }
+    EXPECT_EQ(second.ask("PUT", kRead, R"({"values":[1]})").status(), 200u);
+    ASSERT_EQ(bus.requests.size(), 4u);
     EXPECT_NE(bus.requests[0].client, bus.requests[1].client);
     EXPECT_EQ(bus.requests[0].client, bus.requests[2].client);
-}
-
-TEST_F(WebServer, P9TellsTheBusesFromWhichAddressASessionAsks) {
-    EXPECT_EQ(get(kRead).status(), 200u);
-    EXPECT_EQ(ask("PUT", kRead, R"({"values":[1]})").status(), 200u);
-    ASSERT_EQ(bus.requests.size(), 2u);
-    for (const bus::Request& request : bus.requests) {
+    for (const bus::Request& request : bus.requests)
         EXPECT_EQ(request.host, bus::host_of("127.0.0.1"));
-    }
 }
 
 TEST_F(WebServer, P3AnswersARunningRequestBeforeItStops) {
-    bus.script = [](const bus::Request&) { return std::nullopt; };
+    hold_answers();
     Client idle = connect();
     Client client = connect();
-    client.send(std::string("GET ") + kRead + " HTTP/1.1\r\nHost: x\r\n\r\n");
-    while (bus.open() == 0) io.run_one();
+    begin(client, read_text());
     server->stop();
     EXPECT_TRUE(idle.receive().error);
     EXPECT_EQ(server->connections(), 1u);
@@ -245,7 +215,7 @@ TEST_F(WebServer, WaitsForNoClientThatDoesNotReadWhenItStops) {
     settings.request_timeout = 1h;
     metrics.text = std::make_shared<const std::string>(std::size_t{16} * 1024 * 1024, 'x');
     Client client = connect();
-    for (int i = 0; i < 3; ++i) client.send("GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n");
+    for (int i = 0; i < 3; ++i) client.send(http_text("GET", "/metrics"));
     while (server->counters().requests.empty()) io.run_one();
     io.poll();
     server->stop(1ms);
@@ -264,20 +234,15 @@ TEST_F(WebServer, TakesNobodyElseAfterItStopped) {
     io.restart();
 }
 
-TEST_F(WebServer, MayBeDestroyedWithARequestOnTheBus) {
-    bus.script = [](const bus::Request&) { return std::nullopt; };
+TEST_F(WebServer, MayBeDestroyedWithARequestOnTheBusAndWithoutEverRunning) {
+    start();
+    server.reset();
+    hold_answers();
     Client client = connect();
-    client.send(std::string("GET ") + kRead + " HTTP/1.1\r\nHost: x\r\n\r\n");
-    while (bus.open() == 0) io.run_one();
+    begin(client, read_text());
     server.reset();
     EXPECT_EQ(bus.open(), 0u);
     EXPECT_TRUE(client.receive().error);
-}
-
-TEST_F(WebServer, MayBeDestroyedWithoutEverRunning) {
-    start();
-    server.reset();
-    start();
 }
 
 TEST_F(WebServer, SaysWhyItCannotListen) {
@@ -317,8 +282,7 @@ TEST_F(WebServer, SendsMetricsInTheCodingThatTheClientTakes) {
 TEST_F(WebServer, SendsALongBodyWholeAndItsHeadAlone) {
     metrics.text = std::make_shared<const std::string>(5'000'000, 'x');
     Client client = connect();
-    const Reply reply = client.ask("GET", "/metrics");
-    EXPECT_EQ(reply.body().size(), 5'000'000u);
+    EXPECT_EQ(client.ask("GET", "/metrics").body().size(), 5'000'000u);
     const Reply head = client.ask("HEAD", "/metrics");
     EXPECT_EQ(head.status(), 200u);
     EXPECT_EQ(head.header("Content-Length"), "5000000");
@@ -337,7 +301,7 @@ TEST_F(WebServer, TellsTheMetricsOfACallerThatLeaves) {
     metrics.deferred = true;
     {
         Client client = connect();
-        client.send("GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n");
+        client.send(http_text("GET", "/metrics"));
         while (metrics.waiting.empty()) io.run_one();
     }
     while (metrics.cancelled == 0) io.run_one();

@@ -1,7 +1,9 @@
 // Transactions and incidents of a line, for programs, people and Wireshark.
+#include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <string>
 
-#include "answer.hpp"
 #include "http_rig.hpp"
 #include "panelgate/bus/trace.hpp"
 #include "support/hex.hpp"
@@ -10,7 +12,6 @@ namespace panelgate::web::trace_test {
 namespace {
 
 using ::testing::HasSubstr;
-using ::testing::Not;
 using ::testing::StartsWith;
 
 constexpr const char* kTrace = "/api/v1/lines/floor1/trace";
@@ -74,9 +75,11 @@ TEST_F(ApiTrace, ATransactionHasItsInstantsAndItsFrames) {
     EXPECT_EQ(get(kTrace).at("frames").as_array().at(0).at("transaction"), 17);
 }
 
-TEST_F(ApiTrace, WhatDidNotHappenIsNull) {
-    bus.exchanges[0].arrived = bus.exchanges[0].answered = std::nullopt;
+TEST_F(ApiTrace, WhatDidNotHappenIsNullAndADashInText) {
+    bus.exchanges[0].end = TransactionEnd::timeout;
     bus.exchanges[0].first_byte_in = bus.exchanges[0].last_byte_in = std::nullopt;
+    EXPECT_THAT(text().body(), HasSubstr("timeout       2.0     2.0       -       -    13.0"));
+    bus.exchanges[0].arrived = bus.exchanges[0].answered = std::nullopt;
     bus.exchanges[0].client.clear();
     bus.exchanges[0].reply.clear();
     const boost::json::value told = get(kTrace).at("transactions").as_array().at(0);
@@ -86,14 +89,14 @@ TEST_F(ApiTrace, WhatDidNotHappenIsNull) {
 }
 
 TEST_F(ApiTrace, APageFollowsByTheNumberOfATransactionsEnd) {
-    const Reply page = get(std::string(kTrace) + "?since=42");
-    EXPECT_EQ(page.at("transactions").as_array().size(), 1u);
-    EXPECT_EQ(page.at("frames").as_array().size(), 1u);
-    EXPECT_EQ(page.at("next"), 44);
-    EXPECT_EQ(get(std::string(kTrace) + "?since=43").at("transactions").as_array().size(), 0u);
-    const Reply cut = get(std::string(kTrace) + "?since=40&last=2");
-    EXPECT_EQ(cut.at("next"), 42);
-    EXPECT_EQ(cut.at("transactions").as_array().size(), 0u) << "it ends behind that";
+    const auto page = [&](const char* since) { return get(kTrace + std::string(since)); };
+    const Reply last = page("?since=42");
+    EXPECT_EQ(last.at("transactions").as_array().size(), 1u);
+    EXPECT_EQ(last.at("frames").as_array().size(), 1u);
+    EXPECT_EQ(last.at("next"), 44);
+    EXPECT_EQ(status_and(page("?since=43"), "transactions"), "200 []");
+    EXPECT_EQ(status_and(page("?since=40&last=2"), "next transactions"), "200 42 []")
+        << "it ends behind that";
 }
 
 TEST_F(ApiTrace, IsAlignedTextForPeople) {
@@ -112,19 +115,6 @@ TEST_F(ApiTrace, IsAlignedTextForPeople) {
               "1970-01-01T00:00:00.000000Z    > 1F 03 00 64 00 01 C6 6B  request\n");
 }
 
-TEST_F(ApiTrace, TextSaysWithADashWhatDidNotHappen) {
-    bus.exchanges[0].end = TransactionEnd::timeout;
-    bus.exchanges[0].first_byte_in = bus.exchanges[0].last_byte_in = std::nullopt;
-    EXPECT_THAT(text().body(), HasSubstr("timeout       2.0     2.0       -       -    13.0"));
-}
-
-TEST(Accept, NamesAType) {
-    EXPECT_TRUE(prefers("text/plain", "text/plain"));
-    EXPECT_FALSE(prefers("*/*", "text/plain"));
-    EXPECT_FALSE(prefers("text/plain;q=0.5, application/json", "text/plain"));
-    EXPECT_FALSE(prefers("text/csv", "text/plain"));
-}
-
 TEST_F(ApiTrace, IsACaptureForWireshark) {
     const Reply reply = get("/api/v1/lines/floor1/trace.pcapng");
     EXPECT_EQ(reply.header("Content-Type"), "application/x-pcapng");
@@ -138,16 +128,9 @@ TEST_F(ApiTrace, IsACaptureForWireshark) {
 TEST_F(ApiTrace, ALongCaptureHasEveryFrameAndLetsOthersHaveTheirTurn) {
     bus.frames.clear();
     for (std::uint64_t i = 1; i <= 2000; ++i) bus.frames.push_back(frame(i, FrameKind::reply, 1));
-    Client client = connect();
-    client.send("GET /api/v1/lines/floor1/trace.pcapng HTTP/1.1\r\nHost: x\r\n\r\n");
-    std::size_t turns = 0;
-    const std::function<void()> turn = [&] {
-        if (++turns < 10'000) boost::asio::post(io, turn);
-    };
-    boost::asio::post(io, turn);
-    const std::string body = client.receive().body();
-    EXPECT_GT(std::exchange(turns, 10'000u), 30u);
-    io.poll();
+    const auto [reply, turns] = get_among_others("/api/v1/lines/floor1/trace.pcapng");
+    const std::string& body = reply.body();
+    EXPECT_GT(turns, 30u);
     std::size_t packets = 0;
     for (auto at = body.find("mbrtu"); at != body.npos; at = body.find("mbrtu", at + 1)) ++packets;
     EXPECT_EQ(packets, 2000u);
@@ -176,10 +159,10 @@ TEST_F(ApiTrace, GivesAnIncidentAndRemembersThatItWasRead) {
     const Reply file = get(std::string(kIncidents) + "/3.pcapng");
     EXPECT_EQ(file.header("Content-Disposition"), "attachment; filename=\"floor1-3.pcapng\"");
     EXPECT_THAT(file.body(), HasSubstr("mbrtu"));
-    for (const char* wrong : {"/4", "/x", "/.pcapng", "/3.pcap", "/-3"})
-        EXPECT_EQ(get(std::string(kIncidents) + wrong).status(), 404u) << wrong;
+    expect_gets(kIncidents, 404, {"/4", "/x", "/.pcapng", "/3.pcap", "/-3"});
 }
 
+/// Each answer costs so many transactions, numbered from 17 on.
 class ApiCosts : public HttpRig {
   protected:
     ApiCosts() {
@@ -196,27 +179,25 @@ class ApiCosts : public HttpRig {
 };
 
 TEST_F(ApiCosts, AnAnswerNamesTheTransactionsThatItCost) {
-    EXPECT_EQ(named(get("/api/v1/stations/press/holding-registers/1")), "17");
+    const std::string one = "/api/v1/stations/press/holding-registers/1";
+    const std::string many = "/api/v1/stations/floor1:9/holding-registers/0?count=";
+    Client client = connect();
+    EXPECT_EQ(named(client.ask("GET", one)), "17");
     attempts = 2;
-    EXPECT_EQ(named(get("/api/v1/stations/press/holding-registers/1")), "18, 19");
+    EXPECT_EQ(named(client.ask("GET", one)), "18, 19") << "on one connection each its own";
     attempts = 1;
     EXPECT_EQ(
         named(ask("POST", "/api/v1/lines/floor1/raw", R"({"station":31,"pdu":"0300640001"})")),
         "20");
-    EXPECT_EQ(named(get("/api/v1/stations/floor1:9/holding-registers/0?count=300")), "21, 22, 23");
-}
-
-TEST_F(ApiCosts, OnOneConnectionEachAnswerNamesItsOwn) {
-    Client client = connect();
-    EXPECT_EQ(named(client.ask("GET", "/api/v1/stations/press/holding-registers/1")), "17");
-    EXPECT_EQ(named(client.ask("GET", "/api/v1/stations/press/holding-registers/1")), "18");
+    EXPECT_EQ(named(get(many + "300")), "21, 22, 23");
     EXPECT_EQ(named(client.ask("GET", "/api/v1/lines")), "");
-}
-
-TEST_F(ApiCosts, WhatCostNothingNamesNone) {
+    attempts = 900;
+    const Reply endless = get(many + "125");
+    EXPECT_THAT(named(endless), StartsWith("24, 25, 26"));
+    EXPECT_LE(named(endless).size(), 4000u);
     attempts = 0;
-    EXPECT_EQ(named(get("/api/v1/stations/press/holding-registers/1")), "");
-    EXPECT_EQ(named(get("/api/v1/stations/press")), "");
+    for (const std::string& nothing : {one, std::string("/api/v1/stations/press")})
+        EXPECT_EQ(named(get(nothing)), "") << nothing;
 }
 
 TEST_F(ApiCosts, OfSeveralLinesEachIsNamedWithItsLine) {
@@ -227,15 +208,11 @@ TEST_F(ApiCosts, OfSeveralLinesEachIsNamedWithItsLine) {
         return answer;
     };
     directory.lines[1].bus = &other;
-    const Reply reply = ask("POST", "/api/v1/read",
-                            R"({"items":[{"station":"press","device":"UW1"},
-                                {"station":"floor2:9","table":"coils","address":0}]})");
-    EXPECT_EQ(named(reply), "17") << "the other was refused";
+    const char* items = R"({"items":[{"station":"press","device":"UW1"},
+                                     {"station":"floor2:9","table":"coils","address":0}]})";
+    EXPECT_EQ(named(ask("POST", "/api/v1/read", items)), "17") << "the other was refused";
     directory.lines[1].pass_unlisted_stations = true;
-    const Reply both = ask("POST", "/api/v1/read",
-                           R"({"items":[{"station":"press","device":"UW1"},
-                               {"station":"floor2:9","table":"coils","address":0}]})");
-    EXPECT_EQ(named(both), "floor1:18, floor2:3");
+    EXPECT_EQ(named(ask("POST", "/api/v1/read", items)), "floor1:18, floor2:3");
     server.reset();
     io.poll();
 }
@@ -249,13 +226,6 @@ TEST_F(ApiCosts, AKeyedWriteThatIsRepeatedNamesWhatTheFirstCost) {
     EXPECT_EQ(again.header("Idempotency-Replayed"), "true");
     EXPECT_EQ(named(again), "17");
     EXPECT_EQ(last, 17u);
-}
-
-TEST_F(ApiCosts, AnEndlessListIsCut) {
-    attempts = 900;
-    const Reply reply = get("/api/v1/stations/floor1:9/holding-registers/0?count=125");
-    EXPECT_THAT(named(reply), StartsWith("17, 18, 19"));
-    EXPECT_LE(named(reply).size(), 4000u);
 }
 
 }  // namespace

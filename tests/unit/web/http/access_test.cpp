@@ -1,11 +1,20 @@
-#include "router.hpp"
-
+// Which requests are let in: by token and role, by host name and by the page that they come from.
 #include <gtest/gtest.h>
 
+#include <boost/asio/ip/address.hpp>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
+
+#include "admission.hpp"
+#include "router.hpp"
 
 namespace panelgate::web::access_test {
 namespace {
+
+using boost::asio::ip::make_address;
+using Headers = std::vector<std::pair<std::string, std::string>>;
 
 Settings with_tokens(Role anonymous) {
     Settings settings;
@@ -29,44 +38,41 @@ unsigned refusal(const HttpRequest& request, Role needed, Role anonymous) {
     return refused ? refused->status : 0;
 }
 
-TEST(Access, NeedsNoTokenForPublicRoutes) {
-    EXPECT_EQ(refusal(asking("Bearer wrong"), Role::none, Role::none), 0u);
-}
-
-TEST(Access, GivesARequestWithoutATokenTheAnonymousRole) {
-    EXPECT_EQ(refusal(asking(""), Role::viewer, Role::none), 401u);
-    EXPECT_EQ(refusal(asking(""), Role::viewer, Role::viewer), 0u);
-    EXPECT_EQ(refusal(asking(""), Role::operator_, Role::viewer), 401u);
-    EXPECT_EQ(refusal(asking(""), Role::operator_, Role::operator_), 0u);
-}
-
-TEST(Access, GivesATokenItsOwnRoleEvenWhereAnonymousMayDoMore) {
-    EXPECT_EQ(refusal(asking("Bearer see-me"), Role::viewer, Role::none), 0u);
-    EXPECT_EQ(refusal(asking("Bearer see-me"), Role::operator_, Role::operator_), 403u);
-    EXPECT_EQ(refusal(asking("Bearer let-me"), Role::operator_, Role::none), 0u);
-    EXPECT_EQ(refusal(asking("Bearer wrong"), Role::viewer, Role::operator_), 401u);
-}
-
-TEST(Access, ReturnsTheRoleOfTheClient) {
-    const Settings settings = with_tokens(Role::viewer);
-    EXPECT_EQ(role_of(asking(""), settings), Role::viewer);
-    EXPECT_EQ(role_of(asking("Bearer let-me"), settings), Role::operator_);
-    EXPECT_EQ(role_of(asking("Bearer see-me"), settings), Role::viewer);
-    EXPECT_EQ(role_of(asking("Bearer wrong"), settings), Role::none);
-}
-
-TEST(Access, TakesASecretOnlyWholeAndNeverAnEmptyOne) {
-    for (const char* token : {"let-m", "let-mee", "let-melet-me", "LET-ME", "", "let me"}) {
-        EXPECT_EQ(refusal(asking(std::string("Bearer ") + token), Role::viewer, Role::none), 401u)
-            << token;
-    }
-}
-
-TEST(Access, ReadsTheSchemeWithoutRegardToCase) {
-    EXPECT_EQ(refusal(asking("bEARER let-me"), Role::operator_, Role::none), 0u);
-    EXPECT_EQ(refusal(asking("Bearer  let-me"), Role::operator_, Role::none), 0u);
-    for (const char* text : {"Basic let-me", "Bearer", "Bearerlet-me", "let-me"}) {
-        EXPECT_EQ(refusal(asking(text), Role::viewer, Role::none), 401u) << text;
+TEST(Access, IsByTheRoleOfTheTokenAndWithoutATokenByTheAnonymousOne) {
+    using enum Role;
+    struct Row {
+        const char* authorization;
+        Role needed;
+        Role anonymous;
+        unsigned refused;  ///< 0: allowed
+    };
+    constexpr Row kRows[] = {
+        {"Bearer wrong", none, none, 0},  // a public route needs no token
+        {"", viewer, none, 401},          // the anonymous role
+        {"", viewer, viewer, 0},
+        {"", operator_, viewer, 401},
+        {"", operator_, operator_, 0},
+        {"Bearer see-me", viewer, none, 0},            // the token's own role,
+        {"Bearer see-me", operator_, operator_, 403},  // even where anonymous may do more
+        {"Bearer let-me", operator_, none, 0},
+        {"Bearer wrong", viewer, operator_, 401},
+        {"Bearer let-m", viewer, none, 401},  // a secret whole
+        {"Bearer let-mee", viewer, none, 401},
+        {"Bearer let-melet-me", viewer, none, 401},
+        {"Bearer LET-ME", viewer, none, 401},
+        {"Bearer let me", viewer, none, 401},
+        {"Bearer ", viewer, none, 401},  // never an empty one
+        {"Bearer", viewer, none, 401},
+        {"bEARER let-me", operator_, none, 0},  // the scheme without regard to case
+        {"Bearer  let-me", operator_, none, 0},
+        {"Basic let-me", viewer, none, 401},  // no other scheme
+        {"Bearerlet-me", viewer, none, 401},
+        {"let-me", viewer, none, 401},
+    };
+    for (const Row& row : kRows) {
+        EXPECT_EQ(refusal(asking(row.authorization), row.needed, row.anonymous), row.refused)
+            << '\'' << row.authorization << "' " << label(row.needed) << ' '
+            << label(row.anonymous);
     }
 }
 
@@ -79,6 +85,17 @@ TEST(Access, OfAnotherSchemeSaysWhichIsMeantAndRepeatsNothing) {
         EXPECT_FALSE(carries_token(asking(text)));
     }
     EXPECT_TRUE(carries_token(asking("Bearer wrong")));
+    const auto without = check_access(asking(""), Role::viewer, with_tokens(Role::none));
+    ASSERT_TRUE(without);
+    EXPECT_EQ(without->headers, (Headers{{"WWW-Authenticate", "Bearer realm=\"panelgate\""}}));
+}
+
+TEST(Access, ReturnsTheRoleOfTheClient) {
+    const Settings settings = with_tokens(Role::viewer);
+    EXPECT_EQ(role_of(asking(""), settings), Role::viewer);
+    EXPECT_EQ(role_of(asking("Bearer let-me"), settings), Role::operator_);
+    EXPECT_EQ(role_of(asking("Bearer see-me"), settings), Role::viewer);
+    EXPECT_EQ(role_of(asking("Bearer wrong"), settings), Role::none);
 }
 
 TEST(Access, TakesABodyOnlyAsItIs) {
@@ -92,36 +109,165 @@ TEST(Access, TakesABodyOnlyAsItIs) {
     EXPECT_FALSE(check_encoding(request));
 }
 
-TEST(Access, SaysHowToAskAgain) {
-    const auto refused = check_access(asking(""), Role::viewer, with_tokens(Role::none));
-    ASSERT_TRUE(refused);
-    ASSERT_EQ(refused->headers.size(), 1u);
-    EXPECT_EQ(refused->headers[0].first, "WWW-Authenticate");
-    EXPECT_EQ(refused->headers[0].second, "Bearer realm=\"panelgate\"");
-}
-
-TEST(Access, WantsNoTypeOfWhatHasNoBody) {
-    HttpRequest request = asking("", "DELETE");
-    request.headers["origin"] = "http://gateway";
-    EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), 0u);
-}
-
 TEST(Access, TakesNoFormFromAForeignPage) {
-    HttpRequest request = asking("", "POST");
-    request.headers["origin"] = "http://evil.example";
-    EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), 415u);
-    request.headers["content-type"] = "text/plain";
-    EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), 415u);
-    request.headers["content-type"] = "application/jsonp";
-    EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), 415u);
-    for (const char* type :
-         {"application/json", "Application/JSON", "application/json ; charset=utf-8"}) {
-        request.headers["content-type"] = type;
-        EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), 0u) << type;
+    struct Row {
+        const char* method;
+        const char* content_type;  ///< "": none
+        unsigned refused;
+    };
+    constexpr Row kRows[] = {
+        {"POST", "", 415},
+        {"POST", "text/plain", 415},
+        {"POST", "application/jsonp", 415},
+        {"POST", "application/json", 0},
+        {"POST", "Application/JSON", 0},
+        {"POST", "application/json ; charset=utf-8", 0},
+        {"GET", "", 0},     // changes nothing
+        {"DELETE", "", 0},  // has no body
+    };
+    for (const Row& row : kRows) {
+        HttpRequest request = asking("", row.method);
+        request.headers["origin"] = "http://evil.example";
+        if (*row.content_type != '\0') request.headers["content-type"] = row.content_type;
+        EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), row.refused)
+            << row.method << ' ' << row.content_type;
     }
-    request.headers.erase("content-type");
+}
+
+TEST(HostOfAuthority, IsTheNameWithoutItsTrimmings) {
+    EXPECT_EQ(host_of_authority("gateway"), "gateway");
+    EXPECT_EQ(host_of_authority("Gateway.Plant.Example:8080"), "gateway.plant.example");
+    EXPECT_EQ(host_of_authority("gateway."), "gateway");
+    EXPECT_EQ(host_of_authority("gateway.:80"), "gateway");
+    EXPECT_EQ(host_of_authority("192.168.1.7:"), "192.168.1.7");
+    EXPECT_EQ(host_of_authority("[FE80::1]:8080"), "fe80::1");
+    EXPECT_EQ(host_of_authority("[::1]"), "::1");
+    for (const char* none :
+         {"", ":80", ".", "a b", "a/b", "a@b", "a:8o", "a:123456", "a:1:2", "::1", "[::1", "[::1]x",
+          "[gateway]", "[]", "a\"b", "\xC3\xA4", "a%20b"})
+        EXPECT_EQ(host_of_authority(none), std::nullopt) << none;
+    for (const std::string& name : machine_names()) EXPECT_TRUE(host_of_authority(name)) << name;
+}
+
+class Names : public ::testing::Test {
+  protected:
+    bool knows(const char* host, const char* local = "192.168.1.7") const {
+        return HostNames(settings, {"Box.plant.example", "box"}).knows(host, make_address(local));
+    }
+    Settings settings;
+};
+
+TEST_F(Names, AreThoseOfTheMachineUnlessOthersAreGiven) {
+    EXPECT_TRUE(knows("box"));
+    EXPECT_TRUE(knows("box.plant.example"));
+    EXPECT_FALSE(knows("gateway.plant.example"));
+    settings.hosts = {"Gateway.plant.example"};
+    EXPECT_TRUE(knows("gateway.plant.example"));
+    for (const char* other : {"box", "plant.example", "evil.gateway.plant.example"})
+        EXPECT_FALSE(knows(other)) << other;
+}
+
+TEST_F(Names, AreAlwaysTheAddressesThatLeadHereAndTheLoopback) {
+    settings.address = "0.0.0.0";
+    settings.hosts = {"gateway", "172.16.0.9"};
+    EXPECT_TRUE(knows("192.168.1.7"));
+    EXPECT_TRUE(knows("192.168.1.7", "::ffff:192.168.1.7"));
+    EXPECT_TRUE(knows("fe80::7", "fe80::7%1"));
+    EXPECT_TRUE(knows("fe80:0:0::7", "fe80::7"));
+    EXPECT_TRUE(knows("172.16.0.9"));
+    EXPECT_FALSE(knows("192.168.1.8"));
+    EXPECT_FALSE(knows("fe80::8", "fe80::7"));
+    settings.address = "10.0.0.1";
+    EXPECT_TRUE(knows("10.0.0.1"));
+    for (const char* host : {"localhost", "127.0.0.1", "127.0.0.5", "::1", "::ffff:127.0.0.1"})
+        EXPECT_TRUE(knows(host)) << host;
+    EXPECT_FALSE(knows("localhost.evil.example"));
+}
+
+class Origin : public ::testing::Test {
+  protected:
+    Origin() {
+        request.method = "GET";
+        request.host = "gateway";
+    }
+    /// Returns the status of the refusal; 0 if allowed.
+    unsigned refusal() const {
+        Settings settings;
+        settings.hosts = {"gateway"};
+        const auto local = make_address("192.168.1.7");
+        const auto refused = check_origin(request, HostNames(settings, {}), local);
+        return refused ? refused->status : 0;
+    }
+    void browse(const char* site, const char* mode, const char* dest) {
+        request.headers["sec-fetch-site"] = site;
+        request.headers["sec-fetch-mode"] = mode;
+        request.headers["sec-fetch-dest"] = dest;
+    }
+    HttpRequest request;
+};
+
+TEST_F(Origin, IsRefusedUnderAForeignName) {
+    for (const char* ours : {"gateway", "192.168.1.7", ""}) {
+        request.host = ours;
+        EXPECT_EQ(refusal(), 0u) << ours;
+    }
+    for (const char* foreign : {"evil.example", "10.0.0.1"}) {
+        request.host = foreign;
+        EXPECT_EQ(refusal(), 421u) << foreign;
+    }
+}
+
+TEST_F(Origin, OfAnotherSiteChangesAndReadsNothing) {
+    for (const char* origin :
+         {"http://evil.example", "https://evil.example:8080", "null", "gateway"}) {
+        request.headers["origin"] = origin;
+        for (const char* method : {"PUT", "POST", "DELETE", "GET", "HEAD"}) {
+            request.method = method;
+            EXPECT_EQ(refusal(), 403u) << method << ' ' << origin;
+        }
+        request.method = "OPTIONS";
+        EXPECT_EQ(refusal(), 0u);
+    }
+    request.method = "PUT";
+    request.port = "8080";
+    for (const char* origin :
+         {"http://gateway:8080", "https://GATEWAY", "http://192.168.1.7:8080"}) {
+        request.headers["origin"] = origin;
+        EXPECT_EQ(refusal(), 0u) << origin;
+    }
+    request.headers["origin"] = "http://localhost:9999";
+    EXPECT_EQ(refusal(), 403u) << "another port is another site";
+}
+
+TEST_F(Origin, MayBeAPageOfOursAndNoneOfAnotherSite) {
+    for (const char* site : {"same-origin", "same-site", "none"}) {
+        browse(site, "cors", "empty");
+        EXPECT_EQ(refusal(), 0u) << site;
+    }
+    browse("Cross-Site", "no-cors", "image");
+    for (const char* method : {"GET", "HEAD", "PUT", "POST", "OPTIONS"}) {
+        request.method = method;
+        EXPECT_EQ(refusal(), 403u) << method;
+    }
+}
+
+TEST_F(Origin, MayBeALinkOfAnotherSiteToAPage) {
+    using Path = std::vector<std::string>;
+    browse("cross-site", "navigate", "document");
+    for (const Path& page : {Path{}, Path{"docs"}}) {
+        request.path = page;
+        EXPECT_EQ(refusal(), 0u) << page.size();
+    }
+    for (const Path& data : {Path{"api", "v1", "lines"}, Path{"metrics"}}) {
+        request.path = data;
+        EXPECT_EQ(refusal(), 403u) << data[0];
+    }
+    request.path = {};
+    request.method = "POST";
+    EXPECT_EQ(refusal(), 403u);
     request.method = "GET";
-    EXPECT_EQ(refusal(request, Role::viewer, Role::viewer), 0u);
+    browse("cross-site", "navigate", "iframe");
+    EXPECT_EQ(refusal(), 403u);
 }
 
 }  // namespace

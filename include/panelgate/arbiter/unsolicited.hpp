@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "panelgate/arbiter/outbox.hpp"
+#include "panelgate/arbiter/outstanding.hpp"
+#include "panelgate/arbiter/quiet.hpp"
+#include "panelgate/arbiter/stations.hpp"
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/modbus/rtu_framer.hpp"
+
+namespace panelgate::arbiter {
+
+/// Frames and bytes that belong to no transaction: collected until a silence ends them, classified,
+/// and passed to the stations that they concern. Pure.
+class UnsolicitedFrames {
+  public:
+    explicit UnsolicitedFrames(const SerialFormat& serial, const modbus::CrcOrders& orders = {})
+        : serial_(serial), orders_(orders) {}
+
+    /// The frame sent last: its echo may come late.
+    void on_sent(ByteView adu) {
+        last_frame_.assign(adu.begin(), adu.end());
+        replied_before_ = std::exchange(replied_, std::uint8_t{0});
+        ++sent_since_;
+        if (adu[0] != 0) return;
+        broadcast_ = last_frame_;
+        sent_since_ = 0;
+    }
+    /// Bytes after this answer are its station's trail.
+    void on_replied(std::uint8_t station) { replied_ = station; }
+    /// The station that answered the frame before the one on the wire; 0: none.
+    std::uint8_t replied_before() const { return replied_before_; }
+    void forget() {
+        idle_.clear();
+        foreign_requests_.clear();
+    }
+
+    /// Unsolicited bytes (MST-04): counted, never matched with a later request.
+    void hear(ByteView bytes);
+    bool pending() const { return !idle_.empty(); }
+    /// True if more is collected than any frame has.
+    bool full() const { return idle_.size() > modbus::ReplyFramer::kMaxHeard; }
+    /// Takes and classifies what a silence has ended.
+    std::vector<modbus::Unused> take(std::uint8_t asked);
+    /// Takes what the line has delimited, a `good` frame or none (ASCII).
+    std::vector<modbus::Unused> take_delimited(std::uint8_t asked, bool good);
+
+    /// Counts, traces, and updates the stations. `idle`: no request has wholly left since the last
+    /// reply, so that bytes may be its trail.
+    void note(TimePoint now, const std::vector<modbus::Unused>& parts, bool idle,
+              Stations& stations, Quiet& quiet, Outbox& outbox);
+    /// True if the station sent this instead of the right reply: not the echo, a duplicate, an
+    /// outstanding reply, or its answer to a broadcast or another master.
+    bool is_wrong_reply(TimePoint now, ByteView adu, const Stations& stations) const;
+
+  private:
+    Outbox::Part judge(TimePoint now, const modbus::Unused& part, const Stations& stations) const;
+    bool answers_broadcast(ByteView adu) const;
+    bool answers_other_master(TimePoint now, ByteView adu) const;
+    void let_reply_pass(TimePoint now, ByteView request, const Stations& stations,
+                        Quiet& quiet) const;
+
+    SerialFormat serial_;
+    modbus::CrcOrders orders_;
+    Bytes idle_;
+    Bytes last_frame_;
+    ForeignRequests foreign_requests_;
+    Bytes broadcast_;           ///< the last broadcast
+    unsigned sent_since_ = 0;   ///< frames sent after it
+    std::uint8_t replied_ = 0;  ///< to the last frame; 0: none, or not yet
+    std::uint8_t replied_before_ = 0;
+};
+
+}  // namespace panelgate::arbiter

@@ -1,0 +1,307 @@
+#include "panelgate/arbiter/outbox.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstdlib>
+#include <utility>
+
+#include "panelgate/modbus/ascii.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "verdict.hpp"
+
+namespace panelgate::arbiter {
+
+namespace {
+
+FrameKind kind_of(Outbox::Part what) {
+    switch (what) {
+        case Outbox::Part::damaged:
+            return FrameKind::damaged;
+        case Outbox::Part::echo:
+            return FrameKind::echo;
+        case Outbox::Part::request:
+            return FrameKind::foreign_request;
+        case Outbox::Part::late:
+            return FrameKind::late;
+        case Outbox::Part::duplicate:
+            return FrameKind::copy;
+        case Outbox::Part::broadcast_reply:
+        case Outbox::Part::unasked:
+        case Outbox::Part::unknown:
+            return FrameKind::foreign;
+    }
+    std::abort();
+}
+
+FrameKind kind_of(const Group& group) {
+    if (group.learns_for != 0 || !group.confirms.empty()) return FrameKind::learn_echo;
+    if (group.station == kBroadcast) return FrameKind::broadcast;
+    if (group.probe) return FrameKind::probe;
+    return group.attempts > 1 ? FrameKind::retry : FrameKind::request;
+}
+
+}  // namespace
+
+Outbox::Outbox(const Settings& settings) { apply(settings); }
+
+void Outbox::apply(const Settings& settings) {
+    explain_ = settings.explain;
+    orders_ = crc_orders(settings);
+    std::map<std::uint8_t, StationCounters> before = std::exchange(stations_, {});
+    stations_[kUnlisted] = std::move(before[kUnlisted]);
+    for (const StationSettings& station : settings.stations)
+        stations_[station.id] = std::move(before[station.id]);
+}
+
+std::optional<Action> Outbox::poll() {
+    if (actions_.empty()) return std::nullopt;
+    Action action = std::move(actions_.front());
+    actions_.pop_front();
+    return action;
+}
+
+StationCounters& Outbox::of(std::uint8_t station) {
+    const auto found = stations_.find(station);
+    return found == stations_.end() ? stations_[kUnlisted] : found->second;
+}
+
+void Outbox::transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire, Reason why) {
+    const Group& group = attempt.group();
+    if (group.attempts > 1) ++of(group.station).retries;
+    if (group.station == kBroadcast) ++line_.broadcasts;
+    actions_.push_back(
+        Note{now, kind_of(group), std::move(adu), std::move(why), group.transaction});
+    actions_.push_back(Transmit{std::move(wire)});
+}
+
+void Outbox::finish(const Job& job, Result<Bytes> pdu, bool shared) {
+    actions_.push_back(
+        Finish{job.ticket, std::move(pdu), job.attempts > 0, shared, {}, job.transactions});
+}
+
+void Outbox::finish_from_memory(Ticket ticket, Bytes pdu, Duration age) {
+    Finish answer;
+    answer.ticket = ticket;
+    answer.pdu = std::move(pdu);
+    answer.age = age;
+    actions_.push_back(std::move(answer));
+}
+
+void Outbox::report(const Attempt& attempt, TransactionEnd end) {
+    if (!explain_) return;
+    const Group& group = attempt.group();
+    const Attempt::Timing& timing = attempt.timing();
+    Exchange exchange;
+    exchange.transaction = group.transaction;
+    exchange.end = end;
+    exchange.station = group.station;
+    if (!group.jobs.empty()) exchange.arrived = group.jobs.front().arrived;
+    exchange.granted = timing.started;
+    exchange.first_bit_out = timing.sent - timing.leaving;
+    exchange.last_bit_out = timing.sent;
+    if (attempt.heard()) {
+        exchange.first_byte_in = attempt.first_byte();
+        exchange.last_byte_in = attempt.last_byte();
+    }
+    actions_.push_back(exchange);
+}
+
+void Outbox::event(StationEvent::Kind kind, std::uint8_t station, Duration by) {
+    actions_.push_back(StationEvent{kind, station, by});
+}
+
+void Outbox::written(const Group& group, bool ended) {
+    if (group.request.is_read()) return;
+    const Client client = group.jobs.empty() ? 0 : group.jobs.front().client;
+    actions_.push_back(Written{group.station, group.request.access().write, ended, client});
+}
+
+void Outbox::on_started(TimePoint now, const Job& job) {
+    line_.queue_wait[static_cast<std::size_t>(job.priority)].observe(now - job.arrived);
+}
+
+void Outbox::on_ended(TimePoint now, const Attempt& attempt, Duration gap) {
+    const Attempt::Timing& timing = attempt.timing();
+    const TimePoint longest = attempt.give_up() + timing.longest_reply;
+    const TimePoint end = std::max({timing.sent, attempt.last_byte(), std::min(now, longest)});
+    const Duration busy = end - timing.started + gap;
+    line_.busy += busy;
+    const Jobs& jobs = attempt.group().jobs;
+    for (const Job& job : jobs) {
+        if (!job.gone) shares_.add(job.client, busy / static_cast<int>(jobs.size()));
+    }
+}
+
+void Outbox::on_echo_mismatch(TimePoint now, std::uint8_t station) {
+    constexpr Duration kPause = 10s;
+    ++of(station).echo_mismatches;
+    if (reported_collision_ && now < *reported_collision_ + kPause) return;
+    reported_collision_ = now;
+    event(StationEvent::Kind::collision, station);
+}
+
+void Outbox::on_unsolicited(TimePoint now, const modbus::Unused& part, Part what,
+                            std::uint8_t asked, Duration lateness) {
+    const bool known = what == Part::late || what == Part::duplicate || what == Part::unasked;
+    const bool is_foreign = what == Part::unasked || what == Part::unknown ||
+                            what == Part::request || what == Part::broadcast_reply;
+    of(known ? part.station : asked).discarded_bytes += part.bytes.size();
+    if (what == Part::late) ++of(part.station).late_frames;
+    if (is_foreign) ++of(asked).foreign_frames;
+    count_unsolicited(part, what, asked, lateness);
+    actions_.push_back(Note{now, kind_of(what), part.bytes, {}});
+}
+
+// Symptoms, for diagnosis only: nothing depends on them.
+
+namespace {
+
+/// Symptoms::kPauses classes: below 2 ms, 4 ms, 8 ms …
+std::size_t pause_class(Duration pause) {
+    std::size_t i = 0;
+    for (Duration bound = 2ms; i + 1 < Symptoms::kPauses && pause >= bound; bound *= 2) ++i;
+    return i;
+}
+
+/// A scan may ask addresses without a panel.
+bool is_search(const Group& group) {
+    return !group.jobs.empty() && std::ranges::all_of(group.jobs, &Job::search);
+}
+
+}  // namespace
+
+void Outbox::on_answered(TimePoint now, const Attempt& attempt, Duration think,
+                         const Station::Replied& replied) {
+    const std::uint8_t station = attempt.group().station;
+    actions_.push_back(Note{now,
+                            FrameKind::reply,
+                            modbus::encode_adu(station, attempt.reply(), orders_.of(station)),
+                            {}});
+    StationCounters& counters = of(station);
+    Symptoms& symptoms = counters.symptoms;
+    counters.turnaround.observe(think);
+    counters.bus_transaction.observe(now - attempt.timing().started);
+    if (const auto code = modbus::exception_of(attempt.reply())) ++counters.exceptions[*code];
+    ++(attempt.echo().mismatch() ? symptoms.collided : symptoms.answered);
+    ++symptoms.answered_after[pause_class(attempt.timing().pause)];
+    if (attempt.reply().size() + modbus::kAduOverhead >= Symptoms::kLongReply)
+        ++symptoms.long_answered;
+    if (attempt.echoed()) ++symptoms.echoes;
+    if (!attempt.damaged_bytes().empty()) ++symptoms.strays;
+    if (replied.trailed) ++symptoms.trailed;
+    credit_unanswered(attempt.group());
+    if (replied.back) event(StationEvent::Kind::online, station);
+    if (replied.drift) event(StationEvent::Kind::drift, station, *replied.drift);
+    if (replied.trail) event(StationEvent::Kind::trail, station, *replied.trail);
+    symptoms.mute_in_a_row = 0;
+}
+
+void Outbox::on_failed(const Attempt& attempt, Verdict verdict) {
+    Symptoms& symptoms = symptoms_of(attempt.group().station);
+    if (attempt.echoed()) ++symptoms.echoes;
+    if (verdict == Verdict::damaged) ++of(attempt.group().station).damaged_frames;
+    if (verdict != Verdict::silent) symptoms.mute_in_a_row = 0;
+    if (attempt.echo().mismatch()) {
+        ++symptoms.collided;
+        symptoms.mute_in_a_row = 0;
+    } else if (verdict == Verdict::wrong) {
+        ++symptoms.wrong;
+        if (attempt.refused_other()) ++symptoms.wrong_exceptions;
+    } else if (!attempt.damaged_bytes().empty()) {
+        count_damaged(attempt);
+        symptoms.mute_in_a_row = 0;
+    } else {
+        const bool silent = !attempt.heard() && !attempt.disturbed();
+        ++(silent ? symptoms.silent : symptoms.disturbed);
+        if (silent) remember_unanswered(attempt, symptoms.mute_in_a_row);
+        if (!is_search(attempt.group())) ++symptoms.mute_in_a_row;
+    }
+}
+
+/// An unanswered read that is answered when asked again gives evidence about the pause before it.
+/// An offline station gives none, nor does a register that the panel ignores.
+void Outbox::remember_unanswered(const Attempt& attempt, std::uint64_t mute_before) {
+    const Group& group = attempt.group();
+    constexpr std::uint64_t kMost = 2;  // in a row: a retry may follow another frame closely, too
+    if (!group.request.is_read()) return;
+    if (mute_before >= kMost) {
+        unanswered_.erase(group.station);
+        return;
+    }
+    Unanswered& unanswered = unanswered_[group.station];
+    if (unanswered.pdu != group.request.pdu()) unanswered = {group.request.pdu(), {}, 0};
+    if (unanswered.count < unanswered.pauses.size())
+        unanswered.pauses[unanswered.count++] = pause_class(attempt.timing().pause);
+}
+
+void Outbox::credit_unanswered(const Group& group) {
+    const auto found = unanswered_.find(group.station);
+    if (found == unanswered_.end() || found->second.pdu != group.request.pdu()) return;
+    const Unanswered& unanswered = found->second;
+    for (std::size_t i = 0; i < unanswered.count; ++i)
+        ++symptoms_of(group.station).silent_after[unanswered.pauses[i]];
+    unanswered_.erase(found);
+}
+
+/// Counts an attempt with damage instead of the reply.
+void Outbox::count_damaged(const Attempt& attempt) {
+    const Group& group = attempt.group();
+    const ByteView bytes = attempt.damaged_bytes();
+    Symptoms& symptoms = symptoms_of(group.station);
+    const auto expected = group.request.reply_length();
+    const bool head = bytes.size() >= 2 && bytes[0] == group.station &&
+                      modbus::plain_function(bytes[1]) == group.request.function();
+    if (expected && bytes.size() == *expected) {
+        ++symptoms.damaged_exact;
+    } else if (expected && bytes.size() < *expected) {
+        ++symptoms.damaged_short;
+    } else {
+        ++symptoms.damaged_long;
+    }
+    // A good frame except for the order of the CRC's bytes.
+    if (modbus::crc_ok(bytes, other(orders_.of(group.station)))) ++symptoms.crc_swapped;
+    if (modbus::ends_in_lower_case(bytes)) ++symptoms.lower_case;
+    if (head) ++symptoms.damaged_heads;
+    if (expected.value_or(bytes.size()) >= Symptoms::kLongReply) ++symptoms.long_damaged;
+    symptoms.damaged_bytes += bytes.size();
+    symptoms.damaged_odd += static_cast<std::uint64_t>(
+        std::ranges::count_if(bytes, [](std::uint8_t b) { return std::popcount(b) % 2 == 1; }));
+    symptoms.damaged_zeros += static_cast<std::uint64_t>(std::ranges::count(bytes, 0));
+}
+
+void Outbox::count_unsolicited(const modbus::Unused& part, Part what, std::uint8_t asked,
+                               Duration lateness) {
+    const bool known = what != Part::damaged && what != Part::unknown && what != Part::request;
+    Symptoms& symptoms = symptoms_of(known ? part.station : asked);
+    switch (what) {
+        case Part::damaged:
+            if (!inside_attempt_) ++symptoms.strays;
+            return;
+        case Part::echo:
+            ++symptoms.echoes;
+            return;
+        case Part::request:
+            ++symptoms.requests;
+            return;
+        case Part::late:
+            symptoms.mute_in_a_row = 0;
+            if (lateness <= Duration::zero()) return;  // after a shortened wait
+            ++symptoms.late;
+            symptoms.worst_lateness = std::max(symptoms.worst_lateness, lateness);
+            return;
+        case Part::duplicate:
+            ++symptoms.doubled;
+            return;
+        case Part::broadcast_reply:
+            ++symptoms.broadcast_replies;
+            return;
+        case Part::unasked:
+        case Part::unknown:
+            ++symptoms.unasked;
+            return;
+    }
+}
+
+}  // namespace panelgate::arbiter

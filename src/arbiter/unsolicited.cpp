@@ -1,0 +1,139 @@
+#include "panelgate/arbiter/unsolicited.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+#include "verdict.hpp"
+
+namespace panelgate::arbiter {
+
+using modbus::Unused;
+using Kind = StationEvent::Kind;
+using Part = Outbox::Part;
+
+namespace {
+
+/// True for a good frame that can only be another master's request.
+bool is_request(ByteView adu) {
+    const modbus::ReplyLength as_reply = modbus::reply_length(adu);
+    const bool fits_reply =
+        as_reply.kind == modbus::ReplyLength::Kind::known && as_reply.length == adu.size();
+    return !fits_reply && modbus::request_adu_length(adu) == adu.size();
+}
+
+Part part_of(Unsolicited kind) {
+    switch (kind) {
+        case Unsolicited::late:
+            return Part::late;
+        case Unsolicited::duplicate:
+        case Unsolicited::second:
+            return Part::duplicate;
+        case Unsolicited::unasked:
+            return Part::unasked;
+    }
+    std::abort();
+}
+
+}  // namespace
+
+void UnsolicitedFrames::hear(ByteView bytes) {
+    idle_.insert(idle_.end(), bytes.begin(), bytes.end());
+}
+
+std::vector<Unused> UnsolicitedFrames::take(std::uint8_t asked) {
+    if (serial_.mode == SerialMode::ascii) return take_delimited(asked, false);
+    return modbus::classify_heard(std::exchange(idle_, {}), asked, orders_);
+}
+
+std::vector<Unused> UnsolicitedFrames::take_delimited(std::uint8_t asked, bool good) {
+    const Bytes bytes = std::exchange(idle_, {});
+    if (bytes.empty()) return {};
+    return {modbus::told_part(bytes, asked, good && modbus::crc_ok(bytes, orders_))};
+}
+
+/// A reply to a recent broadcast, from a panel that should be silent.
+bool UnsolicitedFrames::answers_broadcast(ByteView adu) const {
+    constexpr unsigned kRecent = 4;  // requests sent since
+    return !broadcast_.empty() && sent_since_ <= kRecent &&
+           modbus::answers(modbus::pdu_of(broadcast_), modbus::pdu_of(adu));
+}
+
+Part UnsolicitedFrames::judge(TimePoint now, const Unused& part, const Stations& stations) const {
+    if (std::ranges::equal(part.bytes, last_frame_)) return Part::echo;
+    if (begins_with_request(part.bytes, last_frame_, orders_) &&
+        (part.kind == Unused::Kind::damaged || is_request(part.bytes)))
+        return Part::request;
+    if (part.kind == Unused::Kind::damaged) return Part::damaged;
+    // It must not be taken for anything else it might be.
+    if (answers_other_master(now, part.bytes)) return Part::unknown;
+    const Station* station = stations.find(part.station);
+    const bool explained = station != nullptr &&
+                           station->judge(now, modbus::pdu_of(part.bytes)) != Unsolicited::unasked;
+    if (!explained && answers_broadcast(part.bytes)) return Part::broadcast_reply;
+    return station == nullptr ? Part::unknown : Part::unasked;
+}
+
+void UnsolicitedFrames::note(TimePoint now, const std::vector<Unused>& parts, bool idle,
+                             Stations& stations, Quiet& quiet, Outbox& outbox) {
+    const TimePoint heard_at = std::min(now, quiet.since());
+    for (const Unused& part : parts) {
+        const Part what = judge(heard_at, part, stations);
+        if (what != Part::unasked) {
+            outbox.on_unsolicited(now, part, what, quiet.station());
+            if (what == Part::damaged) stations.on_damaged(heard_at, part.bytes);
+            if (what == Part::broadcast_reply) stations.on_broadcast_answered(part.station);
+            if (what == Part::damaged && idle) stations.on_trail(heard_at, replied_);
+            if (what == Part::request) foreign_requests_.on_heard(heard_at, part.bytes);
+            if (what == Part::request) let_reply_pass(now, part.bytes, stations, quiet);
+            continue;
+        }
+        const Station::Heard heard =
+            stations.of(part.station).on_unsolicited_frame(heard_at, modbus::pdu_of(part.bytes));
+        outbox.on_unsolicited(now, part, part_of(heard.kind), quiet.station(), heard.lateness);
+        if (heard.kind == Unsolicited::late) outbox.event(Kind::late, part.station, heard.lateness);
+        if (heard.back) {
+            stations.on_recovery();
+            outbox.event(Kind::online, part.station);
+        }
+        if (heard.settled) quiet.lift(now, part.station);
+    }
+}
+
+bool UnsolicitedFrames::answers_other_master(TimePoint now, ByteView adu) const {
+    constexpr Duration kLongest = 500ms;  // for a reply; its master would have asked again
+    return foreign_requests_.fit(adu, now - kLongest);
+}
+
+/// Another master asks: sending now would damage the reply to it. Wait as long as our slowest panel
+/// has needed, or a usual time.
+void UnsolicitedFrames::let_reply_pass(TimePoint now, ByteView request, const Stations& stations,
+                                       Quiet& quiet) const {
+    const std::size_t size = modbus::request_adu_length(request);
+    const ByteView pdu = modbus::pdu_of(request.first(size));
+    if (request.size() > size || request[0] == kBroadcast) return;  // its reply was heard as well
+    constexpr std::size_t kShort = modbus::kReadRequestAdu;
+    const Duration reply =
+        frame_time(serial_, modbus::reply_length_from_request(pdu).value_or(kShort));
+    const Duration think = std::clamp<Duration>(3 * stations.slowest().value_or(10ms), 20ms, 100ms);
+    quiet.rest_until(now + silent_interval(serial_) + think + reply);
+}
+
+bool UnsolicitedFrames::is_wrong_reply(TimePoint now, ByteView adu,
+                                       const Stations& stations) const {
+    if (std::ranges::equal(adu, last_frame_) || is_request(adu) || answers_broadcast(adu) ||
+        answers_other_master(now, adu))
+        return false;
+    const Station* station = stations.find(adu[0]);
+    if (station == nullptr) return false;
+    // An exception for another outstanding function may be meant for this request: asking again
+    // decides sooner than waiting.
+    const Unsolicited kind = station->judge(now, modbus::pdu_of(adu));
+    return kind == Unsolicited::unasked ||
+           (kind == Unsolicited::late && modbus::exception_of(modbus::pdu_of(adu)));
+}
+
+}  // namespace panelgate::arbiter

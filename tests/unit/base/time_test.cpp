@@ -1,0 +1,182 @@
+// Times on the wire, wall-clock time, and numbers kept by time.
+#include "panelgate/base/time.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/base/series.hpp"
+
+namespace panelgate::time_test {
+namespace {
+
+SerialFormat even(int baud) { return {baud, 8, Parity::even, 1}; }
+SerialFormat plain(int baud) { return {baud, 8, Parity::none, 1}; }
+SerialFormat ascii(int baud) { return {baud, 7, Parity::even, 1, SerialMode::ascii}; }
+
+/// Milliseconds as the table prints them: equal to the last digit printed.
+void expect_milliseconds(Duration time, double printed, double last_digit) {
+    EXPECT_NEAR(to_milliseconds(time), printed, last_digit * 0.51);
+}
+
+struct Row {
+    int baud;
+    double character_11, character_10, silence, request_8, reply_25, reply_255, longest_256;
+};
+
+/// 11 (10) bits a character; 3.5 characters of silence, 1.750 ms above 19200 (V1.02, 2.5.1.1).
+constexpr Row kRows[] = {
+    {1200, 9.1667, 8.3333, 32.083, 73.333, 229.167, 2337.500, 2346.667},
+    {2400, 4.5833, 4.1667, 16.042, 36.667, 114.583, 1168.750, 1173.333},
+    {4800, 2.2917, 2.0833, 8.021, 18.333, 57.292, 584.375, 586.667},
+    {9600, 1.1458, 1.0417, 4.010, 9.167, 28.646, 292.188, 293.333},
+    {14400, 0.7639, 0.6944, 2.674, 6.111, 19.097, 194.792, 195.556},
+    {19200, 0.5729, 0.5208, 2.005, 4.583, 14.323, 146.094, 146.667},
+    {38400, 0.2865, 0.2604, 1.750, 2.292, 7.161, 73.047, 73.333},
+    {57600, 0.1910, 0.1736, 1.750, 1.528, 4.774, 48.698, 48.889},
+    {115200, 0.0955, 0.0868, 1.750, 0.764, 2.387, 24.349, 24.444},
+};
+
+TEST(SerialFormat, HasTheTimesOfTheTable) {
+    for (const Row& row : kRows) {
+        SCOPED_TRACE(row.baud);
+        const SerialFormat format = even(row.baud);
+        expect_milliseconds(character_time(format), row.character_11, 0.0001);
+        expect_milliseconds(character_time(plain(row.baud)), row.character_10, 0.0001);
+        expect_milliseconds(silent_interval(format), row.silence, 0.001);
+        expect_milliseconds(wire_time(format, 8), row.request_8, 0.001);
+        expect_milliseconds(wire_time(format, 25), row.reply_25, 0.001);
+        expect_milliseconds(wire_time(format, 255), row.reply_255, 0.001);
+        expect_milliseconds(wire_time(format, 256), row.longest_256, 0.001);
+    }
+    EXPECT_EQ(wire_time(even(9600), 0), 0ns);
+}
+
+TEST(SerialFormat, Counts10BitsWithoutParity) {
+    const SerialFormat format = plain(38400);
+    expect_milliseconds(wire_time(format, 8), 2.0833, 0.0001);
+    expect_milliseconds(wire_time(format, 25), 6.5104, 0.0001);
+    expect_milliseconds(wire_time(format, 255), 66.4062, 0.0001);
+    EXPECT_EQ(silent_interval(format), 1750us);
+    EXPECT_EQ(silent_interval(even(19201)), 1750us);
+    EXPECT_LT(silent_interval(plain(9600)), silent_interval(even(9600))) << "by the real character";
+    EXPECT_EQ(even(9600).bits_per_character(), 11);
+    EXPECT_EQ(plain(9600).bits_per_character(), 10);
+    EXPECT_EQ((SerialFormat{9600, 8, Parity::none, 2}).bits_per_character(), 11);
+    EXPECT_EQ((SerialFormat{9600, 7, Parity::odd, 1}).bits_per_character(), 10);
+}
+
+TEST(SerialFormat, IsWrittenAsPeopleWriteIt) {
+    EXPECT_EQ(to_string(SerialFormat()), "19200 8E1") << "the standard's by default";
+    EXPECT_EQ(to_string(plain(38400)), "38400 8N1");
+    EXPECT_EQ(to_string({9600, 8, Parity::odd, 2}), "9600 8O2");
+    EXPECT_EQ(to_string(ascii(9600)), "9600 7E1 ASCII");
+}
+
+TEST(SerialFormat, AFrameOfAsciiTakesTwoCharactersAByteAndOneBesides) {
+    const SerialFormat rtu = even(9600);
+    EXPECT_EQ(frame_time(rtu, 8), wire_time(rtu, 8));
+    EXPECT_EQ(frame_time(ascii(9600), 8), wire_time(ascii(9600), 17));
+    EXPECT_EQ(frame_time(ascii(9600), 8 + 11, 2), wire_time(ascii(9600), 17 + 23));
+    EXPECT_EQ(byte_time(rtu), character_time(rtu));
+    EXPECT_EQ(byte_time(ascii(9600)), wire_time(ascii(9600), 2));
+    // The silence is the time to turn round only.
+    EXPECT_EQ(silent_interval(ascii(1200)), wire_time(ascii(1200), 2));
+    EXPECT_EQ(silent_interval(ascii(115200)), 1ms);
+}
+
+TEST(WallTime, IsWrittenAsRfc3339WithMicroseconds) {
+    using namespace std::chrono;
+    const sys_days day = 2026y / November / 22;
+    EXPECT_EQ(rfc3339(day + 7h + 5min + 9s + 250us), "2026-11-22T07:05:09.000250Z");
+    EXPECT_EQ(rfc3339(sys_days(2024y / February / 29) + 23h + 59min + 59s + 999999us),
+              "2024-02-29T23:59:59.999999Z");
+    EXPECT_EQ(rfc3339(WallTime{}), "1970-01-01T00:00:00.000000Z");
+    // A moment's is counted back from now.
+    const WallTime wall = day + 1s;
+    EXPECT_EQ(wall_time_of(TimePoint(5s), TimePoint(6s), wall), wall - 1s);
+    EXPECT_EQ(wall_time_of(TimePoint(6s), TimePoint(5s), wall), wall + 1s);
+}
+
+using Told = std::vector<std::pair<Duration, double>>;
+
+constexpr TimePoint kStart{100s};
+
+/// Four slots of 10 s; times are relative to kStart.
+class SlotRingTest : public testing::Test {
+  protected:
+    Told told(Duration now) const {
+        Told all;
+        ring.each(kStart + now,
+                  [&](TimePoint at, double value) { all.emplace_back(at - kStart, value); });
+        return all;
+    }
+    void put(Duration at, double value) { ring.put(kStart + at, value); }
+
+    SlotRing ring{10s, 4};
+};
+
+TEST_F(SlotRingTest, KeepsTheLastValueOfEachSlot) {
+    EXPECT_EQ(told(0s), Told());
+    EXPECT_FALSE(ring.at(kStart));
+    put(0s, 1);
+    put(9s, 2);
+    put(10s, 0);
+    EXPECT_EQ(told(10s), (Told{{0s, 2}, {10s, 0}}));
+    EXPECT_EQ(ring.at(kStart + 5s), 2);
+    EXPECT_EQ(ring.at(kStart + 19s), 0);
+    EXPECT_FALSE(ring.at(kStart + 20s));
+    EXPECT_FALSE(ring.at(kStart - 1s));
+}
+
+TEST_F(SlotRingTest, P10AnUnsetSlotIsAbsentAndNever0) {
+    put(0s, 1);
+    put(30s, 4);
+    EXPECT_EQ(told(30s), (Told{{0s, 1}, {30s, 4}}));
+    EXPECT_FALSE(ring.at(kStart + 15s));
+}
+
+TEST_F(SlotRingTest, ForgetsTheOldest) {
+    for (int i = 0; i < 6; ++i) put(i * 10s, i);
+    EXPECT_EQ(told(50s), (Told{{20s, 2}, {30s, 3}, {40s, 4}, {50s, 5}}));
+    put(15s, 9);
+    EXPECT_EQ(told(50s).size(), 4u) << "too late";
+    put(25s, 9);
+    EXPECT_EQ(told(50s), (Told{{20s, 9}, {30s, 3}, {40s, 4}, {50s, 5}}));
+}
+
+TEST_F(SlotRingTest, TimeAloneMakesOld) {
+    put(0s, 1);
+    put(20s, 3);
+    EXPECT_EQ(told(39s), (Told{{0s, 1}, {20s, 3}}));
+    EXPECT_EQ(told(40s), (Told{{20s, 3}}));
+    EXPECT_EQ(told(60s), Told());
+    put(100s, 7);
+    EXPECT_EQ(told(100s), (Told{{100s, 7}}));
+}
+
+TEST(SlotRing, KnowsNothingOfBeforeTheClockBegan) {
+    SlotRing young(10s, 7);
+    std::vector<double> values;
+    young.put(TimePoint{15s}, 1);
+    young.put(TimePoint{25s}, 2);
+    young.each(TimePoint{25s}, [&](TimePoint, double value) { values.push_back(value); });
+    EXPECT_EQ(values, (std::vector<double>{1, 2}));
+}
+
+TEST(SlotWidth, IsTheNarrowestThatStaysBelowTheLimit) {
+    constexpr std::size_t kHour = 3600 * SlotRing::kBytes;
+    EXPECT_EQ(slot_width(1, 1h, 1s, kHour), 1s);
+    EXPECT_EQ(slot_width(2, 1h, 1s, kHour), 2s);
+    EXPECT_EQ(slot_width(3, 1h, 1s, kHour), 5s);
+    EXPECT_EQ(slot_width(1, 1h, 5s, kHour), 5s);
+    EXPECT_EQ(slot_width(0, 1h, 1s, 0), 1s);
+    EXPECT_EQ(slot_width(1'000'000, 1h, 1s, kHour), 600s);
+}
+
+}  // namespace
+}  // namespace panelgate::time_test
