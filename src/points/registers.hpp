@@ -44,6 +44,7 @@ class Scaling {
 
     double scale_;
     double offset_;
+    std::optional<double> divisor_;  ///< n if the value is raw / n
     Decimal decimal_scale_;
     Decimal decimal_offset_;
     std::optional<Whole> whole_;  ///< nullopt: too many digits between them

@@ -41,7 +41,8 @@ constexpr const char* kResting = R"(lines:
   - {name: a, device: sim, quarantine: line, timing: {late_window: 5s}, stations: [{id: 1, name: x}]}
   - {name: b, device: sim, quarantine: line, timing: {response_timeout: 300ms}, stations: [{id: 2, name: y}]}
   - {name: c, device: sim, stations: [{id: 3, name: z}]}
-  - {name: d, device: /dev/ttyS0, mode: listen, stations: [{id: 4, name: t, points: [{name: p, at: "400001"}]}]}
+  - {name: d, device: /dev/ttyS0, mode: listen,
+     stations: [{id: 4, name: t, points: [{name: p, at: "400001"}]}]}
 http: {listen: "127.0.0.1:8080"}
 )";
 

@@ -3,6 +3,10 @@
 #include <gmock/gmock.h>
 
 #include <boost/asio/io_context.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
 #include <string>
 
 #include "panelgate/sim/station.hpp"
@@ -52,6 +56,11 @@ class DiscoveriesTest : public testing::Test {
             io.poll();
         }
     }
+    void start_and_run(const char* stations, unsigned share_percent) {
+        EXPECT_FALSE(discoveries.start("floor1", stations, share_percent));
+        EXPECT_EQ(report().state, State::running);
+        run();
+    }
     web::DiscoveryReport report() const { return discoveries.report("floor1"); }
 
     boost::asio::io_context io;
@@ -76,9 +85,7 @@ class DiscoveriesTest : public testing::Test {
 TEST_F(DiscoveriesTest, FindsAnUnlistedPanelAndSaysWhatToPaste) {
     EXPECT_EQ(report().state, State::never);
     const TimePoint began = clock.now();
-    EXPECT_FALSE(discoveries.start("floor1", "18-31", 10));
-    EXPECT_EQ(report().state, State::running);
-    run();
+    start_and_run("18-31", 10);
     const web::DiscoveryReport told = report();
     EXPECT_EQ(told.state, State::done);
     EXPECT_EQ(told.asked, 13u);
@@ -99,8 +106,7 @@ TEST_F(DiscoveriesTest, FindsAnUnlistedPanelAndSaysWhatToPaste) {
 }
 
 TEST_F(DiscoveriesTest, TellsHowFarItIs) {
-    discoveries.start("floor1", "18-20", 50);
-    run();
+    start_and_run("18-20", 50);
     const std::string text = listener->take();
     EXPECT_THAT(text, HasSubstr(R"(event: discovery)"));
     EXPECT_THAT(text, HasSubstr(R"({"line":"floor1","state":"running","asked":1,"of":3,)"));
@@ -109,8 +115,7 @@ TEST_F(DiscoveriesTest, TellsHowFarItIs) {
 
 TEST_F(DiscoveriesTest, SomebodyEndsItAndWhatWasFoundStays) {
     unanswered = 22;
-    discoveries.start("floor1", "18-40", 50);
-    run();
+    start_and_run("18-40", 50);
     EXPECT_EQ(report().state, State::running);
     EXPECT_EQ(bus.open(), 1u);
     discoveries.stop("floor1");
@@ -125,8 +130,7 @@ TEST_F(DiscoveriesTest, SomebodyEndsItAndWhatWasFoundStays) {
 }
 
 TEST_F(DiscoveriesTest, CanBeDoneAgain) {
-    discoveries.start("floor1", "20", 50);
-    run();
+    start_and_run("20", 50);
     unanswered = 21;
     EXPECT_FALSE(discoveries.start("floor1", "21", 20));
     EXPECT_EQ(report().state, State::running);
@@ -144,16 +148,14 @@ TEST_F(DiscoveriesTest, WhoAnsweredLateIsAskedOnceMore) {
         }
         return answer(request);
     };
-    discoveries.start("floor1", "20-22", 50);
-    run();
+    start_and_run("20-22", 50);
     ASSERT_EQ(report().stations.size(), 1u);
     EXPECT_THAT(report().stations[0].evidence, HasSubstr("answers late"));
 }
 
 TEST_F(DiscoveriesTest, WhomTheLineRefusesToAskIsTriedAgainAFewTimes) {
     bus.script = [](const bus::Request&) { return test::FakeBus::fault(Fault::offline, false); };
-    discoveries.start("floor1", "1-30", 10);
-    run();
+    start_and_run("1-30", 10);
     EXPECT_EQ(report().state, State::done);
     EXPECT_EQ(bus.requests.size(), 5u * 30u);
     EXPECT_EQ(report().asked, 0u);
@@ -162,8 +164,7 @@ TEST_F(DiscoveriesTest, WhomTheLineRefusesToAskIsTriedAgainAFewTimes) {
 
 TEST_F(DiscoveriesTest, GivesUpOnALineThatTakesNothing) {
     bus.script = [](const bus::Request&) { return test::FakeBus::fault(Fault::line_down, false); };
-    discoveries.start("floor1", "1-30", 10);
-    run();
+    start_and_run("1-30", 10);
     EXPECT_EQ(report().state, State::stopped);
     EXPECT_EQ(report().asked, 0u);
 }

@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <boost/asio/io_context.hpp>
+#include <cstdint>
 #include <functional>
-#include <memory>
 #include <sstream>
+#include <string>
+#include <utility>
 
 #include "plant.hpp"
 #include "support/fake_bus.hpp"

@@ -68,11 +68,11 @@ TEST(MovedUnits, IsSilentWhereTheyReachNobodyOrAreNamed) {
 }
 
 TEST(MovedUnits, TellsOfAliasesThatAreSwapped) {
-    EXPECT_EQ(told(two_lines("", "lines: [a, b], units: {101: a/1, 102: b/2}"),
-                   two_lines("", "lines: [a, b], units: {101: b/2, 102: a/1}")),
-              moved("101 of 127.0.0.1:1502", "'one' of line a", "'two' of line b", "101: a/one") +
-                  moved("102 of 127.0.0.1:1502", "'two' of line b", "'one' of line a",
-                        "102: b/two"));
+    EXPECT_EQ(
+        told(two_lines("", "lines: [a, b], units: {101: a/1, 102: b/2}"),
+             two_lines("", "lines: [a, b], units: {101: b/2, 102: a/1}")),
+        moved("101 of 127.0.0.1:1502", "'one' of line a", "'two' of line b", "101: a/one") +
+            moved("102 of 127.0.0.1:1502", "'two' of line b", "'one' of line a", "102: b/two"));
 }
 
 TEST(MovedUnits, TellsOfStationsThatHaveSwappedTheirIds) {
@@ -122,9 +122,9 @@ TEST(MovedUnits, AreThoseOfSerialMastersAsWell) {
                units + "}]\n";
     };
     const std::string before = master(", units: {101: a/1}");
-    EXPECT_EQ(told(before, master(", units: {101: a/2}")),
-              moved("101 of serial master plc", "'one' of line a", "'two' of line a",
-                    "101: a/one"));
+    EXPECT_EQ(
+        told(before, master(", units: {101: a/2}")),
+        moved("101 of serial master plc", "'one' of line a", "'two' of line a", "101: a/one"));
     EXPECT_EQ(told(before, master("")), "") << "it is not answered for 101";
 }
 

@@ -1,5 +1,5 @@
-// What stands around serving: families and limits of listeners, how they open, where HTTP listens,
-// and how long the end waits.
+// What stands around serving: families and limits of listeners, how they open, and how long the end
+// waits.
 #include <gmock/gmock.h>
 
 #include <boost/system/errc.hpp>
@@ -8,11 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "http_door.hpp"
+#include "command_run.hpp"
+#include "load.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/rt/log.hpp"
-#include "load.hpp"
-#include "command_run.hpp"
 #include "servers.hpp"
 #include "support/manual_clock.hpp"
 
@@ -22,43 +21,30 @@ namespace {
 namespace errc = boost::system::errc;
 using ::testing::HasSubstr;
 
-class AddressFamilies : public testing::Test {
-  protected:
-    /// The setting of the last of these listeners.
-    bool last_is_six_only() {
+TEST(AddressFamilies, AllAddressesOfIpv6AreThoseOfIpv4WhereNobodyElseHasThePort) {
+    const struct {
+        const char* before;  ///< another listener's address, or none
+        std::uint16_t port;  ///< ... and port
+        std::uint16_t six;   ///< port of the listener on all addresses of IPv6
+        std::uint16_t http;  ///< port of http on 127.0.0.1, or 0 for none
+        bool ipv6_only;
+    } kRows[] = {
+        {"0.0.0.0", 1502, 502, 0, false}, {"0.0.0.0", 502, 502, 0, true},
+        {nullptr, 0, 502, 0, false},      {nullptr, 0, 502, 502, true},
+        {"127.0.0.1", 0, 0, 0, false},  // any free port is never the same
+    };
+    for (const auto& row : kRows) {
+        config::Config config;
+        config.modbus_tcp.resize(row.before != nullptr ? 2 : 1);
+        if (row.before != nullptr) config.modbus_tcp[0].address = row.before;
+        config.modbus_tcp[0].port = row.port;
+        config.modbus_tcp.back().address = "::";
+        config.modbus_tcp.back().port = row.six;
+        if (row.http != 0) config.http.emplace().port = row.http;
         separate_families(config);
-        return config.modbus_tcp.back().ipv6_only;
+        EXPECT_EQ(config.modbus_tcp.back().ipv6_only, row.ipv6_only) << &row - kRows;
+        if (row.before != nullptr) EXPECT_FALSE(config.modbus_tcp.front().ipv6_only);
     }
-    void add(const char* address, std::uint16_t port) {
-        config.modbus_tcp.emplace_back();
-        config.modbus_tcp.back().address = address;
-        config.modbus_tcp.back().port = port;
-    }
-    config::Config config;
-};
-
-TEST_F(AddressFamilies, AllAddressesOfIpv6AreThoseOfIpv4WhereNobodyElseHasThem) {
-    add("0.0.0.0", 1502);
-    add("::", 502);
-    EXPECT_FALSE(last_is_six_only());
-}
-
-TEST_F(AddressFamilies, EachHasItsOwnKindOnOnePort) {
-    add("0.0.0.0", 502);
-    add("::", 502);
-    EXPECT_TRUE(last_is_six_only());
-    EXPECT_FALSE(config.modbus_tcp.front().ipv6_only);
-    config.modbus_tcp.erase(config.modbus_tcp.begin());
-    EXPECT_FALSE(last_is_six_only());
-    config.http.emplace();
-    config.http->port = 502;  // on 127.0.0.1
-    EXPECT_TRUE(last_is_six_only());
-}
-
-TEST_F(AddressFamilies, AnyFreePortIsNeverTheSame) {
-    add("127.0.0.1", 0);
-    add("::", 0);
-    EXPECT_FALSE(last_is_six_only());
 }
 
 class ConnectionLimits : public testing::Test {
@@ -184,39 +170,6 @@ TEST_F(OpeningsTest, WhatTimeDoesNotMendIsToldWithWhatHelps) {
     first = errc::address_family_not_supported;
     EXPECT_THAT(refusal(), HasSubstr("IPv6 is off"));
     EXPECT_EQ(listening_advice(errc::make_error_code(errc::permission_denied), 1502), "");
-}
-
-/// Texts that are no YAML, and where their http section listens.
-const struct {
-    const char* text;
-    const char* listen;
-} kTexts[] = {
-    {"lines: [\nhttp:\n  listen: 127.0.0.1:8081\n", "127.0.0.1:8081"},
-    {"http: {listen: 127.0.0.1:8081, anonymous: operator}\nlines: [", "127.0.0.1:8081"},
-    {"http: {anonymous: none, listen: \"[::1]:8081\"}\r\nlines: [", "[::1]:8081"},
-    {"http:   # ours\r\n\r\n\tlisten: '0.0.0.0:80' # all\r\n}", "0.0.0.0:80"},
-    {"\xEF\xBB\xBFhttp: {listen: 127.0.0.1:1}\n[", "127.0.0.1:1"},
-    // Of others.
-    {"", ""},
-    {"modbus_tcp:\n  - listen: 127.0.0.1:502\nhttp:\n  hosts: [x]\nlog: [", ""},
-    {"#http: {listen: 127.0.0.1:1}\nhttp:\n# listen: 127.0.0.1:2\n", ""},
-    {"http: {hosts: [a]}\nmodbus_tcp: [{listen: 127.0.0.1:502}]\n[", ""},
-    {"http:\n  relisten: 127.0.0.1:2\n", ""},
-    // Deeper.
-    {"http: {tls: {listen: 127.0.0.1:1}}\n[", ""},
-    {"http: {tls: {listen: 127.0.0.1:1}, listen: 127.0.0.1:2}\n[", "127.0.0.1:2"},
-    {"http:\n  tokens:\n    - listen: 127.0.0.1:1\n[", ""},
-    {"http:\n  tls:\n    listen: 127.0.0.1:1\n  listen: 127.0.0.1:2\n[", "127.0.0.1:2"},
-    // Of two none is taken.
-    {"<<<<<<< ours\nhttp: {listen: 127.0.0.1:1}\n=======\n"
-     "http: {listen: 127.0.0.1:2}\n>>>>>>> theirs\n",
-     ""},
-    {"http: {listen: 127.0.0.1:1}\nhttp: {anonymous: none}\n", ""},
-    {"http: {listen: 127.0.0.1:1}\nhttp: {listen: 127.0.0.1:1}\n", "127.0.0.1:1"},
-};
-
-TEST(ListenInText, IsFoundInATextThatIsNoYamlUnlessItIsNotItsOwn) {
-    for (const auto& row : kTexts) EXPECT_EQ(http_listen_in(row.text), row.listen) << row.text;
 }
 
 TEST(Ending, P3WaitsForTheLongestAnswerAndForTenSecondsAtLeast) {

@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/attempts.hpp"
@@ -17,12 +21,13 @@ using test::group_of;
 constexpr std::uint8_t kStation = 17;
 const Bytes kRead = "03 00 6B 00 03"_hex;
 const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
+const Bytes kReplyAdu = encode_adu(kStation, kReply);
 const Bytes kOtherReply = "03 06 02 2B 00 00 00 65"_hex;
 const Bytes kOfOtherShape = "03 04 00 01 00 02"_hex;
 
-Attempt::Timing timing_of(Duration patience, Duration usual) {
-    Attempt::Timing timing = Attempt::timing_of(Settings{}, TimePoint{1h}, 8, Duration::zero());
-    timing.patience = patience;
+Attempt::Timing timing_of(Duration usual, const Settings& line = {}) {
+    Attempt::Timing timing = Attempt::timing_of(line, TimePoint{1h}, 8, Duration::zero());
+    timing.patience = 500ms;
     timing.usual = usual;
     return timing;
 }
@@ -44,8 +49,14 @@ class AttemptTest : public testing::Test {
         ADD_FAILURE() << "it never ends";
         return Verdict::open;
     }
+    /// What came beside the reply was this frame alone.
+    void expect_unsolicited(const Bytes& adu) {
+        const auto unsolicited = attempt_.take_unsolicited();
+        ASSERT_EQ(unsolicited.size(), 1u);
+        EXPECT_EQ(unsolicited[0].bytes, adu);
+    }
 
-    Attempt attempt_{group_of(kStation, kRead), timing_of(500ms, 100ms), {}};
+    Attempt attempt_{group_of(kStation, kRead), timing_of(100ms), {}};
     bool other_frame_ends_ = true;
     Attempt::Ends ends_ = [this](ByteView) { return other_frame_ends_; };
     Duration ended_{};
@@ -61,23 +72,22 @@ TEST_F(AttemptTest, IsSilentWhenItsPatienceIsOverAndNotBefore) {
 TEST_F(AttemptTest, AReplyMayComeBehindNoiseAndBehindAnotherStationsFrame) {
     EXPECT_EQ(hear(5ms, "FF 00 FF"_hex), Verdict::open);
     EXPECT_EQ(hear(20ms, encode_adu(kStation + 1, kReply)), Verdict::open);
-    EXPECT_EQ(hear(40ms, encode_adu(kStation, kReply)), Verdict::replied);
+    EXPECT_EQ(hear(40ms, kReplyAdu), Verdict::replied);
     EXPECT_EQ(attempt_.reply(), kReply);
     EXPECT_FALSE(attempt_.take_unsolicited().empty());
 }
 
 TEST_F(AttemptTest, AHoleInAReplyIsWaitedForAndALongerOneMakesItDamage) {
-    const Bytes adu = encode_adu(kStation, kReply);
-    const Bytes front(adu.begin(), adu.begin() + 5);
-    const Bytes rest(adu.begin() + 5, adu.end());
+    const Bytes front(kReplyAdu.begin(), kReplyAdu.begin() + 5);
+    const Bytes rest(kReplyAdu.begin() + 5, kReplyAdu.end());
     const Duration hole = attempt_.timing().hole;
     EXPECT_EQ(hear(10ms, front), Verdict::open);
     Attempt late = attempt_;
     EXPECT_EQ(attempt_.on_deadline(attempt_.last_byte() + hole - 1ns, ends_), Verdict::open);
     EXPECT_EQ(hear(10ms + hole - 1ns, rest), Verdict::replied);
-    EXPECT_EQ(late.on_deadline(late.last_byte() + hole, ends_), Verdict::open);
-    EXPECT_EQ(late.on_rx(late.last_byte() + hole + 1ms, rest, ends_), Verdict::open);
     std::swap(attempt_, late);
+    EXPECT_EQ(attempt_.on_deadline(attempt_.last_byte() + hole, ends_), Verdict::open);
+    EXPECT_EQ(hear(10ms + hole + 1ms, rest), Verdict::open);
     EXPECT_EQ(run_to_verdict(), Verdict::damaged);
 }
 
@@ -90,7 +100,7 @@ TEST_F(AttemptTest, DamageDoesNotEndItBeforeTheStationsUsualTime) {
     EXPECT_FALSE(attempt_.damaged_bytes().empty());
     std::swap(attempt_, other);
     EXPECT_EQ(attempt_.on_deadline(attempt_.deadline(), ends_), Verdict::open);
-    EXPECT_EQ(hear(90ms, encode_adu(kStation, kReply)), Verdict::replied);
+    EXPECT_EQ(hear(90ms, kReplyAdu), Verdict::replied);
 }
 
 TEST_F(AttemptTest, AGoodFrameOfTheStationThatDoesNotAnswerEndsItUnlessUnsolicited) {
@@ -99,21 +109,19 @@ TEST_F(AttemptTest, AGoodFrameOfTheStationThatDoesNotAnswerEndsItUnlessUnsolicit
     std::swap(attempt_, other);
     other_frame_ends_ = false;
     EXPECT_EQ(hear(10ms, encode_adu(kStation, kOfOtherShape)), Verdict::open);
-    EXPECT_EQ(hear(50ms, encode_adu(kStation, kReply)), Verdict::replied);
+    EXPECT_EQ(hear(50ms, kReplyAdu), Verdict::replied);
 }
 
 TEST_F(AttemptTest, P1ARejectedReplyCountsAsHeardAndTheNextOneAnswers) {
-    ASSERT_EQ(hear(10ms, encode_adu(kStation, kReply)), Verdict::replied);
+    ASSERT_EQ(hear(10ms, kReplyAdu), Verdict::replied);
     attempt_.reject_reply();
-    const auto unsolicited = attempt_.take_unsolicited();
-    ASSERT_EQ(unsolicited.size(), 1u);
-    EXPECT_EQ(unsolicited[0].bytes, encode_adu(kStation, kReply));
+    expect_unsolicited(kReplyAdu);
     EXPECT_EQ(hear(50ms, encode_adu(kStation, kOtherReply)), Verdict::replied);
     EXPECT_EQ(attempt_.reply(), kOtherReply);
 }
 
 TEST_F(AttemptTest, P1ACandidateAnswersWhenNothingElseCameInTheTimeThatTheStationNeeds) {
-    ASSERT_EQ(hear(10ms, encode_adu(kStation, kReply)), Verdict::replied);
+    ASSERT_EQ(hear(10ms, kReplyAdu), Verdict::replied);
     attempt_.keep_candidate(60ms, false);
     Attempt other = attempt_;
     EXPECT_EQ(hear(15ms, "FF FF"_hex), Verdict::open);
@@ -124,23 +132,21 @@ TEST_F(AttemptTest, P1ACandidateAnswersWhenNothingElseCameInTheTimeThatTheStatio
     std::swap(attempt_, other);
     EXPECT_EQ(hear(50ms, encode_adu(kStation, kOtherReply)), Verdict::replied);
     EXPECT_EQ(attempt_.reply(), kOtherReply);
-    const auto unsolicited = attempt_.take_unsolicited();
-    ASSERT_EQ(unsolicited.size(), 1u);
-    EXPECT_EQ(unsolicited[0].bytes, encode_adu(kStation, kReply));
+    expect_unsolicited(kReplyAdu);
 }
 
 TEST_F(AttemptTest, P1WhereDuplicatesAreKnownTheCandidateIsNoAnswer) {
-    ASSERT_EQ(hear(10ms, encode_adu(kStation, kReply)), Verdict::replied);
+    ASSERT_EQ(hear(10ms, kReplyAdu), Verdict::replied);
     attempt_.keep_candidate(60ms, true);
     EXPECT_EQ(run_to_verdict(), Verdict::doubtful) << "and it is asked once more";
-    EXPECT_EQ(ended_, Duration(70ms)) << "a copy may have kept it from saying its own";
-    EXPECT_TRUE(attempt_.take_unsolicited().empty()) << "it proves no copy either";
+    EXPECT_EQ(ended_, Duration(70ms)) << "a duplicate may have kept it from saying its own";
+    EXPECT_TRUE(attempt_.take_unsolicited().empty()) << "it proves no duplicate either";
 }
 
 TEST_F(AttemptTest, P1ACandidateThatComesOnceMoreIsTheAnswerAndShowsNoDuplicate) {
-    ASSERT_EQ(hear(10ms, encode_adu(kStation, kReply)), Verdict::replied);
+    ASSERT_EQ(hear(10ms, kReplyAdu), Verdict::replied);
     attempt_.keep_candidate(60ms, true);
-    EXPECT_EQ(hear(30ms, encode_adu(kStation, kReply)), Verdict::replied);
+    EXPECT_EQ(hear(30ms, kReplyAdu), Verdict::replied);
     EXPECT_EQ(attempt_.reply(), kReply);
     EXPECT_TRUE(attempt_.take_unsolicited().empty());
 }
@@ -157,6 +163,195 @@ TEST_F(AttemptTest, P6NoReadJoinsARepeatedOne) {
     EXPECT_FALSE(first.can_join(timing.sent - whole / 100, job)) << "the rate may be off";
     EXPECT_FALSE(attempt_.can_join(leaving, job)) << "the far end may have it already";
     EXPECT_FALSE(retry.can_join(leaving, job));
+}
+
+const Duration kCharacter = character_time(SerialFormat{});
+
+/// Which bytes must be read at once and which need not, while a reply of 11 bytes comes.
+class AttemptPaceTest : public testing::Test {
+  protected:
+    static Attempt attempt_of(const Attempt::Timing& timing, EchoFilter echo = {}) {
+        return {group_of(kStation, kRead), timing, std::move(echo)};
+    }
+    static Attempt::Timing as_asked() {
+        Attempt::Timing timing = timing_of(500ms);
+        timing.as_asked = true;
+        return timing;
+    }
+    /// These bytes are read, so many characters after start_.
+    Verdict read(std::size_t characters, ByteView bytes, Duration late = {}) {
+        now_ = start_ + characters * kCharacter + late;
+        return attempt_.on_rx(now_, bytes, [](ByteView) { return true; });
+    }
+    /// Bytes `from` to `to` of the reply, whose byte n is there n + 1 characters after start_.
+    Verdict hear(std::size_t from, std::size_t to, Duration late = {}) {
+        return read(to, ByteView(kReplyAdu).subspan(from, to - from), late);
+    }
+    /// After the reply's start.
+    std::optional<Duration> busy() const {
+        const auto until = attempt_.busy_until();
+        return until && *until > now_ ? std::optional(*until - start_) : std::nullopt;
+    }
+
+    Attempt attempt_ = attempt_of(timing_of(500ms));
+    TimePoint start_ = attempt_.timing().sent + 5ms;
+    TimePoint now_{};
+    const Bytes frame_ = encode_adu(kStation, kRead);
+};
+
+/// These bytes of the reply are read, and nothing more is wanted for so long.
+struct Look {
+    std::size_t from;
+    std::size_t to;
+    Duration late;
+    std::optional<Duration> busy;  ///< after the reply's start
+};
+
+TEST_F(AttemptPaceTest, TheReplyIsLookedAtWhenItsHeaderAndWhenAllOfItIsThere) {
+    const Duration header = 3 * kCharacter;
+    const Duration whole = 11 * kCharacter;
+    Attempt::Timing sooner = timing_of(500ms);
+    sooner.wake_latency = 40us;
+    for (int i = 0; i < 50; ++i) sooner.drift.on_look(whole, true);
+    Settings tcp;
+    tcp.may_stall = true;
+    struct Row {
+        const char* what;
+        Attempt::Timing timing;
+        std::vector<Look> looks;
+    };
+    const Row rows[] = {
+        {"as a rule", timing_of(500ms), {{0, 1, 0ms, header}, {1, 3, 0ms, whole}}},
+        {"usually as asked", as_asked(), {{0, 1, 0ms, whole}}},
+        {"a look before its time", as_asked(), {{0, 1, 0ms, whole}, {1, 5, 0ms, whole}}},
+        {"a late look, then a better one",
+         timing_of(500ms),
+         {{0, 1, kCharacter / 2, header + kCharacter / 2}, {1, 3, 0ms, whole}}},
+        {"its end, where replies end sooner",
+         sooner,
+         {{0, 1, 0ms, header}, {1, 3, 0ms, whole - 40us - sooner.drift.early(whole)}}},
+        {"over TCP nothing has a rate", timing_of(500ms, tcp), {{0, 1, 0ms, std::nullopt}}},
+    };
+    for (const Row& row : rows) {
+        SCOPED_TRACE(row.what);
+        attempt_ = attempt_of(row.timing);
+        EXPECT_EQ(attempt_.busy_until(), std::nullopt) << "each byte, until it has begun";
+        for (const Look& look : row.looks) {
+            hear(look.from, look.to, look.late);
+            EXPECT_EQ(busy(), look.busy);
+            EXPECT_FALSE(attempt_.end_look());
+        }
+        EXPECT_EQ(hear(row.looks.back().to, 11), Verdict::replied);
+    }
+}
+
+TEST_F(AttemptPaceTest, ReportsWhetherTheReplyWasThereWhenItsEndWasLookedAt) {
+    for (const std::size_t there : {std::size_t{10}, std::size_t{11}}) {
+        attempt_ = attempt_of(as_asked());
+        hear(0, 1);
+        EXPECT_FALSE(attempt_.end_look());
+        hear(1, there, kCharacter);
+        ASSERT_TRUE(attempt_.end_look());
+        EXPECT_EQ(attempt_.end_look()->reply, 11 * kCharacter);
+        EXPECT_EQ(attempt_.end_look()->whole, there == 11);
+        EXPECT_EQ(busy(), std::nullopt) << "the last byte is wanted when it comes";
+    }
+}
+
+TEST_F(AttemptPaceTest, AnUnexpectedExceptionShowsNothingAboutTheEndAndWhenItBeganIsKnown) {
+    attempt_ = attempt_of(as_asked());
+    hear(0, 1);
+    EXPECT_EQ(read(11, "83 02 C1 34"_hex), Verdict::replied);
+    EXPECT_TRUE(attempt_.unexpected_exception());
+    EXPECT_FALSE(attempt_.end_look());
+    EXPECT_EQ(attempt_.first_sign(now_), 5ms + kCharacter);
+}
+
+TEST_F(AttemptPaceTest, AShortReplyIsSleptThroughAllTheSame) {
+    Settings line;
+    line.serial.baud = 921600;
+    Attempt::Timing timing = timing_of(500ms, line);
+    timing.wake_latency = WakeLatency::kMost;
+    timing.as_asked = true;
+    attempt_ = attempt_of(timing);
+    const Duration character = character_time(line.serial);
+    const Duration reply = 11 * character;
+    read(0, ByteView(kReplyAdu).first(1));
+    EXPECT_EQ(attempt_.busy_until(), now_ - character + reply - reply / 4);
+}
+
+TEST_F(AttemptPaceTest, AnExceptionIsNotWaitedForLongerThanItIs) {
+    read(3, "11 83 02"_hex);
+    EXPECT_EQ(busy(), 5 * kCharacter);
+}
+
+TEST_F(AttemptPaceTest, BytesThatAreLateAreWantedOneByOneUntilTheNextDecides) {
+    hear(0, 3);
+    start_ += 4ms;  // a hole
+    read(7, ByteView(kReplyAdu).subspan(3, 1));
+    EXPECT_EQ(busy(), std::nullopt);
+    read(7, ByteView(kReplyAdu).subspan(4, 3));
+    EXPECT_EQ(busy(), 11 * kCharacter);
+}
+
+TEST_F(AttemptPaceTest, WhatIsNoReplyIsWantedByteByByte) {
+    read(0, "FF 00"_hex);
+    EXPECT_EQ(attempt_.busy_until(), std::nullopt);
+}
+
+TEST_F(AttemptPaceTest, WhatComesFasterThanTheLineIsWantedAtOnce) {
+    attempt_ = Attempt(group_of(kStation, "03 00 6B 00 64"_hex), timing_of(500ms), {});
+    read(0, "11 03 C8"_hex);
+    EXPECT_TRUE(busy());
+    EXPECT_FALSE(attempt_.hasty());
+    read(0, Bytes(62, 7), 1ms);  // an adapter on USB that knows of no rate
+    EXPECT_TRUE(attempt_.hasty());
+    EXPECT_EQ(attempt_.busy_until(), std::nullopt);
+}
+
+TEST_F(AttemptPaceTest, ALongReplyIsLookedAtBeforeItsEndBecauseItMayHaveBeenCutShort) {
+    attempt_ = Attempt(group_of(kStation, "03 00 6B 00 64"_hex), timing_of(500ms), {});
+    read(3, "11 03 C8"_hex);
+    EXPECT_EQ(busy(), 3 * kCharacter + 30ms);
+    const std::size_t come = static_cast<std::size_t>(30ms / kCharacter);
+    read(3 + come, Bytes(come, 7));
+    EXPECT_EQ(busy(), 2 * (3 + come) * kCharacter) << "as long again";
+}
+
+TEST_F(AttemptPaceTest, WhenLessHasComeThanTheLineBringsEachByteIsWanted) {
+    hear(0, 3);
+    read(10, ByteView(kReplyAdu).subspan(3, 2));
+    EXPECT_EQ(attempt_.busy_until(), std::nullopt);
+}
+
+TEST_F(AttemptPaceTest, WhatBeginsLikeAnUnexpectedEchoIsLookedAtWhenTheReplyIsThere) {
+    attempt_ = attempt_of(as_asked(), {frame_, EchoFilter::Expect::perhaps});
+    hear(0, 1);
+    EXPECT_EQ(busy(), 11 * kCharacter);
+    EXPECT_EQ(hear(1, 11), Verdict::replied);
+    EXPECT_EQ(attempt_.first_sign(now_), 5ms + kCharacter) << "it began with the first byte";
+}
+
+TEST_F(AttemptPaceTest, AnEchoThatIsCertainIsLookedAtWhenAllOfItIsThere) {
+    attempt_ = attempt_of(as_asked(), {frame_, EchoFilter::Expect::certainly});
+    start_ = attempt_.timing().started;
+    read(1, ByteView(frame_).first(1));
+    EXPECT_EQ(busy(), 8 * kCharacter);
+    read(8, ByteView(frame_).subspan(1));
+    EXPECT_EQ(busy(), std::nullopt);
+    start_ = attempt_.timing().sent + 5ms;
+    hear(0, 1);
+    EXPECT_EQ(busy(), 11 * kCharacter);
+    EXPECT_EQ(hear(1, 11), Verdict::replied);
+}
+
+TEST_F(AttemptPaceTest, AnEchoIsLookedAtWhenItCanHaveComeBack) {
+    attempt_ = attempt_of(timing_of(500ms), {frame_, EchoFilter::Expect::perhaps});
+    start_ = attempt_.timing().started;
+    read(3, ByteView(frame_).first(3));
+    EXPECT_EQ(busy(), 8 * kCharacter);
+    read(8, ByteView(frame_).subspan(3));
+    EXPECT_EQ(attempt_.busy_until(), std::nullopt);
 }
 
 }  // namespace

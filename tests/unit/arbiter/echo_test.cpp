@@ -1,53 +1,52 @@
+// The line hears what it sends: that is learned, taken out, and confirms no write (P8).
 #include "panelgate/arbiter/echo.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstddef>
 
-#include "echo_fixture.hpp"
-#include "panelgate/modbus/function.hpp"
+#include "arbiter_fixture.hpp"
+#include "panelgate/arbiter/reply_times.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::arbiter::echo::echo_test {
+namespace panelgate::arbiter::echo_test {
 namespace {
 
 using Expect = EchoFilter::Expect;
+using modbus::encode_adu;
+using test::request_of;
 
+const Bytes kWriteCoil = "05 00 01 FF 00"_hex;
 const Bytes kFrame = "11 06 00 01 00 03 9A 9B"_hex;
+constexpr int kNoMore = 16;  ///< replies without an echo after which a known one is gone
 
 Bytes copy(ByteView bytes) { return {bytes.begin(), bytes.end()}; }
 
 TEST(EchoFilter, TakesTheWholeFrameOutInAnyPieces) {
+    const Bytes all = Writer().raw(kFrame).u8(0xAA).u8(0xBB).take();
     for (std::size_t piece = 1; piece <= kFrame.size(); ++piece) {
         EchoFilter filter(kFrame, Expect::certainly);
-        Bytes rest;
-        Bytes all = kFrame;
-        all.insert(all.end(), {0xAA, 0xBB});
-        for (std::size_t at = 0; at < all.size(); at += piece) {
-            const auto part = ByteView(all).subspan(at, std::min(piece, all.size() - at));
-            const Bytes left = copy(filter.feed(part));
-            rest.insert(rest.end(), left.begin(), left.end());
-        }
-        EXPECT_EQ(rest, "AA BB"_hex);
+        Writer rest;
+        for (std::size_t at = 0; at < all.size(); at += piece)
+            rest.raw(filter.feed(ByteView(all).subspan(at, std::min(piece, all.size() - at))));
+        EXPECT_EQ(rest.take(), "AA BB"_hex);
         EXPECT_TRUE(filter.complete());
         EXPECT_FALSE(filter.mismatch());
     }
 }
 
 TEST(EchoFilter, DetectsADifferenceAndReturnsWhatItBuffered) {
-    EchoFilter sure(kFrame, Expect::certainly);
-    EXPECT_TRUE(sure.feed("11 06 00"_hex).empty());
-    EXPECT_EQ(copy(sure.feed("FF 01"_hex)), "11 06 00 FF 01"_hex);
-    EXPECT_TRUE(sure.mismatch());
-
-    EchoFilter unsure(kFrame, Expect::perhaps);
-    EXPECT_TRUE(unsure.feed("11 06 00"_hex).empty());
-    EXPECT_TRUE(unsure.pending());
-    EXPECT_EQ(copy(unsure.feed("FF 01"_hex)), "11 06 00 FF 01"_hex);
-    EXPECT_FALSE(unsure.mismatch());
-    EXPECT_FALSE(unsure.pending());
+    for (const Expect expect : {Expect::certainly, Expect::perhaps}) {
+        EchoFilter filter(kFrame, expect);
+        EXPECT_TRUE(filter.feed("11 06 00"_hex).empty());
+        EXPECT_EQ(filter.pending(), expect == Expect::perhaps);
+        EXPECT_EQ(copy(filter.feed("FF 01"_hex)), "11 06 00 FF 01"_hex);
+        EXPECT_EQ(filter.mismatch(), expect == Expect::certainly);
+        EXPECT_FALSE(filter.pending());
+    }
 }
 
 TEST(EchoFilter, GivesBackWhatNeverBecameTheEcho) {
@@ -58,174 +57,194 @@ TEST(EchoFilter, GivesBackWhatNeverBecameTheEcho) {
     EXPECT_EQ(copy(filter.feed("01 00"_hex)), "01 00"_hex);
 }
 
-TEST(EchoMemory, LearnsOnlyFromRequestsWhoseAnswerCannotBeTheirEcho) {
-    EchoMemory memory(EchoMode::automatic);
-    EXPECT_FALSE(memory.on_echo(test::request_of(kWriteRegister)));
+class EchoMemoryTest : public testing::Test {
+  protected:
+    void reply_without_echo(int times) {
+        for (int i = 0; i < times; ++i) memory.on_reply_without_echo(request_of(kRead), false);
+    }
+    bool must_be_learned() const {
+        return memory.must_be_learned_before(request_of(kWrite), false);
+    }
+    EchoMemory memory{EchoMode::automatic};
+};
+
+TEST_F(EchoMemoryTest, LearnsOnlyFromRequestsWhoseAnswerCannotBeTheirEcho) {
+    EXPECT_FALSE(memory.on_echo(request_of(kWrite)));
     EXPECT_EQ(memory.state(), EchoState::unknown);
-    EXPECT_FALSE(memory.on_echo(test::request_of("01 03 00 00 18"_hex)))
+    EXPECT_FALSE(memory.on_echo(request_of("01 03 00 00 18"_hex)))
         << "24 coils: its reply has 8 bytes, too";
     EXPECT_EQ(memory.state(), EchoState::unknown);
-    EXPECT_TRUE(memory.on_echo(test::request_of(kRead)));
-    EXPECT_FALSE(memory.on_echo(test::request_of(kRead))) << "no news";
-    EXPECT_EQ(memory.expect(test::request_of(kWriteRegister)), Expect::certainly);
+    EXPECT_TRUE(memory.on_echo(request_of(kRead)));
+    EXPECT_FALSE(memory.on_echo(request_of(kRead))) << "no news";
+    EXPECT_EQ(memory.expect(request_of(kWrite)), Expect::certainly);
     memory.forget();
-    EXPECT_TRUE(memory.must_be_learned_before(test::request_of(kWriteRegister), false));
+    EXPECT_TRUE(must_be_learned());
 }
+
+TEST_F(EchoMemoryTest, P8AnEchoThatMayHaveBeenTheAnswerItselfIsLearnedAgain) {
+    ASSERT_TRUE(memory.on_echo(request_of(kRead)));
+    memory.on_unanswered(request_of(kRead));
+    EXPECT_EQ(memory.state(), EchoState::present) << "no read is answered by itself";
+    memory.on_unanswered(request_of(kWrite));
+    EXPECT_EQ(memory.state(), EchoState::unclear);
+    EXPECT_TRUE(must_be_learned());
+    reply_without_echo(kNoMore - 1);
+    EXPECT_EQ(memory.state(), EchoState::unclear) << "bytes may be lost now and then";
+    reply_without_echo(1);
+    EXPECT_EQ(memory.state(), EchoState::absent);
+}
+
+TEST_F(EchoMemoryTest, P8AFewRepliesWithoutAnEchoDoNotShowThatAKnownEchoIsGone) {
+    EXPECT_TRUE(memory.on_echo(request_of(kRead)));
+    memory.on_mismatch();
+    EXPECT_TRUE(memory.expects_one()) << "it has been heard";
+    reply_without_echo(kNoMore - 1);
+    EXPECT_TRUE(memory.expects_one());
+    EXPECT_TRUE(must_be_learned());
+    reply_without_echo(1);
+    EXPECT_FALSE(memory.expects_one());
+    memory.forget();
+    EXPECT_FALSE(memory.expects_one()) << "another device";
+}
+
+class Echo : public testing::Test {
+  protected:
+    static Settings with(EchoMode mode) {
+        Settings settings;
+        settings.serial = {38400, 8, Parity::none, 1};
+        settings.unlisted.retries = 0;
+        settings.stations = {settings.unlisted};
+        settings.stations[0].id = 17;
+        settings.echo = mode;
+        return settings;
+    }
+    /// The adapter hears what was sent last; then the station answers, or not.
+    static void hear_echo(BusScript& bus) {
+        const Bytes adu = bus.sent.back().adu;
+        bus.hear_paced(adu);
+    }
+    static void reply(BusScript& bus, ByteView pdu) {
+        bus.run_for(3ms);
+        bus.hear_reply(17, pdu);
+    }
+    /// A line that has carried a read and is known to have an echo, or not to have one.
+    static void read_once(BusScript& bus, bool echo) {
+        const Ticket ticket = bus.submit(17, kRead);
+        if (echo) hear_echo(bus);
+        answer(bus, 17, kReply, 3ms);
+        EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
+        bus.run_for(10ms);
+    }
+};
+
+/// A line whose echo is learned.
+class LearnedEcho : public Echo {
+  protected:
+    BusScript bus{with(EchoMode::automatic)};
+};
 
 TEST_F(Echo, P8AWriteIsNeverConfirmedByItsOwnEcho) {
     for (const EchoMode mode : {EchoMode::automatic, EchoMode::on}) {
-        for (const Bytes& write : {kWriteCoil, kWriteRegister}) {
-            BusScript bus(settings(mode));
+        for (const Bytes& write : {kWriteCoil, kWrite}) {
+            BusScript bus(with(mode));
             read_once(bus, true);
             const Ticket ticket = bus.submit(17, write);
             hear_echo(bus);
             bus.run_for(2s);
-            ASSERT_TRUE(bus.answered(ticket));
-            ASSERT_FALSE(bus.answer(ticket).pdu.has_value());
             EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
             EXPECT_TRUE(bus.answer(ticket).transmitted);
         }
     }
 }
 
-TEST_F(Echo, P8TheReplyBehindTheEchoConfirmsAWriteAlsoWhenGluedToIt) {
-    BusScript bus(settings(EchoMode::automatic));
+TEST_F(LearnedEcho, P8TheReplyBehindTheEchoConfirmsAWriteAlsoWhenGluedToIt) {
     read_once(bus, true);
     const Ticket ticket = bus.submit(17, kWriteCoil);
-    Bytes both = bus.sent.back().adu;
+    const Bytes adu = bus.sent.back().adu;
     bus.run_to_end_of_request();
     bus.run_for(5ms);
-    const Bytes again = both;
-    both.insert(both.end(), again.begin(), again.end());
-    bus.hear(both);
-    ASSERT_TRUE(bus.answered(ticket));
+    bus.hear(Writer().raw(adu).raw(adu).take());
     EXPECT_EQ(bus.answer(ticket).pdu.value(), kWriteCoil);
 }
 
-TEST_F(Echo, P8AFreshLineIsAskedByAReadBeforeItsFirstWrite) {
-    BusScript bus(settings(EchoMode::automatic));
+TEST_F(LearnedEcho, P8AFreshLineIsAskedByAReadBeforeItsFirstWrite) {
     const Ticket ticket = bus.submit(17, kWriteCoil);
     ASSERT_EQ(bus.sent.size(), 1u);
     EXPECT_EQ(bus.sent[0].adu[1], 3);
-    bus.run_to_end_of_request();
-    reply(bus, "03 02 00 07"_hex);
-    ASSERT_EQ(bus.next_sent()->adu, modbus::encode_adu(17, kWriteCoil));
-    bus.run_to_end_of_request();
-    reply(bus, kWriteCoil);
+    answer(bus, 17, "03 02 00 07"_hex, 3ms);
+    ASSERT_EQ(bus.next_sent().value().adu, encode_adu(17, kWriteCoil));
+    answer(bus, 17, kWriteCoil, 3ms);
     EXPECT_EQ(bus.answer(ticket).pdu.value(), kWriteCoil);
     EXPECT_EQ(bus.sent.size(), 2u);
     // Once is enough.
     bus.run_for(10ms);
-    bus.submit(17, kWriteRegister);
+    bus.submit(17, kWrite);
     EXPECT_EQ(bus.sent.back().adu[1], 6);
 }
 
-TEST_F(Echo, P8AnExceptionTeachesAsWellAsAValue) {
-    BusScript bus(settings(EchoMode::automatic));
+TEST_F(LearnedEcho, P8AnExceptionTeachesAsWellAsAValue) {
     bus.submit(17, kWriteCoil);
     hear_echo(bus);
     reply(bus, "83 02"_hex);
     EXPECT_EQ(bus.arbiter().echo(), EchoState::present);
-    EXPECT_EQ(bus.next_sent()->adu, modbus::encode_adu(17, kWriteCoil));
+    EXPECT_EQ(bus.next_sent().value().adu, encode_adu(17, kWriteCoil));
 }
 
-TEST(EchoMemory, P8AnEchoThatMayHaveBeenTheAnswerItselfIsLearnedAgain) {
-    EchoMemory memory(EchoMode::automatic);
-    const Bytes read = "03 00 00 00 03"_hex;
-    const Bytes write = "06 00 00 00 03"_hex;
-    ASSERT_TRUE(memory.on_echo(test::request_of(read)));
-    memory.on_unanswered(test::request_of(read));
-    EXPECT_EQ(memory.state(), EchoState::present) << "no read is answered by itself";
-    memory.on_unanswered(test::request_of(write));
-    EXPECT_EQ(memory.state(), EchoState::unclear);
-    EXPECT_TRUE(memory.must_be_learned_before(test::request_of(write), false));
-    constexpr int kReads = 16;
-    for (int i = 1; i < kReads; ++i) memory.on_reply_without_echo(test::request_of(read), false);
-    EXPECT_EQ(memory.state(), EchoState::unclear) << "bytes may be lost now and then";
-    memory.on_reply_without_echo(test::request_of(read), false);
-    EXPECT_EQ(memory.state(), EchoState::absent);
-}
-
-TEST(EchoMemory, P8AFewRepliesWithoutAnEchoDoNotShowThatAKnownEchoIsGone) {
-    EchoMemory memory(EchoMode::automatic);
-    EXPECT_TRUE(memory.on_echo(test::request_of(kRead)));
-    memory.on_mismatch();
-    EXPECT_TRUE(memory.expects_one()) << "it has been heard";
-    for (int i = 0; i < 15; ++i) memory.on_reply_without_echo(test::request_of(kRead), false);
-    EXPECT_TRUE(memory.expects_one());
-    EXPECT_TRUE(memory.must_be_learned_before(test::request_of(kWriteRegister), false));
-    memory.on_reply_without_echo(test::request_of(kRead), false);
-    EXPECT_FALSE(memory.expects_one());
-    memory.forget();
-    EXPECT_FALSE(memory.expects_one()) << "another device";
-}
-
-TEST_F(Echo, P8AReplyAfterAForeignFrameShowsNothingAboutAnEcho) {
-    BusScript bus(settings(EchoMode::automatic));
+TEST_F(LearnedEcho, P8AReplyAfterAForeignFrameShowsNothingAboutAnEcho) {
     bus.submit(17, kRead);
     bus.run_to_end_of_request();
-    bus.hear_paced(modbus::encode_adu(18, kReply));
-    bus.hear_paced(modbus::encode_adu(17, kReply));
+    bus.hear_paced(encode_adu(18, kReply));
+    bus.hear_paced(encode_adu(17, kReply));
     EXPECT_EQ(bus.arbiter().echo(), EchoState::unknown);
 }
 
-TEST_F(Echo, P8AReplyAfterARequestOfAnotherMasterShowsNothingAboutAnEcho) {
-    BusScript bus(settings(EchoMode::automatic));
+TEST_F(LearnedEcho, P8AReplyAfterARequestOfAnotherMasterShowsNothingAboutAnEcho) {
     bus.submit(17, kRead);
     bus.run_to_end_of_request();
-    Bytes heard = modbus::encode_adu(18, "04 00 01 00 02"_hex);
     Bytes echo = bus.sent.back().adu;
     echo[3] ^= 0x10;
-    heard.insert(heard.end(), echo.begin(), echo.end());
-    bus.hear_paced(heard);
-    bus.hear_paced(modbus::encode_adu(17, kReply));
+    bus.hear_paced(Writer().raw(encode_adu(18, "04 00 01 00 02"_hex)).raw(echo).take());
+    bus.hear_paced(encode_adu(17, kReply));
     EXPECT_NE(bus.arbiter().echo(), EchoState::absent) << "a damaged echo stood there as well";
 }
 
 TEST_F(Echo, P4AnotherMastersRepliesOfOurStationMakeItRestForNothing) {
-    BusScript bus(settings(EchoMode::off));
+    BusScript bus(with(EchoMode::off));
     for (int i = 0; i < 20; ++i) {
         const Ticket ticket = bus.submit(17, kRead);
         const TimePoint asked = bus.now();
-        bus.run_to_end_of_request();
-        bus.hear_reply(17, kReply);
+        answer(bus, 17, kReply);
         ASSERT_TRUE(bus.answered(ticket));
         EXPECT_LT(bus.now() - asked, 150ms);
         bus.run_for(20ms);
-        bus.hear(modbus::encode_adu(17, "03 00 00 00 03"_hex));
+        bus.hear(encode_adu(17, "03 00 00 00 03"_hex));
         bus.run_for(10ms);
-        bus.hear_reply(17, i % 2 == 0 ? kReply : "03 06 00 01 00 02 00 03"_hex);
+        bus.hear_reply(17, i % 2 == 0 ? kReply : reply_number(1));
         bus.run_for(10ms);
     }
 }
 
-TEST_F(Echo, P8TheFirstWriteToASilentStationIsNotTransmitted) {
-    BusScript bus(settings(EchoMode::automatic));
+TEST_F(LearnedEcho, P8TheFirstWriteToASilentStationIsNotTransmitted) {
     const Ticket ticket = bus.submit(17, kWriteCoil);
     bus.run_for(3s);
-    ASSERT_TRUE(bus.answered(ticket));
     EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
     EXPECT_FALSE(bus.answer(ticket).transmitted);
     for (const auto& sent : bus.sent) EXPECT_EQ(sent.adu[1], 3);
 }
 
-TEST_F(Echo, P8ALineWhereAReadWasInconclusiveConfirmsNothingByOneFrame) {
-    BusScript bus(settings(EchoMode::automatic));
+TEST_F(LearnedEcho, P8ALineWhereAReadWasInconclusiveConfirmsNothingByOneFrame) {
     const Ticket ticket = bus.submit(17, kWriteCoil);
     const Bytes tail(bus.sent[0].adu.begin() + 2, bus.sent[0].adu.end());
     bus.hear(tail);  // half an echo
-    bus.run_to_end_of_request();
-    reply(bus, "03 02 00 07"_hex);
+    answer(bus, 17, "03 02 00 07"_hex, 3ms);
     EXPECT_EQ(bus.arbiter().echo(), EchoState::unclear);
-    ASSERT_EQ(bus.next_sent()->adu, modbus::encode_adu(17, kWriteCoil)) << "one read is enough";
+    ASSERT_EQ(bus.next_sent().value().adu, encode_adu(17, kWriteCoil)) << "one read is enough";
     hear_echo(bus);
     bus.run_for(2s);
-    ASSERT_TRUE(bus.answered(ticket));
     EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
 }
 
-TEST_F(Echo, P8AnEchoThatDiffersIsACollision) {
-    BusScript bus(settings(EchoMode::automatic));
+TEST_F(LearnedEcho, P8AnEchoThatDiffersIsACollision) {
     read_once(bus, true);
     const Ticket ticket = bus.submit(17, kRead);
     Bytes damaged = bus.sent.back().adu;
@@ -233,7 +252,6 @@ TEST_F(Echo, P8AnEchoThatDiffersIsACollision) {
     bus.hear_paced(damaged);
     reply(bus, kReply);
     bus.run_for(1s);
-    ASSERT_TRUE(bus.answered(ticket));
     EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply) << "which the panel gave all the same";
     EXPECT_EQ(bus.arbiter().station_counters().at(17).echo_mismatches, 1u);
     EXPECT_EQ(bus.events.back().kind, StationEvent::Kind::collision);
@@ -242,27 +260,20 @@ TEST_F(Echo, P8AnEchoThatDiffersIsACollision) {
     EXPECT_EQ(bus.arbiter().echo(), EchoState::present);
 }
 
-TEST_F(Echo, P8AnAdapterThatNoLongerHearsItselfIsLearnedAnew) {
-    BusScript bus(settings(EchoMode::automatic));
+TEST_F(LearnedEcho, P8AnAdapterThatNoLongerHearsItselfIsLearnedAnew) {
     read_once(bus, true);
-    const Ticket lost = bus.submit(17, kRead);
-    bus.run_to_end_of_request();
-    reply(bus, kReply);
-    bus.run_for(1s);
-    EXPECT_EQ(bus.answer(lost).pdu.value(), kReply);
-    constexpr int kReads = 16;
-    for (int i = 0; i < kReads; ++i) {
-        bus.submit(17, kRead);
-        bus.run_to_end_of_request();
-        reply(bus, kReply);
+    for (int i = 0; i <= kNoMore; ++i) {
+        const Ticket ticket = bus.submit(17, kRead);
+        answer(bus, 17, kReply, 3ms);
         bus.run_for(1s);
+        if (i == 0) EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
     }
     EXPECT_EQ(bus.arbiter().echo(), EchoState::absent);
 }
 
 TEST_F(Echo, P1AFrameBeforeTheEchoIsAnotherMasters) {
     for (const EchoMode mode : {EchoMode::automatic, EchoMode::on}) {
-        BusScript bus(settings(mode));
+        BusScript bus(with(mode));
         read_once(bus, true);
         for (const bool alive : {true, false, true}) {
             const Ticket ticket = bus.submit(17, kRead);
@@ -279,7 +290,7 @@ TEST_F(Echo, P1AFrameBeforeTheEchoIsAnotherMasters) {
 }
 
 TEST_F(Echo, P8AWriteIsNotConfirmedByWhatComesBeforeItsEcho) {
-    BusScript bus(settings(EchoMode::on));
+    BusScript bus(with(EchoMode::on));
     const Ticket ticket = bus.submit(17, "0F 00 10 00 08 01 55"_hex);
     bus.hear_reply(17, "0F 00 10 00 08"_hex);
     hear_echo(bus);
@@ -288,10 +299,10 @@ TEST_F(Echo, P8AWriteIsNotConfirmedByWhatComesBeforeItsEcho) {
 }
 
 TEST_F(Echo, P1AReplyAfterAnotherMastersRequestOfItsShapeIsAmbiguous) {
-    BusScript bus(settings(EchoMode::off));
+    BusScript bus(with(EchoMode::off));
     const Ticket ticket = bus.submit(17, kRead);
     bus.run_to_end_of_request();
-    bus.hear(modbus::encode_adu(17, "03 00 00 00 03"_hex));
+    bus.hear(encode_adu(17, "03 00 00 00 03"_hex));
     bus.hear_reply(17, kReply);
     EXPECT_FALSE(bus.answered(ticket));
     bus.run_for(2s);
@@ -299,14 +310,14 @@ TEST_F(Echo, P1AReplyAfterAnotherMastersRequestOfItsShapeIsAmbiguous) {
     // Reads beyond it are distinguished.
     const Ticket next = bus.submit(17, kRead);
     bus.run_to_end_of_request();
-    bus.hear(modbus::encode_adu(17, "03 00 00 00 01"_hex));
+    bus.hear(encode_adu(17, "03 00 00 00 01"_hex));
     bus.hear_reply(17, "03 02 00 07"_hex);
     bus.hear_reply(17, kReply);
     EXPECT_EQ(bus.answer(next).pdu.value(), kReply);
 }
 
 TEST_F(Echo, P8AnEchoThatTheConfigurationDeniesIsFoundAllTheSame) {
-    BusScript bus(settings(EchoMode::off));
+    BusScript bus(with(EchoMode::off));
     const Ticket ticket = bus.submit(17, kRead);
     hear_echo(bus);
     reply(bus, kReply);
@@ -317,19 +328,17 @@ TEST_F(Echo, P8AnEchoThatTheConfigurationDeniesIsFoundAllTheSame) {
 }
 
 TEST_F(Echo, P8TheEchoOfABroadcastIsNoForeignFrameAndTheNextRequestLeavesAtTheTurnaround) {
-    BusScript bus(settings(EchoMode::on));
-    bus.submit(0, kWriteRegister, 1);
+    BusScript bus(with(EchoMode::on));
+    bus.submit(0, kWrite, 1);
     const TimePoint start = bus.now();
     hear_echo(bus);
     bus.submit(17, kRead, 2);
-    const auto next = bus.next_sent();
-    ASSERT_TRUE(next);
-    EXPECT_EQ(next->at - start, wire_time({38400, 8, Parity::none, 1}, 8) + 100ms);
+    EXPECT_EQ(bus.next_sent().value().at - start, wire_time(bus.settings().serial, 8) + 100ms);
     EXPECT_EQ(bus.arbiter().station_counters().at(17).discarded_bytes, 0u);
 }
 
 TEST_F(Echo, P8TheEchoOfAnUnansweredRequestIsNoSignOfLife) {
-    BusScript bus(settings(EchoMode::on));
+    BusScript bus(with(EchoMode::on));
     for (int i = 0; i < 3; ++i) {
         const Ticket ticket = bus.submit(17, kRead);
         hear_echo(bus);
@@ -339,5 +348,59 @@ TEST_F(Echo, P8TheEchoOfAnUnansweredRequestIsNoSignOfLife) {
     EXPECT_TRUE(bus.arbiter().health(17).offline());
 }
 
+/// An adapter, or a receiver that is stuck, begins to echo while the device stays open: a line
+/// without an echo, whose station has answered; then a write, and its very frame comes back as it
+/// leaves.
+class EchoInMidLife : public LearnedEcho {
+  protected:
+    EchoInMidLife() {
+        for (int i = 0; i < Quickest::kEnough; ++i) read_once(bus, false);
+        write = bus.submit(17, kWrite);
+        hear_echo(bus);
+        EXPECT_FALSE(bus.answered(write));
+    }
+    /// A read is sent that detects the echo.
+    void ask() { ASSERT_EQ(bus.next_sent(600ms).value().kind, FrameKind::learn_echo); }
+    Ticket write = 0;
+};
+
+TEST_F(EchoInMidLife, P8ConfirmsNoWriteOfAPanelThatIsOff) {
+    ask();
+    hear_echo(bus);
+    bus.run_for(2s);
+    EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
+    EXPECT_TRUE(bus.answer(write).transmitted);
+    EXPECT_EQ(bus.arbiter().echo(), EchoState::present);
+}
+
+TEST_F(EchoInMidLife, P8ConfirmsNoWriteWhereTheReadIsAnsweredBehindAnEcho) {
+    ask();
+    hear_echo(bus);
+    reply(bus, kReply);
+    EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
+}
+
+TEST_F(EchoInMidLife, P8TheReplyBehindItConfirmsTheWrite) {
+    reply(bus, kWrite);
+    EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
+    bus.run_for(200ms);
+    bus.submit(17, kWrite);
+    EXPECT_EQ(bus.sent.back().kind, FrameKind::learn_echo) << "nothing is known of the echo";
+}
+
+TEST_F(EchoInMidLife, P2AnAnswerThatWasJustQuickConfirmsTheWriteOnce) {
+    ask();
+    answer(bus, 17, kReply, 3ms);
+    EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
+    EXPECT_EQ(std::ranges::count(bus.sent, encode_adu(17, kWrite), &BusScript::Sent::adu), 1);
+}
+
+TEST_F(EchoInMidLife, P2ARefusedReadDecidesAsWellAndTheWriteIsNotRepeated) {
+    ask();
+    answer(bus, 17, "83 02"_hex, 3ms);
+    EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
+    EXPECT_FALSE(bus.next_sent(1s));
+}
+
 }  // namespace
-}  // namespace panelgate::arbiter::echo::echo_test
+}  // namespace panelgate::arbiter::echo_test

@@ -226,8 +226,11 @@ class JobQueueBesideAModel : public JobQueueModel {
     void remove_some() {
         const auto keep = any_test();
         const auto match = [&](const Job& job) { return !keep(job) && job.ticket % 3 == 0; };
+        Ticket last = 0;
         for (const Job& job : queue_.remove_if(match)) {
             ASSERT_TRUE(match(job));
+            ASSERT_GT(job.ticket, last);
+            last = job.ticket;
             model_.remove(job.ticket);
         }
         ASSERT_TRUE(std::ranges::none_of(model_.jobs, match));
@@ -245,14 +248,34 @@ class JobQueueBesideAModel : public JobQueueModel {
         if (what == 18) return remove_some();
         put_back();
     }
-    void compare() const {
+    /// Also what one client has for one station, by turns.
+    void compare(unsigned turn) const {
         ASSERT_EQ(queue_.waiting(), model_.jobs.size());
         ASSERT_EQ(queue_.size(), model_.counting([](const Job&) { return true; }));
         std::optional<TimePoint> first;
         for (const Job& job : model_.jobs)
             first = std::min(first.value_or(job.start_by), job.start_by);
         ASSERT_EQ(queue_.first_expiry(), first);
+        std::vector<Ticket> firsts;
+        queue_.any_first([&](const Job& job) {
+            firsts.push_back(job.ticket);
+            return false;
+        });
+        std::ranges::sort(firsts);
+        ASSERT_EQ(firsts, tickets(model_.firsts([](const Job&) { return true; })));
+        const Client client = 1 + turn % 9;
+        const auto station = static_cast<std::uint8_t>(1 + turn % 4);
+        const auto theirs = [&](const Job& job) {
+            return job.client == client && (job.station == station || job.station == 0);
+        };
+        ASSERT_EQ(queue_.has(client, station), std::ranges::any_of(model_.jobs, theirs));
         ASSERT_TRUE(queue_.consistent());
+    }
+
+    static std::vector<Ticket> tickets(const std::vector<const Job*>& jobs) {
+        std::vector<Ticket> all;
+        for (const Job* job : jobs) all.push_back(job->ticket);
+        return all;
     }
 
     const QueueSettings settings_{.limit = 24, .per_client = 6, .deadline = 2s};
@@ -264,9 +287,9 @@ class JobQueueBesideAModel : public JobQueueModel {
 };
 
 TEST_F(JobQueueBesideAModel, PopsAndCountsLikeASimpleList) {
-    for (int i = 0; i < 20'000 && !HasFailure(); ++i) {
+    for (unsigned i = 0; i < 20'000 && !HasFailure(); ++i) {
         step(below(20));
-        compare();
+        compare(i);
     }
     EXPECT_GT(overtaken_, 50);
     EXPECT_GT(shed_, 500);

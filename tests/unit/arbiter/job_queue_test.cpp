@@ -3,62 +3,25 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <map>
-#include <vector>
+#include <utility>
 
+#include "panelgate/base/bytes.hpp"
+#include "support/hex.hpp"
 #include "support/queue_fixture.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::arbiter::job_queue_test {
 namespace {
 
-using testing::ElementsAre;
-using testing::IsEmpty;
-
 using test::any;
+using testing::ElementsAre;
+
+/// Whose turn it is.
 using JobQueueTest = test::QueueFixture;
-
-TEST_F(JobQueueTest, WritesGoBeforeReadsAndReadsBeforePolls) {
-    const Ticket poll_ = add(poll(1, 1));
-    const Ticket read_ = add(read(2, 1));
-    const Ticket write_ = add(write(3, 1));
-    EXPECT_THAT(drain(), ElementsAre(write_, read_, poll_));
-    EXPECT_TRUE(queue_.empty());
-}
-
-TEST_F(JobQueueTest, ALaneKeepsItsOrderWhateverItsClasses) {
-    const Ticket first = add(read(1, 7));
-    const Ticket second = add(write(1, 7));
-    const Ticket other = add(write(1, 8));
-    EXPECT_THAT(drain(), ElementsAre(other, first, second));
-}
-
-TEST_F(JobQueueTest, StationsOfOneClientDoNotWaitForEachOther) {
-    add(read(1, 7));
-    const Ticket other = add(read(1, 8));
-    EXPECT_EQ(next([](const Job& job) { return job.station != 7; }), other);
-    EXPECT_EQ(next([](const Job& job) { return job.station != 7; }), 0u);
-}
-
-TEST_F(JobQueueTest, ABroadcastWaitsForOlderJobsAndDelaysYoungerOnes) {
-    const Ticket older = add(read(1, 7));
-    const Ticket broadcast = add(write(1, 0));
-    const Ticket younger = add(write(1, 8));
-    const Ticket of_other_client = add(read(2, 7));
-    std::vector<Ticket> first;
-    queue_.any_first([&](const Job& job) {
-        first.push_back(job.ticket);
-        return false;
-    });
-    EXPECT_THAT(first, ElementsAre(older, of_other_client));
-    EXPECT_THAT(drain(), ElementsAre(older, broadcast, younger, of_other_client));
-}
-
-TEST_F(JobQueueTest, AJobBehindABroadcastIsNotTakenAlong) {
-    add(write(1, 0));
-    add(read(1, 7));
-    const Ticket free = add(read(2, 7));
-    EXPECT_THAT(tickets(queue_.take_all(7, any)), ElementsAre(free));
-}
 
 TEST_F(JobQueueTest, P9HostsTakeTurnsThenTheirClientsThenTheirStations) {
     const Ticket a1 = add(read(1, 1, 100));
@@ -153,31 +116,6 @@ TEST_F(JobQueueTest, P9AWriteThatIsAloneStartsWithinTwoTurns) {
     }
 }
 
-TEST_F(JobQueueTest, AJobPutBackGoesAheadOfItsLaneAndIsNeverRefused) {
-    limits(2, 2);
-    const Ticket first = add(read(1, 1));
-    const Ticket second = add(read(1, 1));
-    Jobs taken = queue_.take_all(1, any);
-    const Ticket third = add(read(1, 1));
-    const Ticket fourth = add(read(1, 1));
-    for (Job& job : taken) queue_.put_back(std::move(job));
-    EXPECT_EQ(queue_.size(), 4u);
-    EXPECT_THAT(drain(), ElementsAre(first, second, third, fourth));
-}
-
-TEST_F(JobQueueTest, TakesAllThatMatchWhileTheyAreFirst) {
-    const Ticket a = add(read(1, 1));
-    const Ticket b = add(read(2, 1));
-    const Ticket c = add(read(1, 1));
-    add(write(2, 1));
-    add(read(2, 1));
-    add(read(3, 2));
-    const auto reads = [](const Job& job) { return job.priority == PriorityClass::read; };
-    EXPECT_THAT(tickets(queue_.take_all(1, reads)), ElementsAre(a, b, c));
-    EXPECT_TRUE(queue_.consistent());
-    EXPECT_EQ(queue_.waiting(), 3u);
-}
-
 TEST_F(JobQueueTest, AsksAgainAfterEachThatWasTaken) {
     const Ticket last = add(read(2, 1));
     const Ticket middle = add(read(1, 1));
@@ -191,37 +129,238 @@ TEST_F(JobQueueTest, AsksAgainAfterEachThatWasTaken) {
     EXPECT_THAT(tickets(queue_.take_all(1, backwards)), ElementsAre(last, middle, first));
 }
 
-TEST_F(JobQueueTest, RemovesInOrderOfTickets) {
-    const Ticket a = add(read(9, 1, 50));
+/// What goes when it is full, and what counts.
+class JobQueueLimits : public test::QueueFixture {
+  protected:
+    /// Ticket of the dropped job, 0: none; the newcomer was taken.
+    Ticket shed_for(Job job) {
+        const auto pushed = queue_.push(std::move(job));
+        EXPECT_TRUE(pushed.taken);
+        EXPECT_TRUE(queue_.consistent());
+        return pushed.shed.empty() ? 0 : pushed.shed.front().ticket;
+    }
+    bool refuses(Job job) {
+        const auto pushed = queue_.push(std::move(job));
+        EXPECT_TRUE(pushed.taken || pushed.shed.empty());
+        EXPECT_TRUE(queue_.consistent());
+        return !pushed.taken;
+    }
+};
+
+TEST_F(JobQueueLimits, P9RefusesMoreThanOneClientMayHave) {
+    limits(10, 2);
     add(read(1, 1));
-    const Ticket b = add(write(9, 2, 50));
-    const Ticket c = add(read(9, 1, 50));
-    const auto theirs = [](const Job& job) { return job.client == 9; };
-    EXPECT_THAT(tickets(queue_.remove_if(theirs)), ElementsAre(a, b, c));
-    EXPECT_THAT(queue_.remove_if(theirs), IsEmpty());
+    add(read(1, 2));
+    EXPECT_TRUE(refuses(read(1, 3)));
+    EXPECT_TRUE(refuses(write(1, 3)));
+    add(read(2, 3));
+}
+
+TEST_F(JobQueueLimits, P9RefusesMoreThanTheLimitWhenAllHaveTheSame) {
+    limits(4, 4);
+    for (Client client = 1; client <= 4; ++client) add(read(client, 1));
+    EXPECT_TRUE(refuses(read(5, 1)));
+    EXPECT_TRUE(refuses(read(1, 1)));
+}
+
+/// Otherwise the same client would lose every time and never be served.
+TEST_F(JobQueueLimits, P9OfEquallyGreedyClientsTheNewestRequestGoes) {
+    limits(3, 4);
+    const Ticket first = add(read(1, 1, 100));
+    const Ticket second = add(read(3, 1, 100));
+    const Ticket third = add(read(2, 1, 100));
+    EXPECT_EQ(shed_for(read(8, 1, 200)), third);
+    EXPECT_EQ(shed_for(read(9, 1, 300)), second);
+    EXPECT_EQ(next(), first);
+}
+
+TEST_F(JobQueueLimits, P6EqualReadsCountOnce) {
+    for (Client client = 1; client <= 1024; ++client)
+        ASSERT_TRUE(queue_.push(read_of(client, "03 00 10 00 08"_hex)).taken);
     EXPECT_TRUE(queue_.consistent());
     EXPECT_EQ(queue_.size(), 1u);
+    EXPECT_EQ(queue_.waiting(), 1024u);
+    EXPECT_TRUE(queue_.pop(any));
+    EXPECT_EQ(queue_.size(), 1u);
+    EXPECT_EQ(queue_.take_all(1, any).size(), 1023u);
+    EXPECT_EQ(queue_.size(), 0u);
 }
 
-TEST_F(JobQueueTest, KnowsWhatWaitsForAStation) {
-    add(read(1, 7));
-    EXPECT_TRUE(queue_.has(1, 7));
-    EXPECT_FALSE(queue_.has(1, 8));
-    EXPECT_FALSE(queue_.has(2, 7));
-    add(write(1, 0));
-    EXPECT_TRUE(queue_.has(1, 8));
+TEST_F(JobQueueLimits, P6ContainedReadsCountOnceWhicheverCameFirst) {
+    add(read_of(1, "03 00 12 00 02"_hex));
+    add(read_of(2, "03 00 14 00 02"_hex));
+    EXPECT_EQ(queue_.size(), 2u);
+    const Ticket wide = add(read_of(3, "03 00 10 00 08"_hex));
+    add(read_of(4, "03 00 17 00 01"_hex));
+    EXPECT_EQ(queue_.size(), 1u);
+    add(read_of(5, "03 00 17 00 02"_hex));
+    add(read_of(5, "04 00 12 00 02"_hex));
+    Job alone = read_of(6, "03 00 12 00 02"_hex);
+    alone.alone = true;
+    add(std::move(alone));
+    EXPECT_EQ(queue_.size(), 4u);
+    queue_.remove_if([&](const Job& job) { return job.ticket == wide; });
+    EXPECT_TRUE(queue_.consistent());
+    EXPECT_EQ(queue_.size(), 5u);  // the first two count again; 17 is carried by 17 and 18
 }
 
-TEST_F(JobQueueTest, KnowsTheEarliestMomentAtWhichOneIsTooLate) {
-    EXPECT_FALSE(queue_.first_expiry());
-    for (const Duration at : {5s, 3s, 4s}) {
-        Job late = read(1, 1);
-        late.start_by = TimePoint{at};
-        add(std::move(late));
+TEST_F(JobQueueLimits, P6AReadThatRidesIsTakenWhenTheQueueIsFull) {
+    limits(2, 1);
+    add(read_of(1, "03 00 10 00 08"_hex));
+    add(read_of(2, "03 00 20 00 08"_hex));
+    add(read_of(1, "03 00 20 00 08"_hex));
+    add(read_of(3, "03 00 11 00 02"_hex));
+    EXPECT_TRUE(refuses(read_of(3, "03 00 17 00 02"_hex)));
+}
+
+TEST_F(JobQueueLimits, NeverHoldsMoreThanItsMost) {
+    const Bytes pdu = "03 00 10 00 08"_hex;
+    for (std::size_t i = 0; i < JobQueue::kMost; ++i)
+        ASSERT_TRUE(queue_.push(read_of(i % 640 + 1, pdu)).taken);
+    EXPECT_TRUE(refuses(read_of(1, pdu)));
+    EXPECT_TRUE(refuses(write(1, 1)));
+    queue_.put_back(read_of(1, pdu));
+    EXPECT_EQ(queue_.waiting(), JobQueue::kMost + 1);
+}
+
+TEST_F(JobQueueLimits, P9ANewcomerTakesTheNewestPlaceOfTheGreediestHost) {
+    limits(6, 6);
+    add(read(1, 1, 100));
+    add(read(2, 1, 100));
+    add(read(2, 1, 100));
+    const Ticket newest_of_greediest = add(read(2, 2, 100));
+    add(read(1, 1, 100));
+    add(read(3, 1, 200));
+    EXPECT_EQ(shed_for(read(4, 1, 300)), newest_of_greediest);
+    EXPECT_EQ(queue_.size(), 6u);
+}
+
+TEST_F(JobQueueLimits, P9PollsGoBeforeReadsAndReadsBeforeWrites) {
+    limits(4, 4);
+    const Ticket write_ = add(write(1, 1));
+    const Ticket poll_ = add(poll(1, 2));
+    const Ticket read_ = add(read(1, 3));
+    add(write(1, 4));
+    EXPECT_EQ(shed_for(read(2, 1)), poll_);
+    EXPECT_EQ(shed_for(write(3, 1)), read_);
+    EXPECT_TRUE(refuses(read(4, 1)));  // half of the queue is not more than half
+    EXPECT_TRUE(refuses(read(2, 2)));
+    EXPECT_TRUE(queue_.has(1, 1) && write_ != 0);
+}
+
+/// Otherwise no client could read beside more writers than there are places.
+TEST_F(JobQueueLimits, P9WritesLeaveAFifthOfThePlacesToReads) {
+    limits(5, 5);
+    for (Client client = 1; client <= 3; ++client) add(write(client, 1));
+    const Ticket first = add(read(4, 1));
+    const Ticket second = add(read(5, 1));
+    EXPECT_EQ(shed_for(write(6, 1)), second);
+    EXPECT_TRUE(refuses(write(7, 1)));
+    for (int i = 0; i < 4; ++i) next();
+    EXPECT_EQ(next(), first);
+}
+
+TEST_F(JobQueueLimits, P9AWriteGoesForAReadOnlyWhereOneHostHoldsMoreThanHalf) {
+    limits(4, 4);
+    for (std::uint8_t station = 1; station <= 3; ++station) add(write(1, station));
+    add(read(2, 1));
+    const Ticket newest = ticket_ - 1;
+    EXPECT_EQ(shed_for(read(3, 1)), newest);
+    EXPECT_TRUE(refuses(read(4, 1)));
+}
+
+TEST_F(JobQueueLimits, P9AWriteTakesThePlaceOfAReadEvenOfItsOwn) {
+    limits(3, 4);
+    add(read(1, 1));
+    add(write(1, 2));
+    const Ticket own = add(read(1, 3));
+    EXPECT_TRUE(refuses(read(1, 4)));
+    EXPECT_EQ(shed_for(write(1, 4)), own);
+}
+
+TEST_F(JobQueueLimits, P9AFloodOfWritesDoesNotDropTheReadsOfClientsWithLess) {
+    limits(6, 6);
+    for (std::uint8_t station = 1; station <= 4; ++station) add(write(1, station));
+    add(read(2, 1));
+    add(read(3, 1));
+    EXPECT_TRUE(refuses(write(1, 5)));
+}
+
+TEST_F(JobQueueLimits, WhatGoesIsTheNewestOfItsLane) {
+    limits(4, 4);
+    const Ticket first = add(poll(1, 1));
+    const Ticket second = add(write(1, 1));
+    const Ticket third = add(read(1, 1));
+    const Ticket fourth = add(write(1, 1));
+    EXPECT_EQ(shed_for(write(2, 1)), fourth);
+    EXPECT_EQ(shed_for(write(3, 1)), third);
+    EXPECT_EQ(shed_for(write(4, 1)), second);
+    EXPECT_EQ(shed_for(write(5, 1)), first);
+    EXPECT_TRUE(refuses(write(6, 1)));
+}
+
+TEST_F(JobQueueLimits, P9AHostWhoseReadsAreAllDoubledStillMakesRoom) {
+    limits(8, 8);
+    for (unsigned i = 0; i < 8; ++i) {
+        const Bytes pdu = Writer().u8(3).u16(10 * i).u16(1).take();
+        for (Client client = 1; client <= 2; ++client) {
+            Job job = read_of(client, pdu);
+            job.host = 100;
+            add(std::move(job));
+        }
     }
-    EXPECT_EQ(queue_.first_expiry(), TimePoint{3s});
-    queue_.remove_if([](const Job& job) { return job.start_by == TimePoint{3s}; });
-    EXPECT_EQ(queue_.first_expiry(), TimePoint{4s});
+    EXPECT_NE(shed_for(read(3, 1, 200)), 0u);
+    EXPECT_EQ(queue_.size(), 8u);
+}
+
+/// 40 connections of one host, 16 requests each at once and again with every answer; a polite
+/// client asks for one thing after the other.
+void plays_beside_a_flood(Host flood, Host polite, PriorityClass priority) {
+    JobQueue queue{QueueSettings{}};
+    Ticket ticket = 0;
+    std::map<Client, int> open;
+    const auto ask = [&](Host host, Client client, PriorityClass as) {
+        ++ticket;
+        const auto address = static_cast<unsigned>(ticket * 7 % 60000);
+        Job job{.ticket = ticket,
+                .station = static_cast<std::uint8_t>(1 + ticket % 5),
+                .request = test::request_of(Writer().u8(3).u16(address).u16(1).take()),
+                .client = client,
+                .host = host,
+                .priority = as};
+        auto pushed = queue.push(std::move(job));
+        for (const Job& shed : pushed.shed) {
+            EXPECT_NE(shed.client, 1000u);
+            --open[shed.client];
+        }
+        if (pushed.taken) ++open[client];
+        return pushed.taken;
+    };
+    constexpr Client kPolite = 1000;
+    int longest = 0;
+    for (int turn = 0, since = 0; turn < 500; ++turn) {
+        for (Client client = 1; client <= 40; ++client) {
+            while (open[client] < 16 && ask(flood, client, priority)) continue;
+        }
+        if (open[kPolite] == 0) {
+            EXPECT_TRUE(ask(polite, kPolite, PriorityClass::read));
+            since = 0;
+        }
+        longest = std::max(longest, ++since);
+        --open[queue.pop(any)->client];
+    }
+    EXPECT_TRUE(queue.consistent());
+    EXPECT_LE(longest, flood == polite ? 42 : priority == PriorityClass::write ? 5 : 3);
+}
+
+TEST(JobQueueFlood, P9APoliteClientBesideAFloodingHostIsNeverRefused) {
+    plays_beside_a_flood(100, 200, PriorityClass::read);
+    plays_beside_a_flood(100, 200, PriorityClass::write);
+}
+
+TEST(JobQueueFlood, P9APoliteClientOfTheFloodingHostIsNotRefusedEither) {
+    plays_beside_a_flood(100, 100, PriorityClass::read);
+    plays_beside_a_flood(100, 100, PriorityClass::write);
 }
 
 }  // namespace

@@ -16,31 +16,18 @@ class QuietTest : public testing::Test {
     Quiet quiet_{kLongest, kPause};
 };
 
-TEST_F(QuietTest, ALineThatWasOpenedIsSilentForOneGapFirst) {
+TEST_F(QuietTest, TheGapFollowsTheOpeningAndTheLastBitSentOrHeard) {
     EXPECT_EQ(quiet_.free_at(kGap), kStart + kGap);
-}
-
-TEST_F(QuietTest, TheGapFollowsTheLastBitSentOrHeard) {
     quiet_.on_sent(kStart + 50ms, 17);
     EXPECT_EQ(quiet_.free_at(kGap), kStart + 60ms);
     EXPECT_EQ(quiet_.station(), 17);
     quiet_.on_heard(kStart + 40ms);
     EXPECT_EQ(quiet_.free_at(kGap), kStart + 60ms) << "our own frame was still leaving";
+    quiet_.on_answered_early(kStart + 46ms);
+    EXPECT_EQ(quiet_.free_at(kGap), kStart + 56ms) << "the reply shows that it had left";
     quiet_.on_heard(kStart + 70ms);
     EXPECT_EQ(quiet_.free_at(kGap), kStart + 80ms);
     EXPECT_EQ(quiet_.free_at(2 * kGap), kStart + 90ms);
-}
-
-TEST_F(QuietTest, TheGapFollowsAReplyThatCameBeforeTheRequestCanHaveLeft) {
-    quiet_.on_sent(kStart + 50ms, 17);
-    quiet_.on_heard(kStart + 50ms);
-    quiet_.on_answered_early(kStart + 46ms);
-    EXPECT_EQ(quiet_.free_at(kGap), kStart + 56ms);
-}
-
-TEST_F(QuietTest, UnsolicitedBytesPostponeTheNextRequest) {
-    quiet_.on_noise(kStart + 50ms);
-    EXPECT_EQ(quiet_.free_at(kGap), kStart + 60ms);
 }
 
 TEST_F(QuietTest, ALineThatFloatsIsWaitedForNoLongerThanAFrameLasts) {
@@ -53,7 +40,7 @@ TEST_F(QuietTest, ALineThatFloatsIsWaitedForNoLongerThanAFrameLasts) {
     EXPECT_LT(quiet_.free_at(kGap), now);
 }
 
-TEST_F(QuietTest, BytesWithPausesAreFramesHoweverManyTheyAre) {
+TEST_F(QuietTest, UnsolicitedBytesWithPausesAreFramesHoweverManyTheyAre) {
     TimePoint now = kStart + 50ms;
     for (int i = 0; i < 100; ++i) {
         now += kPause;
@@ -70,18 +57,14 @@ TEST_F(QuietTest, RestsForTheLongestRequestedTimeAndUntilThatIsOver) {
     EXPECT_EQ(quiet_.free_at(kGap), kStart + kGap);
 }
 
-TEST_F(QuietTest, P1AQuarantineLastsUntilTheLatestInstantThatItWasGiven) {
+TEST_F(QuietTest, P1AQuarantineLastsUntilItsLatestInstantUnlessItsOwnStationLiftsIt) {
     quiet_.quarantine(kStart, 17, kStart + 500ms);
     quiet_.quarantine(kStart, 17, kStart + 400ms);
     EXPECT_EQ(quiet_.quarantined_until(), kStart + 500ms);
     quiet_.quarantine(kStart, 17, kStart + 600ms);
     EXPECT_EQ(quiet_.quarantined_until(), kStart + 600ms);
-}
-
-TEST_F(QuietTest, P1OnlyTheStationWithOutstandingRepliesLiftsItsQuarantine) {
-    quiet_.quarantine(kStart, 17, kStart + 500ms);
     quiet_.lift(kStart, 18);
-    EXPECT_EQ(quiet_.quarantined_until(), kStart + 500ms);
+    EXPECT_EQ(quiet_.quarantined_until(), kStart + 600ms);
     quiet_.lift(kStart, 17);
     EXPECT_LE(quiet_.quarantined_until(), kStart);
 }
@@ -96,6 +79,63 @@ TEST_F(QuietTest, ReportsOnceHowMuchOfAQuarantineHasPassed) {
     quiet_.lift(kStart + 4100ms, 17);
     EXPECT_EQ(quiet_.take_rested(kStart + 9s), 100ms);
     EXPECT_EQ(quiet_.take_rested(kStart + 9s), 0ms);
+}
+
+constexpr bool kEarly = true;
+
+void reply(Pace& pace, bool early, int times) {
+    for (int i = 0; i < times; ++i) pace.on_reply(early);
+}
+void rate(Pace& pace, bool hasty, int times) {
+    for (int i = 0; i < times; ++i) pace.on_rate(hasty);
+}
+
+TEST(Pace, IsBelievedAfterSomeRepliesInTimeNotAfterOne) {
+    Pace pace;
+    EXPECT_FALSE(pace.believed());
+    reply(pace, !kEarly, 1);
+    EXPECT_FALSE(pace.believed());
+    reply(pace, !kEarly, 10);
+    EXPECT_TRUE(pace.believed());
+}
+
+TEST(Pace, P1OneReplyThatCameTooEarlySettlesIt) {
+    for (const int before : {0, 1, 100}) {
+        Pace pace;
+        reply(pace, !kEarly, before);
+        reply(pace, kEarly, 1);
+        EXPECT_FALSE(pace.believed());
+        reply(pace, !kEarly, 1000);
+        EXPECT_FALSE(pace.believed());
+    }
+}
+
+TEST(Pace, HasteNowAndThenIsASenderThatWasHeldUpAndAgainAndAgainNoPaceUntilItHasCeased) {
+    Pace pace;
+    for (int i = 0; i < 50; ++i) {
+        rate(pace, true, 1);
+        EXPECT_TRUE(pace.kept());
+        rate(pace, false, 8);
+    }
+    rate(pace, true, 3);
+    EXPECT_FALSE(pace.kept());
+    for (int i = 0; i < 50; ++i) {
+        rate(pace, false, 4);
+        rate(pace, true, 1);
+        EXPECT_FALSE(pace.kept());
+    }
+    rate(pace, false, 16);
+    EXPECT_TRUE(pace.kept());
+}
+
+TEST(Pace, IsNoPaceAtAllAfterSomeEarlyRepliesInARow) {
+    Pace pace;
+    reply(pace, kEarly, 2);
+    EXPECT_FALSE(pace.unbound());
+    reply(pace, kEarly, 1);
+    EXPECT_TRUE(pace.unbound());
+    reply(pace, !kEarly, 1);
+    EXPECT_FALSE(pace.unbound());
 }
 
 }  // namespace

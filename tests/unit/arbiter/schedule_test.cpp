@@ -2,14 +2,19 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "panelgate/base/bytes.hpp"
 #include "support/attempts.hpp"
 #include "support/hex.hpp"
+#include "support/queue_fixture.hpp"
 #include "support/request.hpp"
 
 namespace panelgate::arbiter::schedule_test {
@@ -101,22 +106,28 @@ TEST_F(ScheduleTest, NothingGoesBeforeTheGapBehindTheLastBitIsOver) {
     EXPECT_FALSE(schedule.next_start(stations, quiet)) << "nothing waits";
 }
 
-TEST_F(ScheduleTest, ARetryLeavesOneTurnToTheOthers) {
-    schedule.retry(now, failed(1), kCheap);
-    EXPECT_EQ(order(), "r1") << "nobody else wants the line";
-    wait(2);
-    wait(2);
-    wait(3);
-    schedule.retry(now, failed(1), kCheap);
-    EXPECT_EQ(order(2), "2 r1");
-}
-
-TEST_F(ScheduleTest, P4ADearRetryLeavesATurnToEachStationThatWaited) {
-    wait(2);
-    wait(3);
-    wait(2);
-    schedule.retry(now, failed(1), kDear);
-    EXPECT_EQ(order(), "2 3 r1 2");
+TEST_F(ScheduleTest, P4ARetryLeavesTheOthersTurnsByWhatItMayCost) {
+    struct Row {
+        std::vector<std::uint8_t> waiting;
+        Duration patience;
+        std::string asked;  ///< at first
+        Quarantine quarantine = Quarantine::automatic;
+    };
+    const Row rows[] = {
+        {{}, kCheap, "r1"},                            // nobody else wants the line
+        {{2, 2, 3}, kCheap, "2 r1"},                   // one turn
+        {{2, 3, 2}, kDear, "2 3 r1 2"},                // one for each of the stations that waited
+        {{2, 2, 2, 2, 2, 2, 3}, kDear, "2 3 r1 2 2"},  // also where one has many clients
+        {{2}, kDear, "r1 2", Quarantine::line},        // the whole line rests: it goes first
+    };
+    for (const Row& row : rows) {
+        settings.quarantine = row.quarantine;
+        rebuild();
+        for (const std::uint8_t station : row.waiting) wait(station);
+        schedule.retry(now, failed(1), row.patience);
+        const auto turns = static_cast<std::size_t>(std::ranges::count(row.asked, ' ')) + 1;
+        EXPECT_EQ(order(turns), row.asked);
+    }
 }
 
 TEST_F(ScheduleTest, P4ADearRetryLeavesTheOthersNoMoreTimeThanItMayTake) {
@@ -126,21 +137,6 @@ TEST_F(ScheduleTest, P4ADearRetryLeavesTheOthersNoMoreTimeThanItMayTake) {
     EXPECT_EQ(order(1), "2");
     now += kDear;
     EXPECT_EQ(order(), "r1 3") << "what the others took counts";
-}
-
-TEST_F(ScheduleTest, P4AStationWithManyClientsDoesNotHaveAllTurnsBeforeALongRetry) {
-    for (int i = 0; i < 6; ++i) wait(2);
-    wait(3);
-    schedule.retry(now, failed(1), kDear);
-    EXPECT_EQ(order(5), "2 3 r1 2 2") << "one for each of the stations that waited";
-}
-
-TEST_F(ScheduleTest, WhereTheWholeLineRestsARetryGoesFirst) {
-    settings.quarantine = Quarantine::line;
-    rebuild();
-    wait(2);
-    schedule.retry(now, failed(1), kDear);
-    EXPECT_EQ(order(), "r1 2");
 }
 
 TEST_F(ScheduleTest, NothingElseGoesToAStationBeforeItsRetry) {
@@ -174,11 +170,10 @@ TEST_F(ScheduleTest, P4AProbeGoesWhenTheLineIsFreeAndOnABusyOneWhenItHasWaited) 
     now = *stations.next_probe() - 1ns;
     EXPECT_EQ(order(), "");
     now += 1ns;
-    const auto probe = next().group;
-    ASSERT_TRUE(probe);
-    EXPECT_EQ(probe->station, 1);
-    EXPECT_TRUE(probe->probe);
-    EXPECT_TRUE(probe->jobs.empty()) << "nobody waits for it";
+    const Group probe = next().group.value();
+    EXPECT_EQ(probe.station, 1);
+    EXPECT_TRUE(probe.probe);
+    EXPECT_TRUE(probe.jobs.empty()) << "nobody waits for it";
     wait(2);
     EXPECT_EQ(order(1), "2") << "who waits goes first";
     wait(2);
@@ -190,25 +185,22 @@ TEST_F(ScheduleTest, P8BeforeTheFirstWriteAReadShowsWhetherTheLineHasAnEcho) {
     settings.echo = EchoMode::automatic;
     rebuild();
     const Ticket write = wait(1, true);
-    const auto reading = next().group;
-    ASSERT_TRUE(reading);
-    EXPECT_EQ(reading->learns_for, write);
-    EXPECT_TRUE(reading->jobs.empty());
-    EXPECT_EQ(reading->request.function(), 3);
+    const Group reading = next().group.value();
+    EXPECT_EQ(reading.learns_for, write);
+    EXPECT_TRUE(reading.jobs.empty());
+    EXPECT_EQ(reading.request.function(), 3);
     echo.on_unclear();
-    const auto writing = next().group;
-    ASSERT_TRUE(writing);
-    ASSERT_EQ(writing->jobs.size(), 1u) << "what did not tell is not asked for ever";
-    EXPECT_EQ(writing->request.function(), 6);
-    EXPECT_EQ(writing->jobs.front().ticket, write);
+    const Group writing = next().group.value();
+    ASSERT_EQ(writing.jobs.size(), 1u) << "what did not tell is not asked for ever";
+    EXPECT_EQ(writing.request.function(), 6);
+    EXPECT_EQ(writing.jobs.front().ticket, write);
 }
 
 TEST_F(ScheduleTest, ABroadcastGoesAloneAndToNoStation) {
     wait(0, true);
-    const auto group = next().group;
-    ASSERT_TRUE(group);
-    EXPECT_EQ(group->station, 0);
-    EXPECT_EQ(group->jobs.size(), 1u);
+    const Group group = next().group.value();
+    EXPECT_EQ(group.station, 0);
+    EXPECT_EQ(group.jobs.size(), 1u);
 }
 
 TEST_F(ScheduleTest, P1OnALineThatMayStallOutstandingRepliesNeedAReopening) {
@@ -258,6 +250,136 @@ TEST_F(ScheduleTest, PartsOfAJoinedReadGoAgainExceptForClientsThatHaveLeft) {
     ASSERT_EQ(gone.size(), 1u);
     EXPECT_EQ(gone.front().ticket, left);
     EXPECT_EQ(order(), "1 1");
+}
+
+constexpr TimePoint kStart{1h};
+
+/// What waits for its first turn, and what goes again.
+class BacklogTest : public test::QueueFixture {
+  protected:
+    /// Waits for its first turn.
+    Ticket wait(Job job) {
+        const Ticket ticket = job.ticket;
+        EXPECT_TRUE(backlog_.queue().push(std::move(job)).taken);
+        return ticket;
+    }
+    /// Was sent, and goes again.
+    void retry(Jobs jobs) {
+        Group group{
+            .station = jobs.front().station, .request = jobs.front().request, .attempts = 1};
+        group.jobs = std::move(jobs);
+        backlog_.retry(std::move(group));
+    }
+    static Job until(Job job, TimePoint start_by, TimePoint deadline) {
+        job.start_by = start_by;
+        job.deadline = deadline;
+        return job;
+    }
+    /// Of the retry that is taken, 0 when none may go.
+    int take(const std::function<bool(const Group&)>& may_go) {
+        const auto group = backlog_.take_retry(may_go);
+        return group ? group->station : 0;
+    }
+
+    Backlog backlog_{QueueSettings{}};
+};
+
+TEST_F(BacklogTest, HoldsWhatWaitsAndWhatGoesAgain) {
+    EXPECT_TRUE(backlog_.empty());
+    wait(read(1, 17));
+    retry({read(2, 18)});
+    EXPECT_FALSE(backlog_.empty());
+    EXPECT_TRUE(backlog_.has(1, 17));
+    EXPECT_FALSE(backlog_.has(1, 18));
+    EXPECT_TRUE(backlog_.has(2, 18));
+    EXPECT_FALSE(backlog_.has(2, 17));
+    EXPECT_TRUE(backlog_.has_retry(18));
+    EXPECT_FALSE(backlog_.has_retry(17)) << "it was not sent yet";
+}
+
+TEST_F(BacklogTest, TheOldestRetryThatMayGoIsTaken) {
+    for (const std::uint8_t station : Bytes{17, 18, 19}) retry({read(1, station)});
+    const auto not_17 = [](const Group& group) { return group.station != 17; };
+    EXPECT_EQ(take([](const Group&) { return false; }), 0);
+    EXPECT_EQ(take(not_17), 18);
+    EXPECT_EQ(take(not_17), 19);
+    EXPECT_EQ(take(not_17), 0);
+    EXPECT_TRUE(backlog_.has_retries());
+    EXPECT_EQ(take([](const Group&) { return true; }), 17);
+    EXPECT_FALSE(backlog_.has_retries());
+}
+
+TEST_F(BacklogTest, P2ACancelledClientHasNothingLeftAndTheOthersOfASharedRetryHave) {
+    const Job shared = read(1, 17);
+    const Job other = read(2, 17);
+    const Ticket waits = wait(read(1, 18));
+    wait(read(2, 18));
+    retry({shared, other});
+    retry({read(1, 19)});
+    const auto cancelled = tickets(backlog_.cancel(1));
+    EXPECT_EQ(cancelled.size(), 3u);
+    EXPECT_EQ(cancelled.front(), waits);
+    EXPECT_FALSE(backlog_.has(1, 17) || backlog_.has(1, 18) || backlog_.has(1, 19));
+    EXPECT_TRUE(backlog_.has(2, 17) && backlog_.has(2, 18));
+    EXPECT_FALSE(backlog_.has_retry(19)) << "nobody waits for it any more";
+    EXPECT_TRUE(backlog_.cancel(1).empty());
+}
+
+/// Clients that left while it was on the wire are still among its jobs.
+TEST_F(BacklogTest, P2ARetryEndsWithTheLastClientThatWaitsForIt) {
+    Job left = read(1, 17);
+    left.gone = true;
+    retry({read(2, 17), left, read(3, 17)});
+    EXPECT_EQ(backlog_.cancel(2).size(), 1u);
+    EXPECT_TRUE(backlog_.has_retry(17));
+    EXPECT_EQ(backlog_.cancel(3).size(), 2u) << "each is answered";
+    EXPECT_FALSE(backlog_.has_retry(17));
+    EXPECT_EQ(backlog_.take_dropped().size(), 1u);
+    EXPECT_TRUE(backlog_.take_dropped().empty());
+    left = read(1, 18);
+    left.gone = true;
+    left.deadline = kStart + 9s;
+    retry({until(read(2, 18), kStart, kStart + 1s), left});
+    EXPECT_EQ(backlog_.expire(kStart + 1s).size(), 2u);
+    EXPECT_TRUE(backlog_.empty());
+}
+
+TEST_F(BacklogTest, P3WhatWasNotSentExpiresWhenItCanNoLongerBeStarted) {
+    const Ticket first = wait(until(read(1, 17), kStart + 1s, kStart + 5s));
+    wait(until(read(2, 17), kStart + 2s, kStart + 3s));
+    EXPECT_EQ(backlog_.first_expiry(), kStart + 1s);
+    EXPECT_TRUE(backlog_.expire(kStart + 1s - 1ns).empty());
+    EXPECT_EQ(tickets(backlog_.expire(kStart + 1s)), std::vector<Ticket>{first});
+    EXPECT_EQ(backlog_.first_expiry(), kStart + 2s);
+}
+
+TEST_F(BacklogTest, P3WhatWasSentExpiresOnlyAtItsDeadlineEachJobAtItsOwn) {
+    const Job first = until(read(1, 17), kStart + 1s, kStart + 2s);
+    const Job second = until(read(2, 17), kStart + 1s, kStart + 4s);
+    retry({first, second});
+    EXPECT_EQ(backlog_.first_expiry(), kStart + 2s);
+    EXPECT_TRUE(backlog_.expire(kStart + 2s - 1ns).empty());
+    EXPECT_EQ(tickets(backlog_.expire(kStart + 2s)), std::vector<Ticket>{first.ticket});
+    EXPECT_TRUE(backlog_.has_retry(17)) << "one still waits for it";
+    EXPECT_EQ(tickets(backlog_.expire(kStart + 4s)), std::vector<Ticket>{second.ticket});
+    EXPECT_FALSE(backlog_.has_retry(17));
+    EXPECT_FALSE(backlog_.first_expiry());
+}
+
+TEST_F(BacklogTest, OnlyWhatWaitsForItsFirstTurnIsRemoved) {
+    const Ticket waits = wait(read(1, 17));
+    retry({read(1, 17)});
+    EXPECT_EQ(tickets(backlog_.remove_if(test::any)), std::vector<Ticket>{waits});
+    EXPECT_TRUE(backlog_.has_retry(17));
+}
+
+TEST_F(BacklogTest, P7GivesEverythingWhenItIsCleared) {
+    wait(read(1, 17));
+    wait(write(2, 18));
+    retry({read(3, 17), read(4, 17)});
+    EXPECT_EQ(backlog_.clear().size(), 4u);
+    EXPECT_TRUE(backlog_.empty());
+    EXPECT_TRUE(backlog_.clear().empty());
 }
 
 }  // namespace

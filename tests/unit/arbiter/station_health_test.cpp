@@ -7,24 +7,22 @@
 namespace panelgate::arbiter::station_health_test {
 namespace {
 
+constexpr TimePoint kStart{1h};
+
 class StationHealthTest : public testing::Test {
   protected:
     bool miss() { return health.on_silence(now += 1s); }
     void go_offline() {
         while (!health.offline()) miss();
     }
-    Duration until_probe() const { return health.next_probe() - now; }
 
     StationHealth health{{.after = 3, .probe_min = 500ms, .probe_max = 3s}};
-    TimePoint now{1h};
+    TimePoint now = kStart;
 };
 
-TEST_F(StationHealthTest, IsUnknownBeforeTheFirstTry) {
+TEST_F(StationHealthTest, P4SoManySilencesInARowTakeItOfflineOnce) {
     EXPECT_EQ(health.state(), Health::unknown);
     EXPECT_FALSE(health.last_success());
-}
-
-TEST_F(StationHealthTest, P4SoManySilencesInARowTakeItOfflineOnce) {
     EXPECT_FALSE(miss());
     EXPECT_EQ(health.state(), Health::suspect);
     EXPECT_FALSE(miss());
@@ -83,12 +81,12 @@ TEST_F(StationHealthTest, AReplyBringsItBackAndIsRemembered) {
 TEST_F(StationHealthTest, P4ThePauseBetweenProbesDoublesUpToItsMost) {
     go_offline();
     for (const Duration pause : {500ms, 1000ms, 2000ms, 3000ms, 3000ms}) {
-        EXPECT_EQ(until_probe(), pause);
+        EXPECT_EQ(health.next_probe() - now, pause);
         miss();
     }
     health.on_reply(now);
     go_offline();
-    EXPECT_EQ(until_probe(), Duration(500ms)) << "from the start again";
+    EXPECT_EQ(health.next_probe() - now, Duration(500ms)) << "from the start again";
 }
 
 TEST_F(StationHealthTest, P4AWriteMayBeTheProbeOnceAnInterval) {
@@ -100,12 +98,8 @@ TEST_F(StationHealthTest, P4AWriteMayBeTheProbeOnceAnInterval) {
     EXPECT_TRUE(health.take_half_open(now + 1s));
 }
 
-TEST(StationHealth, P10ALateReplyIsASignOfLifeAndNoSuccess) {
-    StationHealth health(OfflineSettings{.after = 2});
-    const TimePoint now{1h};
-    health.on_silence(now);
-    health.on_silence(now);
-    ASSERT_EQ(health.state(), Health::offline);
+TEST_F(StationHealthTest, P10ALateReplyIsASignOfLifeAndNoSuccess) {
+    go_offline();
     EXPECT_TRUE(health.on_late_reply(now + 1s)) << "it is back";
     EXPECT_EQ(health.state(), Health::suspect);
     EXPECT_FALSE(health.last_success());
@@ -115,34 +109,70 @@ TEST(StationHealth, P10ALateReplyIsASignOfLifeAndNoSuccess) {
     EXPECT_EQ(health.last_success(), now + 2s);
 }
 
-TEST(StationHealth, P10OnALineThatIsDownNothingIsKnownUntilItIsAskedAgain) {
-    StationHealth health(OfflineSettings{.after = 2});
-    const TimePoint now{1h};
+TEST_F(StationHealthTest, P10OnALineThatIsDownNothingIsKnownUntilItIsAskedAgain) {
     health.on_reply(now);
     health.on_line_down();
     EXPECT_EQ(health.state(), Health::unknown);
     EXPECT_EQ(health.last_success(), now);
     health.on_reply(now + 1s);
     EXPECT_EQ(health.state(), Health::online);
-    health.on_silence(now);
-    health.on_silence(now);
+    go_offline();
     health.on_line_down();
     EXPECT_EQ(health.state(), Health::unknown);
     EXPECT_TRUE(health.offline()) << "it is asked by probes all the same";
-    health.on_silence(now + 2s);
+    miss();
     EXPECT_EQ(health.state(), Health::offline);
 }
 
-TEST(StationHealth, P4SilentWritesAloneTakeNoStationOfflineThatAnswersReads) {
-    StationHealth health(OfflineSettings{.after = 3});
-    const TimePoint now{1h};
+TEST_F(StationHealthTest, P4SilentWritesAloneTakeNoStationOfflineThatAnswersReads) {
     health.on_reply(now);
     EXPECT_FALSE(health.on_silent_write());
     EXPECT_FALSE(health.on_silent_write());
     for (int i = 0; i < 9; ++i) EXPECT_TRUE(health.on_silent_write()) << "a read is to tell";
     EXPECT_EQ(health.state(), Health::suspect);
-    EXPECT_TRUE(health.on_silence(now)) << "the read was silent, too";
+    EXPECT_TRUE(miss()) << "the read was silent, too";
     EXPECT_EQ(health.state(), Health::offline);
+}
+
+TEST(ProbeBudget, P4SpendingWheneverAllowedStaysAtTheShare) {
+    for (const double share : {ProbeBudget::kOffline, ProbeBudget::kFailing}) {
+        ProbeBudget budget(share);
+        TimePoint now = kStart;
+        Duration spent{};
+        for (int i = 0; i < 200; ++i) {
+            const Duration cost = (1 + i * 37 % 500) * 1ms;
+            ASSERT_TRUE(budget.allows(now));
+            now += cost;
+            spent += cost;
+            budget.spend(now, cost);
+            now = budget.next();
+            ASSERT_FALSE(budget.allows(now - 1ns));
+        }
+        EXPECT_NEAR(to_seconds(spent) / to_seconds(now - kStart), share, share / 1000);
+        budget.clear();
+        EXPECT_TRUE(budget.allows(kStart)) << "free again";
+    }
+}
+
+TEST(ProbeBudget, UnusedTimeIsNotSavedUp) {
+    ProbeBudget budget(0.2);
+    budget.spend(kStart, 100ms);
+    EXPECT_FALSE(budget.allows(kStart));
+    const Duration rest = budget.next() - kStart;
+    budget.spend(kStart + 1h, 100ms);
+    EXPECT_EQ(budget.next() - (kStart + 1h), rest);
+}
+
+TEST(ProbeBudget, P4AnExcessIsPaidOffUpToALimit) {
+    ProbeBudget budget(0.2);
+    for (int i = 1; i <= 3; ++i) budget.spend(kStart + i * 100ms, 100ms, 1h);
+    EXPECT_EQ(budget.next(), kStart + 1500ms) << "a fifth of that time was spent";
+    EXPECT_FALSE(budget.allows(kStart + 500ms));
+    EXPECT_TRUE(budget.allows(kStart + 500ms, 1s)) << "that much is lent";
+    for (int i = 4; i <= 100; ++i) budget.spend(kStart + i * 100ms, 100ms, 2s);
+    EXPECT_EQ(budget.next(), kStart + 10s + 2s);
+    budget.spend(kStart + 11s, 1s, 2s);
+    EXPECT_EQ(budget.next(), kStart + 15s) << "one that is dearer is paid in full";
 }
 
 }  // namespace

@@ -117,15 +117,13 @@ TEST_F(StationTest, P1ARepetitionOfThePreviousReplyMayBeADuplicateAndTheOutstand
     EXPECT_TRUE(station_.has_outstanding());
     const auto other = station_.on_unsolicited_frame(now_ + 40ms, kOtherValue);
     EXPECT_TRUE(other.settled);
-    EXPECT_TRUE(may_ask(now_ + 40ms, kOther)) << "copies are not its habit yet";
+    EXPECT_TRUE(may_ask(now_ + 40ms, kOther)) << "duplicates are not its habit yet";
 }
 
 TEST_F(StationTest, P1ADuplicateAmidDamagedBytesShowsThatTheStationSendsTwice) {
     answer(kRead, kReply);
-    Bytes heard = "23 03"_hex;
     const Bytes adu = modbus::encode_adu(kId, kReply);
-    heard.insert(heard.end(), adu.begin(), adu.end());
-    heard.push_back(0x07);
+    const Bytes heard = Writer().raw("23 03"_hex).raw(adu).u8(7).take();
     station_.on_damaged_bytes(now_ + 20ms, kId, heard);
     answer(kOther, kOtherValue);
     EXPECT_FALSE(may_ask(now_ + 20ms, kOther));
@@ -211,6 +209,13 @@ TEST_F(StationTest, P4OneThatHasFallenSilentIsNotRetriedAndWaitedForAsLongAsItHa
     answer(kRead, kReply);
     EXPECT_FALSE(station_.missed_last());
     EXPECT_EQ(patience(kRead), kTimeout);
+    station_.on_retry(false);
+    EXPECT_FALSE(station_.missed_last());
+    station_.on_retry(true);  // while it is due, its silence is known
+    EXPECT_TRUE(station_.missed_last());
+    EXPECT_LT(patience(kRead), kTimeout / 2);
+    answer(kRead, kReply);
+    EXPECT_FALSE(station_.missed_last());
 }
 
 TEST_F(StationTest, P4OneThatKeepsFailingWithoutBeingSilentHasAFifthOfTheBus) {
@@ -258,41 +263,22 @@ TEST_F(StationTest, P4HalfOfTheLastAttemptsInVainMakeItFlakyAndLateRepliesDoNotM
     EXPECT_LT(station_.patience(group_of(kId, kRead), std::nullopt, false, true), kTimeout / 2);
     for (int i = 0; i < 5; ++i) answer(kRead, kReply);
     EXPECT_FALSE(station_.flaky());
-}
-
-TEST_F(StationTest, P4DamagedRepliesDoNotMakeItFlaky) {
     for (int i = 0; i < 8; ++i) miss(kRead, Verdict::damaged);
-    EXPECT_FALSE(station_.flaky());
+    EXPECT_FALSE(station_.flaky()) << "damaged replies are no silence";
 }
 
-TEST_F(StationTest, P4WhileARetryIsDueItsSilenceIsKnown) {
-    answer(kRead, kReply);
-    station_.on_retry(false);
-    EXPECT_FALSE(station_.missed_last());
-    station_.on_retry(true);
-    EXPECT_TRUE(station_.missed_last());
-    EXPECT_LT(patience(kRead), kTimeout / 2);
-    answer(kRead, kReply);
-    EXPECT_FALSE(station_.missed_last());
-}
-
-TEST_F(StationTest, AnUnheardStationThatIsWantedIsNotForgotten) {
-    Station unheard = station(false);
-    unheard.on_asked(now_, group_of(kId, kRead));
-    unheard.on_wanted(now_ + 30s);
-    EXPECT_FALSE(unheard.forgettable(now_ + Station::kForgetUnheard));
-    EXPECT_TRUE(unheard.forgettable(now_ + 30s + Station::kForgetUnheard));
-}
-
-TEST_F(StationTest, OnlyAnUnheardStationIsForgottenWhenNotAskedForAMinute) {
+TEST_F(StationTest, OnlyAnUnheardStationIsForgottenWhenNotWantedForAMinute) {
     Station unheard = station(false);
     unheard.on_asked(now_, group_of(kId, kRead));
     station_.on_asked(now_, group_of(kId, kRead));
     EXPECT_FALSE(unheard.forgettable(now_ + Station::kForgetUnheard - 1ns));
     EXPECT_TRUE(unheard.forgettable(now_ + Station::kForgetUnheard));
     EXPECT_FALSE(station_.forgettable(now_ + 1h));
+    unheard.on_wanted(now_ + 30s);
+    EXPECT_FALSE(unheard.forgettable(now_ + Station::kForgetUnheard));
+    EXPECT_TRUE(unheard.forgettable(now_ + 30s + Station::kForgetUnheard));
     unheard.add_outstanding(now_, kRead, now_);
-    EXPECT_FALSE(unheard.forgettable(now_ + 1h)) << "it owes something";
+    EXPECT_FALSE(unheard.forgettable(now_ + 1h)) << "a reply is outstanding";
     unheard.on_unsolicited_frame(now_ + 1s, kReply);
     EXPECT_FALSE(unheard.forgettable(now_ + 1h)) << "it was heard";
 }

@@ -102,61 +102,53 @@ TEST(WallTime, IsWrittenAsRfc3339WithMicroseconds) {
     EXPECT_EQ(wall_time_of(TimePoint(6s), TimePoint(5s), wall), wall + 1s);
 }
 
-using Told = std::vector<std::pair<Duration, double>>;
+using Values = std::vector<std::pair<int, double>>;  // at seconds
 
 constexpr TimePoint kStart{100s};
 
 /// Four slots of 10 s; times are relative to kStart.
-class SlotRingTest : public testing::Test {
-  protected:
-    Told told(Duration now) const {
-        Told all;
-        ring.each(kStart + now,
-                  [&](TimePoint at, double value) { all.emplace_back(at - kStart, value); });
-        return all;
-    }
-    void put(Duration at, double value) { ring.put(kStart + at, value); }
-
-    SlotRing ring{10s, 4};
-};
-
-TEST_F(SlotRingTest, KeepsTheLastValueOfEachSlot) {
-    EXPECT_EQ(told(0s), Told());
-    EXPECT_FALSE(ring.at(kStart));
-    put(0s, 1);
-    put(9s, 2);
-    put(10s, 0);
-    EXPECT_EQ(told(10s), (Told{{0s, 2}, {10s, 0}}));
-    EXPECT_EQ(ring.at(kStart + 5s), 2);
-    EXPECT_EQ(ring.at(kStart + 19s), 0);
-    EXPECT_FALSE(ring.at(kStart + 20s));
-    EXPECT_FALSE(ring.at(kStart - 1s));
+SlotRing ring_of(const Values& put) {
+    SlotRing ring(10s, 4);
+    for (const auto& [at, value] : put) ring.put(kStart + at * 1s, value);
+    return ring;
 }
 
-TEST_F(SlotRingTest, P10AnUnsetSlotIsAbsentAndNever0) {
-    put(0s, 1);
-    put(30s, 4);
-    EXPECT_EQ(told(30s), (Told{{0s, 1}, {30s, 4}}));
-    EXPECT_FALSE(ring.at(kStart + 15s));
+Values told(const Values& put, int now) {
+    Values all;
+    ring_of(put).each(kStart + now * 1s, [&](TimePoint at, double value) {
+        all.emplace_back(static_cast<int>((at - kStart) / 1s), value);
+    });
+    return all;
 }
 
-TEST_F(SlotRingTest, ForgetsTheOldest) {
-    for (int i = 0; i < 6; ++i) put(i * 10s, i);
-    EXPECT_EQ(told(50s), (Told{{20s, 2}, {30s, 3}, {40s, 4}, {50s, 5}}));
-    put(15s, 9);
-    EXPECT_EQ(told(50s).size(), 4u) << "too late";
-    put(25s, 9);
-    EXPECT_EQ(told(50s), (Told{{20s, 9}, {30s, 3}, {40s, 4}, {50s, 5}}));
+TEST(SlotRing, KeepsTheLastValueOfEachSlot) {
+    EXPECT_EQ(told({}, 0), Values());
+    EXPECT_FALSE(ring_of({}).at(kStart));
+    const Values put{{0, 1}, {9, 2}, {10, 0}};
+    EXPECT_EQ(told(put, 10), (Values{{0, 2}, {10, 0}}));
+    EXPECT_EQ(ring_of(put).at(kStart + 5s), 2);
+    EXPECT_EQ(ring_of(put).at(kStart + 19s), 0);
+    EXPECT_FALSE(ring_of(put).at(kStart + 20s));
+    EXPECT_FALSE(ring_of(put).at(kStart - 1s));
 }
 
-TEST_F(SlotRingTest, TimeAloneMakesOld) {
-    put(0s, 1);
-    put(20s, 3);
-    EXPECT_EQ(told(39s), (Told{{0s, 1}, {20s, 3}}));
-    EXPECT_EQ(told(40s), (Told{{20s, 3}}));
-    EXPECT_EQ(told(60s), Told());
-    put(100s, 7);
-    EXPECT_EQ(told(100s), (Told{{100s, 7}}));
+TEST(SlotRing, P10AnUnsetSlotIsAbsentAndNever0) {
+    EXPECT_EQ(told({{0, 1}, {30, 4}}, 30), (Values{{0, 1}, {30, 4}}));
+    EXPECT_FALSE(ring_of({{0, 1}, {30, 4}}).at(kStart + 15s));
+}
+
+TEST(SlotRing, ForgetsTheOldest) {
+    Values put{{0, 0}, {10, 1}, {20, 2}, {30, 3}, {40, 4}, {50, 5}};
+    EXPECT_EQ(told(put, 50), (Values{{20, 2}, {30, 3}, {40, 4}, {50, 5}}));
+    put.emplace_back(15, 9);
+    EXPECT_EQ(told(put, 50).size(), 4u) << "too late";
+    put.emplace_back(25, 9);
+    EXPECT_EQ(told(put, 50), (Values{{20, 9}, {30, 3}, {40, 4}, {50, 5}}));
+    // Time alone makes old.
+    EXPECT_EQ(told({{0, 1}, {20, 3}}, 39), (Values{{0, 1}, {20, 3}}));
+    EXPECT_EQ(told({{0, 1}, {20, 3}}, 40), (Values{{20, 3}}));
+    EXPECT_EQ(told({{0, 1}, {20, 3}}, 60), Values());
+    EXPECT_EQ(told({{0, 1}, {20, 3}, {100, 7}}, 100), (Values{{100, 7}}));
 }
 
 TEST(SlotRing, KnowsNothingOfBeforeTheClockBegan) {

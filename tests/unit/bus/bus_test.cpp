@@ -10,7 +10,6 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <utility>
 #include <variant>
 #include <vector>
 
@@ -164,7 +163,9 @@ TEST_F(BusTest, RefusesWhatMayNotBeTransmitted) {
 }
 
 TEST_F(BusTest, AsksALineThatCanTellWhetherTheRequestHasLeft) {
+    make_bus();
     line->tells_unsent = true;
+    bus->start();
     const int before = line->asked_for_unsent;
     EXPECT_TRUE(ask(17).pdu.has_value());
     EXPECT_FALSE(ask_silent(17).pdu.has_value());

@@ -9,7 +9,6 @@
 #include <optional>
 #include <ostream>
 #include <set>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -122,24 +121,6 @@ TEST(ConfigGoldenFolder, EachCaseBeginsWithAPlace) {
             EXPECT_EQ(one.expected.find("not YAML"), std::string::npos) << one.name;
         }
     }
-}
-
-TEST(ConfigGoldenFolder, PutsTheLinesOfACaseIntoItsPrelude) {
-    const std::string text =
-        "# about\na:\n<case>\nz: 1\n\n==== one\n  b: 2\n----\nf:2:3: no\n\n==== two whole\nc: "
-        "3\n----\n";
-    const GoldenFile file = parse_golden(text);
-    ASSERT_EQ(file.cases.size(), 2U);
-    EXPECT_EQ(file.configuration_of(file.cases[0]), "a:\n  b: 2\nz: 1\n");
-    EXPECT_EQ(file.cases[0].expected, "f:2:3: no\n");
-    EXPECT_EQ(file.configuration_of(file.cases[1]), "c: 3\n");
-    EXPECT_EQ(file.cases[1].expected, "");
-    EXPECT_EQ(write_golden(file), text);
-}
-
-TEST(ConfigGoldenFolder, ALineOfNoCaseIsRefused) {
-    EXPECT_THROW(parse_golden("==== one\na: 1\n----\nsaid\n\nlost\n"), std::invalid_argument);
-    EXPECT_THROW(parse_golden("a: 1\n\n==== one\nb: 1\n----\n"), std::invalid_argument);
 }
 
 }  // namespace

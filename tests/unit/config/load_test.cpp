@@ -11,11 +11,11 @@
 #include <utility>
 #include <vector>
 
+#include "load.hpp"
 #include "memory_files.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/yaml/document.hpp"
-#include "load.hpp"
 
 namespace panelgate::config::load_test {
 namespace {

@@ -24,15 +24,15 @@ Line line_of(const std::string& text) {
 }
 
 TEST(ConfigTiming, P5AFrameGapIsTheOwnersChoiceDownToThreeAndAHalfCharacters) {
-    const Line quick = line_of(
-        kTty +
-        "    serial: {baud: 115200, parity: none}\n    timing: {frame_gap: 304us}\n"
-        "    stations: [{id: 1}, {id: 2, timing: {frame_gap: auto}}]\n");
+    const Line quick =
+        line_of(kTty +
+                "    serial: {baud: 115200, parity: none}\n    timing: {frame_gap: 304us}\n"
+                "    stations: [{id: 1}, {id: 2, timing: {frame_gap: auto}}]\n");
     EXPECT_EQ(quick.arbiter.unlisted.frame_gap, 304us);
     EXPECT_EQ(quick.arbiter.stations[0].frame_gap, 304us);
     EXPECT_EQ(quick.arbiter.stations[1].frame_gap, 1750us);
-    const Line slow = line_of(
-        kTty + "    serial: {baud: 9600, parity: none}\n    timing: {frame_gap: 3646us}\n");
+    const Line slow =
+        line_of(kTty + "    serial: {baud: 9600, parity: none}\n    timing: {frame_gap: 3646us}\n");
     EXPECT_GE(Duration(3646us), silent_interval(slow.device.serial));
     for (const std::string& device : {kSim, kTcp})
         EXPECT_EQ(line_of(device + "    timing: {frame_gap: 0us}\n").arbiter.unlisted.frame_gap,

@@ -114,9 +114,7 @@ class Diagnose : public testing::Test {
     /// Of station 1 alone on its line.
     std::string alone(const arbiter::Symptoms& one) const { return causes({{1, one}}); }
     /// Of station 2 beside one that has no fault.
-    std::string beside(const arbiter::Symptoms& two) const {
-        return causes({{1, fine}, {2, two}});
-    }
+    std::string beside(const arbiter::Symptoms& two) const { return causes({{1, fine}, {2, two}}); }
     /// The only finding, which is this one.
     Finding only(const std::string& what, Stations stations) const {
         const std::vector<Finding> found = findings(std::move(stations));

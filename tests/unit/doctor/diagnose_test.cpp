@@ -169,8 +169,8 @@ TEST_F(Diagnose, SilentWhenAskedQuicklyIsAGapTooShort) {
 
 TEST_F(Diagnose, LateRepliesAreATimeoutTooShortAndNoGap) {
     facts.response_timeouts[2] = 100ms;
-    const Finding found = only("timeout-too-short 2",
-                               {{1, fine}, {2, Mix().lost(6, 0).answered(6).late(6, 41ms)}});
+    const Finding found =
+        only("timeout-too-short 2", {{1, fine}, {2, Mix().lost(6, 0).answered(6).late(6, 41ms)}});
     EXPECT_EQ(found.advice, "Set its `timing.response_timeout` to 180ms.");
     EXPECT_THAT(found.evidence, HasSubstr("6 replies came up to 41ms after the timeout of 100ms"));
     EXPECT_EQ(beside(Mix().silent(9).late(3, 50ms)), "timeout-too-short 2");

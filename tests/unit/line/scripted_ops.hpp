@@ -1,7 +1,8 @@
 #pragma once
 
 #include <asm/ioctls.h>
-#include <asm/termios.h>
+#include <asm/termbits.h>
+#include <asm/termios.h>  // neither with <termios.h>
 #include <linux/serial.h>
 
 #include <cerrno>

@@ -125,8 +125,8 @@ TEST_F(TtyLineTest, ADeviceThatIsListenedToIsOpenedForReadingOnlyAndNothingLeave
 TEST_F(TtyLineTest, P7OpensADeviceThatAppearsLaterAndReportsOnceWhatIsMissing) {
     const auto line = start(heard);
     for (int i = 0; i < 3; ++i) io.run_one();  // further attempts report nothing new
-    EXPECT_THAT(heard.downs, ElementsAre("cannot open " + settings.device +
-                                         ": No such file or directory"));
+    EXPECT_THAT(heard.downs,
+                ElementsAre("cannot open " + settings.device + ": No such file or directory"));
     const Pty pty;
     plug(pty);
     run_until([&] { return heard.ups == 1; });

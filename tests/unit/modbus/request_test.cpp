@@ -149,18 +149,10 @@ TEST(Request, KnowsWhatItIs) {
           "18 04 DE"_hex, "2B 0E 01 00"_hex, "2B 0D 01"_hex, "5A 01 02"_hex}) {
         const Request request = Request::make(pdu, QuantityCheck::fit).value();
         EXPECT_EQ(request.pdu(), pdu);
-        EXPECT_EQ(request.function(), pdu[0]);
         EXPECT_EQ(request.is_read(), is_pure_read(pdu)) << to_hex(pdu);
-        EXPECT_EQ(request.is_broadcastable(), is_broadcastable(pdu[0])) << to_hex(pdu);
-        EXPECT_EQ(request.is_never_answered(), is_never_answered(pdu)) << to_hex(pdu);
         EXPECT_EQ(request.span(), read_span(pdu)) << to_hex(pdu);
-        EXPECT_EQ(request.access().read, access_of(pdu).read) << to_hex(pdu);
-        EXPECT_EQ(request.access().write, access_of(pdu).write) << to_hex(pdu);
         EXPECT_EQ(request.reply_length(), reply_length_from_request(pdu)) << to_hex(pdu);
     }
-}
-
-TEST(Request, OfASpanReadsIt) {
     const Span span{Table::input_registers, 0x102, 127};
     EXPECT_EQ(Request::read(span).pdu(), "04 01 02 00 7F"_hex);
     EXPECT_EQ(Request::read(span).span(), span);
@@ -186,14 +178,13 @@ TEST(AccessOf, SaysWhatIsReadAndWritten) {
           Row{write_registers(4), {}, holding(0, 4)},
           Row{"16 00 04 00 F2 00 25"_hex, {}, holding(4, 1)},
           Row{"18 04 DE"_hex, holding(0x04DE, 1), {}},
-          Row{"17 00 03 00 06 00 0E 00 01 02 00 FF"_hex, holding(3, 6), holding(14, 1)},
-          // Functions without addresses.
-          Row{}, Row{"07"_hex, {}, {}}, Row{"08 00 00 00 01"_hex, {}, {}}, Row{"11"_hex, {}, {}},
-          Row{read_file(1), {}, {}}, Row{"2B 0E 01 00"_hex, {}, {}},
-          Row{"41 00 01 00 02"_hex, {}, {}}}) {
+          Row{"17 00 03 00 06 00 0E 00 01 02 00 FF"_hex, holding(3, 6), holding(14, 1)}, Row{}}) {
         EXPECT_EQ(access_of(row.pdu).read, row.read) << to_hex(row.pdu);
         EXPECT_EQ(access_of(row.pdu).write, row.write) << to_hex(row.pdu);
     }
+    for (const Bytes& pdu : {"07"_hex, "08 00 00 00 01"_hex, "11"_hex, read_file(1),
+                             "2B 0E 01 00"_hex, "41 00 01 00 02"_hex})
+        EXPECT_FALSE(access_of(pdu).read || access_of(pdu).write) << to_hex(pdu);
 }
 
 TEST(ReadSpan, IsWhatOneOfTheFourReadsAsksFor) {
@@ -212,16 +203,13 @@ TEST(ReadSpan, IsWhatOneOfTheFourReadsAsksFor) {
         EXPECT_FALSE(read_span(pdu)) << to_hex(pdu);
 }
 
-TEST(Request, IsAPureReadOnlyWhenSurelyOne) {
+TEST(Request, IsAPureReadOrNeverAnsweredOnlyWhenSurelySo) {
     for (const Bytes& pdu : {"03 00 00 00 01"_hex, "2B 0E 01 00"_hex})
         EXPECT_TRUE(is_pure_read(pdu)) << to_hex(pdu);
     for (const Bytes& pdu :
          {"2B 0D 01"_hex, "2B"_hex, "08 00 00 00 01"_hex, read_write(1, 1), "5A"_hex, ""_hex})
         EXPECT_FALSE(is_pure_read(pdu)) << to_hex(pdu);
-}
-
-TEST(Request, OnlyForceListenOnlyIsNeverAnswered) {
-    EXPECT_TRUE(is_never_answered("08 00 04 00 00"_hex));
+    EXPECT_TRUE(is_never_answered("08 00 04 00 00"_hex)) << "force listen only";
     for (const Bytes& pdu : {"08 04 00 00 00"_hex, "08 00 00 00 04"_hex, "06 00 04 00 00"_hex})
         EXPECT_FALSE(is_never_answered(pdu)) << to_hex(pdu);
 }

@@ -4,7 +4,6 @@
 
 #include <random>
 #include <tuple>
-#include <utility>
 #include <vector>
 
 #include "support/hex.hpp"

@@ -6,6 +6,7 @@
 #include <optional>
 #include <random>
 #include <tuple>
+#include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
@@ -20,6 +21,81 @@ const Bytes kReply = "11 03 06 02 2B 00 00 00 64 C8 BA"_hex;
 Bytes joined(Bytes front, const Bytes& back) {
     front.insert(front.end(), back.begin(), back.end());
     return front;
+}
+
+/// The procedure of serial line V1.02, 6.2.2, a bit at a time.
+std::uint16_t slow_crc(ByteView bytes) {
+    unsigned crc = 0xFFFF;
+    for (const std::uint8_t byte : bytes) {
+        crc ^= byte;
+        for (int bit = 0; bit < 8; ++bit) {
+            const bool carry = (crc & 1) != 0;
+            crc >>= 1;
+            if (carry) crc ^= 0xA001;
+        }
+    }
+    return static_cast<std::uint16_t>(crc);
+}
+
+TEST(Crc16, GivesTheValuesOfTheStandard) {
+    EXPECT_EQ(crc16("31 32 33 34 35 36 37 38 39"_hex), 0x4B37) << "check value of the algorithm";
+    EXPECT_EQ(crc16("02 07"_hex), 0x1241) << "example of the serial line guide";
+    EXPECT_EQ(crc16({}), 0xFFFF);
+    EXPECT_EQ(crc16("02 07 41 12"_hex), 0) << "over a frame with its CRC";
+}
+
+TEST(Crc16, AgreesWithTheBitwiseProcedure) {
+    std::mt19937 random(1);
+    for (std::size_t size = 0; size < 300; ++size) {
+        Bytes bytes(size);
+        for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random());
+        ASSERT_EQ(crc16(bytes), slow_crc(bytes)) << to_hex(bytes);
+    }
+}
+
+TEST(RtuFrame, IsAtLeastFourBytesWithTheLowByteOfTheCrcFirst) {
+    EXPECT_EQ(encode_adu(0x02, "07"_hex), "02 07 41 12"_hex);
+    EXPECT_TRUE(crc_ok("02 07 41 12"_hex));
+    EXPECT_FALSE(crc_ok("02 07 12 41"_hex));
+    EXPECT_FALSE(crc_ok({}));
+    EXPECT_FALSE(crc_ok("FF"_hex));
+    EXPECT_FALSE(crc_ok("FF FF"_hex)) << "the residue of nothing is not a frame";
+    EXPECT_FALSE(crc_ok("02 3E 81"_hex));
+    const Bytes longest = encode_adu(0x14, Bytes(257, 0x55));
+    EXPECT_EQ(longest.size(), 260u);
+    EXPECT_TRUE(crc_ok(longest)) << "there is no upper limit here";
+    EXPECT_FALSE(decode_adu("02 07 41 13"_hex));
+}
+
+TEST(RtuFrame, ComesApartIntoStationAndPdu) {
+    const Bytes adu = "11 03 00 6B 00 03 76 87"_hex;
+    const std::optional<RtuFrame> frame = decode_adu(adu);
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->station, 0x11);
+    EXPECT_EQ(Bytes(frame->pdu.begin(), frame->pdu.end()), "03 00 6B 00 03"_hex);
+}
+
+TEST(CrcOrder, HighFirstIsTheSameCrcInReverseOrderAndGoodInItsOwnOnly) {
+    const Bytes old = encode_adu(0x11, kReplyPdu, CrcOrder::high_first);
+    EXPECT_EQ(old, "11 03 06 02 2B 00 00 00 64 BA C8"_hex);
+    Bytes swapped = old;
+    std::swap(swapped[swapped.size() - 2], swapped.back());
+    EXPECT_EQ(swapped, encode_adu(0x11, kReplyPdu));
+    EXPECT_TRUE(crc_ok(old, CrcOrder::high_first));
+    EXPECT_FALSE(crc_ok(old));
+    EXPECT_FALSE(crc_ok(swapped, CrcOrder::high_first));
+    EXPECT_FALSE(crc_ok("11 03 06"_hex, CrcOrder::high_first)) << "no frame is so short";
+}
+
+TEST(CrcOrder, EachAddressOfALineHasItsOwn) {
+    CrcOrders orders;
+    orders.set(5, CrcOrder::high_first);
+    EXPECT_EQ(orders.of(5), CrcOrder::high_first);
+    EXPECT_EQ(orders.of(6), CrcOrder::low_first);
+    EXPECT_TRUE(crc_ok(encode_adu(5, kReplyPdu, CrcOrder::high_first), orders));
+    EXPECT_FALSE(crc_ok(encode_adu(5, kReplyPdu), orders));
+    EXPECT_TRUE(crc_ok(encode_adu(6, kReplyPdu), orders));
+    EXPECT_FALSE(crc_ok({}, orders));
 }
 
 class RtuFramer : public ::testing::Test {
@@ -173,9 +249,13 @@ TEST_F(RtuFramer, EveryOneBitDamageIsRejected) {
     }
 }
 
-TEST_F(RtuFramer, ReadsTheTwoByteCountOfReadFifoQueue) {
+TEST_F(RtuFramer, KnowsTheTwoByteCountOfReadFifoQueueAndTheLongFramesOfPanels) {
     ReplyFramer fifo(0x11, "18 04 DE"_hex);
     EXPECT_TRUE(fifo.feed("11 18 00 06 00 02 01 B8 12 84 18 8D"_hex));
+    Bytes pdu{0x01, 255};
+    pdu.resize(257, 0x55);
+    ReplyFramer coils(20, "01 00 20 07 F8"_hex);
+    EXPECT_EQ(coils.feed(encode_adu(20, pdu)), pdu);
 }
 
 TEST_F(RtuFramer, SilenceEndsADeviceIdentificationWithAWrongCount) {
@@ -183,13 +263,6 @@ TEST_F(RtuFramer, SilenceEndsADeviceIdentificationWithAWrongCount) {
     ReplyFramer asked(0x11, "2B 0E 01 00"_hex);
     EXPECT_FALSE(asked.feed(encode_adu(0x11, pdu)));
     EXPECT_EQ(asked.on_silence(), pdu);
-}
-
-TEST_F(RtuFramer, TakesTheLongFramesOfPanelsThatHaveThem) {
-    Bytes pdu{0x01, 255};
-    pdu.resize(257, 0x55);
-    ReplyFramer asked(20, "01 00 20 07 F8"_hex);
-    EXPECT_EQ(asked.feed(encode_adu(20, pdu)), pdu);
 }
 
 /// Station 5 has the old order of the CRC, high byte first; station 6 the standard's.

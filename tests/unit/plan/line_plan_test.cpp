@@ -15,7 +15,6 @@ using testing::SizeIs;
 class LinePlanTest : public testing::Test, protected test::PlantLine {
   protected:
     std::optional<HighestRate> rate() const { return highest_rate(line, make_plan(line)); }
-    LinePlan at(double times) const { return make_plan(at_intervals(line, 1 / times)); }
 };
 
 TEST_F(LinePlanTest, APollCostsItsFramesItsSilencesAndTheThinkTime) {
@@ -189,28 +188,7 @@ TEST_F(LinePlanTest, TheHighestRateIsSlowerWhereChangesAreTooMuch) {
     ASSERT_TRUE(rate());
     EXPECT_LT(rate()->times, 1);
     EXPECT_TRUE(rate()->changing);
-    EXPECT_NEAR(at(rate()->times).most, kFull, 1e-4);
-}
-
-TEST_F(LinePlanTest, ARefreshThatStaysLeavesMoreToTheHighestRate) {
-    add_both();
-    ask(line.stations[0], 200, 50, 2s);
-    copy(0, 10, 10s).refresh = 10s;
-    const LinePlan now = make_plan(line);
-    ASSERT_TRUE(rate());
-    EXPECT_GT(rate()->times, kHigh / now.load) << "writes do not come more often";
-    EXPECT_EQ(verdict(at(rate()->times * 0.999)), Verdict::fine);
-    EXPECT_NE(verdict(at(rate()->times * 1.001)), Verdict::fine);
-}
-
-TEST_F(LinePlanTest, ReadingAgainStopsAtItsLimit) {
-    add_both();
-    show_as_written(line.stations[1]);
-    ask(line.stations[1], 500, 60, 10s);
-    copy(0, 4, 100ms);
-    ASSERT_TRUE(rate());
-    EXPECT_LT(rate()->times, kHigh / make_plan(line).load) << "slower, it is as much at first";
-    EXPECT_NEAR(at(rate()->times).load, kHigh, 1e-4);
+    EXPECT_NEAR(make_plan(at_intervals(line, 1 / rate()->times)).most, kFull, 1e-4);
 }
 
 }  // namespace

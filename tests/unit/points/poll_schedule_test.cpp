@@ -100,14 +100,6 @@ TEST(PollSchedule, TurnsOutOfTurnComeInTheirOrderAndAreLimited) {
     EXPECT_EQ(schedule.take_due(kStart + 2h).size(), 1u) << "the burst is there again";
 }
 
-TEST(PollSchedule, PollsEveryIntervalAtItsOwnRate) {
-    PollSchedule schedule = make_schedule({100ms, 1s, 7s});
-    const Begun begun = run(schedule, 70s);
-    EXPECT_THAT(begun.at(0), SizeIs(700));
-    EXPECT_THAT(begun.at(1), SizeIs(70));
-    EXPECT_THAT(begun.at(2), SizeIs(10));
-}
-
 TEST(PollSchedule, DoesNotDriftOverTenThousandPeriods) {
     PollSchedule schedule = make_schedule({1s, 1s});
     std::minstd_rand random(7);

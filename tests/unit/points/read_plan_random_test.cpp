@@ -123,55 +123,45 @@ TEST(RandomReadPlan, KeepsItsPromisesForAHundredThousandStations) {
     }
 }
 
-/// Finds the minimum load (share of the wire) over all partitions of the wants into reads.
-class ExhaustiveSearch {
-  public:
-    ExhaustiveSearch(const std::vector<Want>& wants, const PlanLimits& limits)
-        : wants_(wants), limits_(limits) {
-        place(0);
-    }
-    double best() const { return best_; }
+using Parts = std::vector<std::vector<Want>>;
 
-  private:
-    void place(std::size_t index) {
-        if (index == wants_.size()) {
-            double sum = 0;
-            for (const std::vector<Want>& part : parts_) sum += load(part);
-            best_ = std::min(best_, sum);
-            return;
-        }
-        for (std::size_t i = 0; i < parts_.size(); ++i) {
-            parts_[i].push_back(wants_[index]);
-            if (load(parts_[i]) >= 0) place(index + 1);
-            parts_[i].pop_back();
-        }
-        parts_.push_back({wants_[index]});
-        place(index + 1);
-        parts_.pop_back();
+/// Returns the share of the wire of one read for these of the wants; -1 if they may not be read
+/// together. A want inside a longer read is no reason to refuse.
+double load_of(const std::vector<Want>& part, const std::vector<Want>& wants,
+               const PlanLimits& limits) {
+    modbus::Span box = part.front().span;
+    Duration every = part.front().every;
+    for (const Want& one : part) {
+        if (one.span.table != box.table) return -1;
+        box = join(box, one.span);
+        every = std::min(every, one.every);
     }
-    /// Returns -1 if these may not be read together. A want inside a longer read is no reason to
-    /// refuse.
-    double load(const std::vector<Want>& part) const {
-        modbus::Span box = part.front().span;
-        Duration every = part.front().every;
-        for (const Want& one : part) {
-            if (one.span.table != box.table) return -1;
-            box = join(box, one.span);
-            every = std::min(every, one.every);
-        }
-        const bool same =
-            std::ranges::all_of(part, [&](const Want& one) { return one.span == box; });
-        if (!same && (box.count > limits_.of(box.table).max_items ||
-                      crosses_hole(box, wants_, limits_) || contains_refused(box, limits_)))
-            return -1;
-        return to_seconds(read_cost(limits_, box.table, box.count)) / to_seconds(every);
-    }
+    const bool same = std::ranges::all_of(part, [&](const Want& one) { return one.span == box; });
+    if (!same && (box.count > limits.of(box.table).max_items || crosses_hole(box, wants, limits) ||
+                  contains_refused(box, limits)))
+        return -1;
+    return to_seconds(read_cost(limits, box.table, box.count)) / to_seconds(every);
+}
 
-    const std::vector<Want>& wants_;
-    const PlanLimits& limits_;
-    std::vector<std::vector<Want>> parts_;
-    double best_ = 1e9;
-};
+/// Returns the minimum load over all partitions into reads that begin with `parts`.
+double least_load(const std::vector<Want>& wants, const PlanLimits& limits, Parts& parts,
+                  std::size_t index = 0) {
+    double best = 0;
+    if (index == wants.size()) {
+        for (const std::vector<Want>& part : parts) best += load_of(part, wants, limits);
+        return best;
+    }
+    parts.push_back({wants[index]});
+    best = least_load(wants, limits, parts, index + 1);
+    parts.pop_back();
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+        parts[i].push_back(wants[index]);
+        if (load_of(parts[i], wants, limits) >= 0)
+            best = std::min(best, least_load(wants, limits, parts, index + 1));
+        parts[i].pop_back();
+    }
+    return best;
+}
 
 /// Returns the largest ratio of the plan's load to the minimum, over random stations.
 double worst_ratio(int stations, std::uint32_t intervals, unsigned seed) {
@@ -186,7 +176,8 @@ double worst_ratio(int stations, std::uint32_t intervals, unsigned seed) {
         for (const PlannedRead& read : plan_reads(wants, limits))
             load += to_seconds(read_cost(limits, read.span.table, read.span.count)) /
                     to_seconds(read.every);
-        worst = std::max(worst, load / ExhaustiveSearch(wants, limits).best());
+        Parts parts;
+        worst = std::max(worst, load / least_load(wants, limits, parts));
     }
     return worst;
 }

@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -73,82 +72,31 @@ TEST(ReadPlan, CountsWhatNobodyElseCanUseAsTheCostOfAReadAndOfAWrite) {
     expect_write(kRegisters, 1, true, 8 + 8);
 }
 
-struct Planned {
-    const char* why;
-    PlanLimits limits;
-    std::vector<Want> wants;
-    const char* reads;
-};
-
-void expect_plans(const std::vector<Planned>& rows) {
-    for (const Planned& row : rows)
-        EXPECT_EQ(text_of(plan_reads(row.wants, row.limits)), row.reads) << row.why;
-}
-
+// That every want is served, no want torn, no hole crossed, no refused span read with others, and
+// that no cheaper plan exists: read_plan_random_test.
 TEST(ReadPlan, ServesEveryWantWithFewReads) {
+    struct Case {
+        const char* why;
+        PlanLimits limits;
+        std::vector<Want> wants;
+        const char* reads;
+    };
     const PlanLimits limits = limits_of(125);
-    expect_plans({
+    const PlanLimits refused = limits_of(125, {{0, 100}}, {span(12, 1)});
+    const Case cases[] = {
         {"neighbours", limits, {want(12, 2), want(10), want(11)}, "10+4(0 1 2)"},
-        {"overlapping and contained ones",
-         limits,
-         {want(10, 20), want(12, 2), want(28, 10), want(10, 20)},
-         "10+28(0 1 2 3)"},
-        {"a want that fits is never torn", limits_of(4), {want(0, 3), want(3, 3)}, "0+3(0) 3+3(1)"},
-        {"one that is larger than a read is cut",
-         limits,
-         {want(0, 300), want(300, 10)},
-         "0+125(0) 125+125(0) 250+60(0 1)"},
+        {"two areas", limits_of(125, {{0, 11}, {12, 100}}), {want(10), want(13)}, "10+4(0 1)"},
+        {"a hole", limits_of(125, {{0, 11}, {13, 100}}), {want(10), want(13)}, "10+1(0) 13+1(1)"},
+        {"too large", limits, {want(0, 300), want(300, 10)}, "0+125(0) 125+125(0) 250+60(0 1)"},
         {"a slow want in a fast read", limits, {want(12, 1, 10s), want(10, 5)}, "10+5(0 1)"},
-        {"not dearer per second", limits, {want(0, 2), want(2, 2, 2s)}, "0+4(0 1)"},
-        {"dearer", limits, {want(0, 2), want(2, 100, 60s)}, "0+2(0) 2+100(1)/60000"},
-        {"what cannot be asked for",
-         limits,
-         {want(0, 0), want(65535, 2), want(70000), want(5, 0xFFFFFFFF), want(1, 1, 0s)},
-         ""},
-        {"of an unreadable table", limits_of(0), {want(1)}, ""},
+        {"dearer per second", limits, {want(0, 2), want(2, 100, 60s)}, "0+2(0) 2+100(1)/60000"},
+        {"around a refused one", refused, {want(10), want(11), want(13)}, "10+2(0 1) 13+1(2)"},
+        {"refused", refused, {want(11), want(12), want(12, 1, 5s)}, "11+1(0) 12+1!(1 2)"},
+        {"invalid", limits, {want(0, 0), want(65535, 2), want(70000), want(1, 1, 0s)}, ""},
+        {"an unreadable table", limits_of(0), {want(1)}, ""},
         {"the last item", limits_of(125, {{0, 65535}}), {want(65535)}, "65535+1(0)"},
-    });
-}
-
-TEST(ReadPlan, CrossesAHoleOnlyWhereTheProfileSaysThatItIsReadable) {
-    const std::vector<Want> wants = {want(10), want(13)};
-    expect_plans({
-        {"one area", limits_of(125, {{0, 100}}), wants, "10+4(0 1)"},
-        {"two side by side", limits_of(125, {{0, 11}, {12, 100}}), wants, "10+4(0 1)"},
-        {"a gap", limits_of(125, {{0, 11}, {13, 100}}), wants, "10+1(0) 13+1(1)"},
-    });
-}
-
-TEST(ReadPlan, ReadsARefusedSpanOnlyAlone) {
-    const PlanLimits limits = limits_of(125, {{0, 100}}, {span(12, 1)});
-    expect_plans({
-        {"not wanted", limits, {want(10), want(11), want(13), want(14)}, "10+2(0 1) 13+2(2 3)"},
-        {"wanted",
-         limits,
-         {want(11), want(12), want(13), want(12, 1, 5s)},
-         "11+1(0) 12+1!(1 3) 13+1(2)"},
-        {"with another want inside",
-         limits_of(125, {}, {span(10, 20)}),
-         {want(10, 20), want(12, 2)},
-         "10+20!(0) 12+2(1)"},
-    });
-}
-
-TEST(ReadPlan, ReadsAcrossAHoleOnlyWhileThatIsCheaperThanAnotherRequest) {
-    const PlanLimits limits = limits_of(125, {{0, 65535}});
-    std::uint32_t hole = 0;
-    while (plan_reads(std::vector{want(0), want(hole + 1)}, limits).size() == 1) ++hole;
-    EXPECT_GT(read_cost(limits, kRegisters, hole + 2), 2 * read_cost(limits, kRegisters, 1));
-    EXPECT_LE(read_cost(limits, kRegisters, hole + 1), 2 * read_cost(limits, kRegisters, 1));
-}
-
-TEST(ReadPlan, KeepsTablesApart) {
-    const std::vector<Want> wants = {
-        want(1), {{Table::input_registers, 2, 1}, 1s}, {{Table::coils, 1, 1}, 1s}};
-    const auto plan = plan_reads(wants, limits_of(125, {{0, 100}}));
-    ASSERT_THAT(plan, SizeIs(3));
-    EXPECT_EQ(plan[0].span.table, Table::coils);
-    EXPECT_EQ(plan[1].span.table, Table::input_registers);
+    };
+    for (const Case& c : cases) EXPECT_EQ(text_of(plan_reads(c.wants, c.limits)), c.reads) << c.why;
 }
 
 TEST(ReadPlan, TakesTheProfilesLimitsWithinTheStandards) {
@@ -189,34 +137,16 @@ TEST(IsPlannable, AWantHasItemsOfTheTableAndAnInterval) {
     EXPECT_FALSE(is_plannable(want(0, 1, 0s)));
 }
 
-TEST(Bisect, CutsAtTheWidestHoleOrInTheMiddle) {
-    struct Case {
-        std::vector<Want> wants;
-        PlannedRead read;
-        const char* halves;
-        std::optional<modbus::Span> between;  ///< refused, if both halves succeed
-    };
-    const Case cases[] = {
-        {{want(0), want(1), want(5), want(6), want(8)},
-         {span(0, 9), 1s, {0, 1, 2, 3, 4}, false},
-         "0+2(0 1) 5+4(2 3 4)",
-         span(1, 5)},
-        {{want(0), want(1), want(2), want(3, 1, 500ms)},
-         {span(0, 4), 500ms, {0, 1, 2, 3}, false},
-         "0+2(0 1) 2+2(2 3)/500",
-         span(1, 2)},
-        {{want(0, 4), want(2, 4)}, {span(0, 6), 1s, {0, 1}, false}, "0+4(0) 2+4(1)", {}},
-        // One want, the same items, a piece of one: nothing to cut.
-        {{want(4, 2)}, {span(4, 2), 1s, {0}, false}, "", {}},
-        {{want(4, 2), want(4, 2)}, {span(4, 2), 1s, {0, 1}, false}, "", {}},
-        {{want(0, 300)}, {span(125, 125), 1s, {0}, false}, "", {}},
-    };
-    for (const Case& c : cases) {
-        SCOPED_TRACE(text_of(c.read));
-        const auto halves = bisect(c.read, c.wants);
-        EXPECT_EQ(halves ? text_of(std::vector{halves->first, halves->second}) : "", c.halves);
-        if (halves) EXPECT_EQ(refused_between(halves->first, halves->second), c.between);
-    }
+TEST(Bisect, HasNothingToCutInOneWantOrTheSameItemsAndKnowsNoSeamBetweenHalvesThatOverlap) {
+    const std::vector<Want> wants = {want(4, 2), want(4, 2), want(0, 300), want(0, 4), want(2, 4)};
+    EXPECT_FALSE(bisect({span(4, 2), 1s, {0}, false}, wants).has_value());
+    EXPECT_FALSE(bisect({span(4, 2), 1s, {0, 1}, false}, wants).has_value());
+    EXPECT_FALSE(bisect({span(125, 125), 1s, {2}, false}, wants).has_value());
+    const auto halves = bisect({span(0, 6), 500ms, {3, 4}, false}, wants);
+    ASSERT_TRUE(halves.has_value());
+    EXPECT_EQ(text_of(std::vector{halves->first, halves->second}), "0+4(3) 2+4(4)")
+        << "each at its interval";
+    EXPECT_FALSE(refused_between(halves->first, halves->second).has_value());
 }
 
 /// Simulates a panel that refuses every read containing one of `bad`, until only reads marked

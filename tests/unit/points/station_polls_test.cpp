@@ -203,19 +203,6 @@ TEST(StationPolls, P10WhatCannotBeReadBehindAWriteIsAskedForAgainSoon) {
     EXPECT_EQ(play(polls, kStart + 80s, 10min, silent).size(), 0u);
 }
 
-TEST(StationPolls, WhoWritesWithoutPauseGetsNoMoreThanAFewReadsASecond) {
-    StationPolls polls = polls_of({registers(7, 1, 60s)});
-    play(polls, kStart, 10s);
-    std::size_t reads = 0;
-    for (TimePoint now = kLater; now < kStart + 30s; now += 10ms) {
-        polls.on_write(now, item(7));
-        polls.on_written(now + 1ms, item(7));
-        reads += play(polls, now + 1ms, 9ms).size();
-    }
-    EXPECT_GE(reads, 80u);
-    EXPECT_LE(reads, 16u + 4u * 20u + 1u) << "of 2000 writes";
-}
-
 PolledStation station(std::uint8_t id, std::vector<Want> wants) {
     return {id, std::move(wants), limits()};
 }

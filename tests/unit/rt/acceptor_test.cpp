@@ -111,7 +111,7 @@ TEST(AccessList, AllowsPeersByThePrefixOfItsNetworks) {
     for (const Row& row : rows)
         EXPECT_EQ(AccessList(row.networks).allows(asio::ip::make_address(row.peer)), row.allowed)
             << row.peer;
-    for (const Network& bad : {Network{"floor1", 8}, {"10.0.0.0", 33}, {"::", 129}})
+    for (const Network& bad : {Network{"floor1", 8}, Network{"10.0.0.0", 33}, Network{"::", 129}})
         EXPECT_THROW(AccessList({bad}), std::invalid_argument) << bad.address;
 }
 

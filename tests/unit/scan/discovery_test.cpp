@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -30,6 +29,18 @@ constexpr TimePoint kStart{1h};
 constexpr Duration kAnswered = 15ms;
 constexpr Duration kSilence = 40ms;
 
+/// Stations `first` to `last` answer their questions number `from` to `to` like this.
+struct Script {
+    std::uint8_t first;
+    std::uint8_t last;
+    int from;
+    int to;
+    Answer answer;
+};
+const Answer kRefused{Reply::refused, {}, {}};
+const Answer kDamaged{Reply::damaged, {}, kAnswered};
+const Answer kSilent{Reply::silent, {}, kSilence};
+
 /// Simulated panels on a line shared with clients; each question has a cost, and its answer arrives
 /// later than that.
 class DiscoveryTest : public testing::Test {
@@ -43,13 +54,15 @@ class DiscoveryTest : public testing::Test {
         panels.try_emplace(station, *shipped().find(profile), station);
     }
     Answer ask(const ReadRequest& request) {
-        ++questions[request.station()];
+        const std::uint8_t station = request.station();
+        const int nth = ++questions[station];
         EXPECT_TRUE(modbus::is_pure_read(Bytes(request.pdu().begin(), request.pdu().end())));
-        if (scripted) {
-            if (auto answer = scripted(request)) return *answer;
+        for (const Script& one : script) {
+            if (one.first <= station && station <= one.last && one.from <= nth && nth <= one.to)
+                return one.answer;
         }
-        const auto panel = panels.find(request.station());
-        if (panel == panels.end()) return {Reply::silent, {}, kSilence};
+        const auto panel = panels.find(station);
+        if (panel == panels.end()) return kSilent;
         return {Reply::answered, panel->second.handle(now, 0, request.pdu()), kAnswered};
     }
     /// Runs to the end; returns the share of time used.
@@ -62,11 +75,17 @@ class DiscoveryTest : public testing::Test {
             if (!request) ADD_FAILURE() << "nothing to ask at " << to_seconds(now - kStart);
             if (!request) return 1;
             const Answer answer = ask(*request);
+            spent.emplace_back(now, answer.cost);
             cost += answer.cost;
             now += answer.cost + 3ms;  // time in the queue
             discovery.on_answer(now, answer);
         }
         return to_seconds(cost) / to_seconds(std::max(now, discovery.due()) - began);
+    }
+    /// One that has run to its end.
+    Discovery& searched() {
+        run(made.emplace(shipped(), settings, now));
+        return *made;
     }
     /// "20 panasonic-gt, 31 autonics-gplp-s": who was found, and what it is first of all.
     static std::string found(const Discovery& discovery) {
@@ -80,77 +99,64 @@ class DiscoveryTest : public testing::Test {
 
     std::map<std::uint8_t, sim::Station> panels;
     std::map<std::uint8_t, int> questions;
-    std::function<std::optional<Answer>(const ReadRequest&)> scripted;
+    std::vector<Script> script;  ///< the first that fits counts; else the panels answer
+    std::vector<std::pair<TimePoint, Duration>> spent;
     TimePoint now = kStart;
     DiscoverySettings settings;  ///< all addresses
+    std::optional<Discovery> made;
 };
 
 TEST_F(DiscoveryTest, WhomTheLineRefusesToAskWaitsForItsTurnAndIsNotSilent) {
     add("panasonic-gt", 5);
-    int refusals = 0;
-    scripted = [&](const ReadRequest& request) -> std::optional<Answer> {
-        if (request.station() != 5 || refusals == 2) return std::nullopt;
-        ++refusals;
-        return Answer{Reply::refused, {}, {}};
-    };
-    Discovery discovery(shipped(), settings, now);
-    run(discovery);
-    EXPECT_EQ(discovery.asked(), 247u);
-    EXPECT_EQ(discovery.refused(), 0u);
-    EXPECT_EQ(found(discovery), "5 panasonic-gt");
-    EXPECT_EQ(discovery.remaining(now), Duration::zero());
+    script = {{5, 5, 1, 2, kRefused}};
+    const Discovery& all = searched();
+    EXPECT_EQ(all.asked(), 247u);
+    EXPECT_EQ(all.refused(), 0u);
+    EXPECT_EQ(found(all), "5 panasonic-gt");
+    EXPECT_EQ(all.remaining(now), Duration::zero());
 }
 
 TEST_F(DiscoveryTest, WhoIsRefusedEachTimeIsCountedAsNotAsked) {
-    scripted = [](const ReadRequest& request) -> std::optional<Answer> {
-        if (request.station() % 2 == 0) return std::nullopt;
-        return Answer{Reply::refused, {}, {}};
-    };
-    Discovery discovery(shipped(), settings, now);
-    EXPECT_FALSE(discovery.remaining(now)) << "nothing was asked yet";
-    run(discovery);
-    EXPECT_EQ(discovery.asked(), 123u);
-    EXPECT_EQ(discovery.refused(), 124u);
-    EXPECT_THAT(discovery.silent(), Not(Contains(1)));
+    script = {{1, 124, 1, 99, kRefused}};
+    Discovery all(shipped(), settings, now);
+    EXPECT_FALSE(all.remaining(now)) << "nothing was asked yet";
+    run(all);
+    EXPECT_EQ(all.asked(), 123u);
+    EXPECT_EQ(all.refused(), 124u);
+    EXPECT_THAT(all.silent(), Not(Contains(1)));
 }
 
 TEST_F(DiscoveryTest, NamesWhomItReallyAskedAndWhoWasSilent) {
     add("panasonic-gt", 5);
     settings.stations = {3, 4, 5, 6, 7};
-    scripted = [](const ReadRequest& request) -> std::optional<Answer> {
-        if (request.station() == 4) return Answer{Reply::refused, {}, {}};
-        if (request.station() == 6) return Answer{Reply::damaged, {}, kAnswered};
-        return std::nullopt;
-    };
-    Discovery discovery(shipped(), settings, now);
-    EXPECT_THAT(discovery.asked_stations(), ElementsAre());
-    run(discovery);
-    EXPECT_THAT(discovery.asked_stations(), ElementsAre(3, 5, 6, 7));
-    EXPECT_THAT(discovery.silent(), ElementsAre(3, 7));
+    script = {{4, 4, 1, 99, kRefused}, {6, 6, 1, 99, kDamaged}};
+    Discovery few(shipped(), settings, now);
+    EXPECT_THAT(few.asked_stations(), ElementsAre());
+    run(few);
+    EXPECT_THAT(few.asked_stations(), ElementsAre(3, 5, 6, 7));
+    EXPECT_THAT(few.silent(), ElementsAre(3, 7));
 }
 
 TEST_F(DiscoveryTest, WhoIsSilentAgainWhenAskedOnceMoreStaysSilent) {
     settings.stations = {9};
-    Discovery discovery(shipped(), settings, now);
-    run(discovery);
-    discovery.ask_late(9);
-    EXPECT_FALSE(discovery.done());
-    run(discovery);
+    Discovery& one = searched();
+    one.ask_late(9);
+    EXPECT_FALSE(one.done());
+    run(one);
     EXPECT_EQ(questions[9], 2);
-    EXPECT_THAT(discovery.silent(), ElementsAre(9));
-    EXPECT_EQ(discovery.asked(), 1u);
-    discovery.ask_late(9);
-    EXPECT_TRUE(discovery.done()) << "once";
+    EXPECT_THAT(one.silent(), ElementsAre(9));
+    EXPECT_EQ(one.asked(), 1u);
+    one.ask_late(9);
+    EXPECT_TRUE(one.done()) << "once";
 }
 
 TEST_F(DiscoveryTest, FindsWhoAnswersAndWhatPanelItIs) {
     add("autonics-gplp-s", 31);
     add("panasonic-gt", 20);
-    Discovery discovery(shipped(), settings, now);
-    run(discovery);
-    EXPECT_EQ(discovery.asked(), 247u);
-    EXPECT_EQ(discovery.of(), 247u);
-    EXPECT_EQ(found(discovery), "20 panasonic-gt, 31 autonics-gplp-s");
+    const Discovery& all = searched();
+    EXPECT_EQ(all.asked(), 247u);
+    EXPECT_EQ(all.of(), 247u);
+    EXPECT_EQ(found(all), "20 panasonic-gt, 31 autonics-gplp-s");
     EXPECT_EQ(questions[7], 1) << "who is silent is asked once";
 }
 
@@ -158,22 +164,17 @@ TEST_F(DiscoveryTest, StaysBelowItsShareOfTheLine) {
     add("omron-cp2e", 1);
     for (const double share : {0.01, 0.1, 0.5, 1.0}) {
         settings.share = share;
-        Discovery discovery(shipped(), settings, now);
-        EXPECT_LE(run(discovery), share * 1.001) << share;
-        now = discovery.due();
+        Discovery all(shipped(), settings, now);
+        EXPECT_LE(run(all), share * 1.001) << share;
+        now = all.due();
     }
 }
 
 TEST_F(DiscoveryTest, NeverTakesMoreThanItsShareOfAnyStretchButOneQuestion) {
-    add("omron-cp2e", 100);
-    Discovery discovery(shipped(), settings, now);
-    std::vector<std::pair<TimePoint, Duration>> spent;
-    scripted = [&](const ReadRequest& request) -> std::optional<Answer> {
-        const Duration cost = request.station() % 50 == 0 ? 500ms : kSilence;
-        spent.emplace_back(now, cost);
-        return Answer{Reply::silent, {}, cost};
-    };
-    run(discovery);
+    for (const std::uint8_t station : Bytes{50, 100, 150, 200})
+        script.push_back({station, station, 1, 99, {Reply::silent, {}, 500ms}});
+    searched();
+    ASSERT_EQ(spent.size(), 247u);
     for (std::size_t from = 0; from < spent.size(); ++from) {
         Duration sum{};
         for (std::size_t to = from; to + 1 < spent.size(); ++to) {
@@ -185,79 +186,65 @@ TEST_F(DiscoveryTest, NeverTakesMoreThanItsShareOfAnyStretchButOneQuestion) {
 }
 
 TEST_F(DiscoveryTest, NothingIsAskedBeforeItsTime) {
-    Discovery discovery(shipped(), settings, now);
-    EXPECT_TRUE(discovery.question(now));
-    EXPECT_TRUE(discovery.question(now)) << "the same until it is answered";
-    discovery.on_answer(now + 40ms, {Reply::silent, {}, 40ms});
-    EXPECT_FALSE(discovery.question(now + 399ms));
-    EXPECT_TRUE(discovery.question(now + 400ms));
-    EXPECT_EQ(discovery.due(), now + 400ms);
+    Discovery all(shipped(), settings, now);
+    EXPECT_TRUE(all.question(now));
+    EXPECT_TRUE(all.question(now)) << "the same until it is answered";
+    all.on_answer(now + 40ms, kSilent);
+    EXPECT_FALSE(all.question(now + 399ms));
+    EXPECT_TRUE(all.question(now + 400ms));
+    EXPECT_EQ(all.due(), now + 400ms);
 }
 
 TEST_F(DiscoveryTest, WhatTheLineCouldNotTakeIsAskedAgain) {
     settings.stations = {9};
-    Discovery discovery(shipped(), settings, now);
-    discovery.on_answer(now, {Reply::unsent});
-    EXPECT_EQ(discovery.asked(), 0u);
-    EXPECT_FALSE(discovery.question(now + 999ms));
-    EXPECT_EQ(discovery.question(now + 1s)->station(), 9);
-    scripted = [](const ReadRequest&) { return Answer{Reply::unsent}; };
-    run(discovery);
-    EXPECT_TRUE(discovery.gave_up());
+    Discovery one(shipped(), settings, now);
+    one.on_answer(now, {Reply::unsent});
+    EXPECT_EQ(one.asked(), 0u);
+    EXPECT_FALSE(one.question(now + 999ms));
+    EXPECT_EQ(one.question(now + 1s)->station(), 9);
+    script = {{9, 9, 1, 99, {Reply::unsent}}};
+    run(one);
+    EXPECT_TRUE(one.gave_up());
     EXPECT_EQ(questions[9], 59) << "not for ever";
 }
 
 TEST_F(DiscoveryTest, DamageIsAStationOnlyWhenItComesAgainAndAgain) {
-    scripted = [&](const ReadRequest& request) -> std::optional<Answer> {
-        if (request.station() == 5 || (request.station() == 6 && questions[6] == 1))
-            return Answer{Reply::damaged, {}, kAnswered};
-        return std::nullopt;
-    };
-    Discovery discovery(shipped(), settings, now);
-    run(discovery);
-    EXPECT_EQ(found(discovery), "5");
-    EXPECT_EQ(discovery.findings().at(0).evidence.damaged, 3u);
+    script = {{5, 5, 1, 99, kDamaged}, {6, 6, 1, 1, kDamaged}};
+    const Discovery& all = searched();
+    EXPECT_EQ(found(all), "5");
+    EXPECT_EQ(all.findings().at(0).evidence.damaged, 3u);
     EXPECT_EQ(questions[6], 2);
 }
 
 TEST_F(DiscoveryTest, WhoAnswersLateMayBeAskedOnceMore) {
     add("autonics-gplp-s", 31);
-    scripted = [&](const ReadRequest& request) -> std::optional<Answer> {
-        if (request.station() == 31 && questions[31] > 1) return std::nullopt;
-        return Answer{Reply::silent, {}, kSilence};
-    };
-    Discovery discovery(shipped(), settings, now);
-    run(discovery);
-    EXPECT_TRUE(discovery.silent().contains(31));
-    EXPECT_EQ(found(discovery), "");
-    discovery.ask_late(31);
-    EXPECT_FALSE(discovery.done());
-    run(discovery);
-    EXPECT_EQ(discovery.asked(), 247u);
-    EXPECT_EQ(found(discovery), "31 autonics-gplp-s");
-    EXPECT_EQ(discovery.findings().at(0).evidence.late, 1u);
-    EXPECT_FALSE(discovery.silent().contains(31));
-    discovery.ask_late(31);
-    EXPECT_TRUE(discovery.done()) << "once";
+    script = {{31, 31, 1, 1, kSilent}};
+    Discovery& all = searched();
+    EXPECT_TRUE(all.silent().contains(31));
+    EXPECT_EQ(found(all), "");
+    all.ask_late(31);
+    EXPECT_FALSE(all.done());
+    run(all);
+    EXPECT_EQ(all.asked(), 247u);
+    EXPECT_EQ(found(all), "31 autonics-gplp-s");
+    EXPECT_EQ(all.findings().at(0).evidence.late, 1u);
+    EXPECT_FALSE(all.silent().contains(31));
+    all.ask_late(31);
+    EXPECT_TRUE(all.done()) << "once";
 }
 
 TEST_F(DiscoveryTest, WhoGoesAwayWhileLookedAtIsToldByWhatItSaid) {
     add("autonics-gplp-s", 31);
-    scripted = [&](const ReadRequest& request) -> std::optional<Answer> {
-        if (request.station() != 31 || questions[31] < 3) return std::nullopt;
-        return Answer{Reply::silent, {}, 1s};
-    };
-    Discovery discovery(shipped(), settings, now);
-    run(discovery);
-    EXPECT_EQ(discovery.findings().size(), 1u);
+    script = {{31, 31, 3, 99, {Reply::silent, {}, 1s}}};
+    EXPECT_EQ(searched().findings().size(), 1u);
     EXPECT_EQ(questions[31], 5) << "three silences are enough";
 }
 
 TEST_F(DiscoveryTest, HasNothingToAskWhereEverybodyIsKnown) {
     settings.stations.clear();
-    Discovery discovery(shipped(), settings, now);
-    EXPECT_TRUE(discovery.done());
-    EXPECT_FALSE(discovery.gave_up());
+    const Discovery none(shipped(), settings, now);
+    EXPECT_TRUE(none.done());
+    EXPECT_FALSE(none.gave_up());
 }
 
 }  // namespace

@@ -48,9 +48,9 @@ TEST(ScanOptions, SayWhatWouldBeRightAndLeaveTheSettingsAlone) {
     settings.stations = {9};
     for (const std::string text :
          {"", "9600,", "fast", "49", "4000001", "9600 38400", "-9600", "9600;1"})
-        EXPECT_EQ(parse_baud(text, settings),
-                  "--baud '" + text +
-                      "' is not a list of rates from 50 to 4000000 such as 9600,38400");
+        EXPECT_EQ(
+            parse_baud(text, settings),
+            "--baud '" + text + "' is not a list of rates from 50 to 4000000 such as 9600,38400");
     EXPECT_EQ(parse_parity("none,mark", settings),
               "--parity 'none,mark' is not a list of none, even and odd");
     for (const std::string text : {"", "0", "248", "31-1", "1-", "-5", "1-31,", "a"})

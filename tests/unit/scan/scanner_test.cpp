@@ -5,15 +5,14 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "attempt.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/scan/report.hpp"
-#include "attempt.hpp"
 #include "support/hex.hpp"
 #include "virtual_line.hpp"
 

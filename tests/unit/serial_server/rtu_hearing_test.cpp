@@ -2,9 +2,12 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <random>
+#include <vector>
 
-#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "talk.hpp"
 
@@ -16,9 +19,9 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::Not;
-using testing::SizeIs;
 
-const Bytes kRequest = encode_adu(kOurs, kReadOne);
+const Bytes kForeign = encode_adu(kOther, kReadOne);
+const Bytes kWriteBeef = encode_adu(kOurs, Bytes{0x06, 0, 0, 0xBE, 0xEF});
 
 /// Returns the stations of all frames, in order.
 std::vector<int> heard(RtuHearing& hearing, const Bytes& bytes, bool silence = true) {
@@ -32,33 +35,38 @@ std::vector<int> heard(RtuHearing& hearing, const Bytes& bytes, bool silence = t
     take();
     return stations;
 }
-
-Bytes reply_with(const Bytes& data) {
-    Bytes pdu{0x03, static_cast<std::uint8_t>(data.size())};
-    pdu.insert(pdu.end(), data.begin(), data.end());
-    return encode_adu(kOther, pdu);
-}
-
-TEST(RtuHearing, FindsARequestWithoutASilence) {
+std::vector<int> heard(const Bytes& bytes, bool silence = true) {
     RtuHearing hearing(Talk::served());
-    EXPECT_THAT(heard(hearing, kRequest, false), ElementsAre(kOurs));
+    return heard(hearing, bytes, silence);
 }
-
-TEST(RtuHearing, FindsARequestInAnyPieces) {
+/// In pieces of this size, with a silence behind each.
+std::vector<int> heard_in_pieces(Bytes bytes, std::size_t size) {
     RtuHearing hearing(Talk::served());
     std::vector<int> all;
-    for (const std::uint8_t byte : kRequest) {
-        for (const int station : heard(hearing, {byte})) all.push_back(station);
+    while (!bytes.empty()) {
+        for (const int station : heard(hearing, take_first(bytes, size))) all.push_back(station);
     }
-    EXPECT_THAT(all, ElementsAre(kOurs));
+    return all;
 }
 
-TEST(RtuHearing, FindsARequestBehindAGlitch) {
+Bytes reply_with(const Bytes& data) {
+    return encode_adu(kOther, joined({{0x03, static_cast<std::uint8_t>(data.size())}, data}));
+}
+
+TEST(RtuHearing, FindsARequestWithoutASilenceAndInAnyPieces) {
+    EXPECT_THAT(heard(kRequest, false), ElementsAre(kOurs));
+    EXPECT_THAT(heard_in_pieces(kRequest, 1), ElementsAre(kOurs));
+}
+
+TEST(RtuHearing, FindsARequestBehindAGlitchOrHalfAFrame) {
     for (int glitch = 0; glitch < 256; ++glitch) {
-        RtuHearing hearing(Talk::served());
         const Bytes noise{static_cast<std::uint8_t>(glitch)};
-        EXPECT_THAT(heard(hearing, joined({noise, kRequest})), ElementsAre(kOurs)) << glitch;
+        EXPECT_THAT(heard(joined({noise, kRequest})), ElementsAre(kOurs)) << glitch;
     }
+    for (const Bytes& glitch : {Bytes{0xFF}, Bytes{0, 0xFF}, Bytes{0xF0, 0xFF, 0xFF}})
+        EXPECT_THAT(heard(joined({glitch, kWriteBeef})), ElementsAre(kOurs));
+    Bytes all = kRequest;
+    EXPECT_THAT(heard(joined({take_first(all, 5), kRequest})), ElementsAre(kOurs));
 }
 
 TEST(RtuHearing, NeverTakesADamagedFrame) {
@@ -74,39 +82,26 @@ TEST(RtuHearing, NeverTakesADamagedFrame) {
 
 TEST(RtuHearing, HearsAnotherUnitsExchangeAndTheNextRequestInOnePiece) {
     RtuHearing hearing(Talk::served());
-    const Bytes exchange = joined({encode_adu(kOther, kReadOne), reply_with({1, 2}), kRequest});
-    EXPECT_THAT(heard(hearing, exchange, false), ElementsAre(kOther, kOther, kOurs));
+    EXPECT_THAT(heard(hearing, joined({kForeign, reply_with({1, 2}), kRequest}), false),
+                ElementsAre(kOther, kOther, kOurs));
     EXPECT_EQ(hearing.take_faults(), 0u);
+    const Bytes no = encode_adu(kOther, Bytes{0x83, 0x02});  // an exception
+    EXPECT_THAT(heard(joined({kForeign, no, kRequest})), ElementsAre(kOther, kOther, kOurs));
 }
 
 TEST(RtuHearing, FindsNoRequestInAnotherUnitsData) {
-    RtuHearing hearing(Talk::served());
-    EXPECT_THAT(heard(hearing, reply_with(kRequest), false), ElementsAre(kOther));
-    for (std::size_t piece = 1; piece < 10; ++piece) {
-        const Bytes reply = reply_with(kRequest);
-        std::vector<int> all;
-        for (std::size_t at = 0; at < reply.size(); at += piece) {
-            const auto end = std::min(at + piece, reply.size());
-            for (const int station : heard(hearing, Bytes(reply.begin() + static_cast<long>(at),
-                                                          reply.begin() + static_cast<long>(end))))
-                all.push_back(station);
-        }
-        EXPECT_THAT(all, ElementsAre(kOther)) << piece;
-    }
-}
-
-TEST(RtuHearing, FindsNoRequestInDamagedDataThatGoesOn) {
-    RtuHearing hearing(Talk::served());
-    Bytes reply = reply_with(joined({kRequest, {1, 2}}));
-    reply[2] = 2;
-    EXPECT_THAT(heard(hearing, reply), IsEmpty());
+    EXPECT_THAT(heard(reply_with(kRequest), false), ElementsAre(kOther));
+    for (std::size_t piece = 1; piece < 10; ++piece)
+        EXPECT_THAT(heard_in_pieces(reply_with(kRequest), piece), ElementsAre(kOther)) << piece;
+    Bytes damaged = reply_with(joined({kRequest, {1, 2}}));  // the data goes on
+    damaged[2] = 2;
+    EXPECT_THAT(heard(damaged), IsEmpty());
 }
 
 TEST(RtuHearing, P2TakesNoWriteOutOfADamagedOne) {
-    const Bytes write = encode_adu(kOurs, Bytes{0x06, 0, 0, 0xBE, 0xEF});
-    const Bytes read = encode_adu(kOther, kReadOne);
+    const Bytes& write = kWriteBeef;
     for (const Bytes& data : {write, joined({{0, 7}, write}), joined({write, {0, 7}}),
-                              joined({read, write}), joined({write, write})}) {
+                              joined({kForeign, write}), joined({write, write})}) {
         const auto size = static_cast<std::uint8_t>(data.size());
         Bytes damaged = joined({{kOurs, 0x10, 1, 0, 0, 8, size}, data});
         for (const Bytes& crc : {Bytes{}, Bytes{0x12, 0x34}}) {
@@ -120,35 +115,10 @@ TEST(RtuHearing, P2TakesNoWriteOutOfADamagedOne) {
     }
 }
 
-TEST(RtuHearing, TakesAWriteBehindAGlitch) {
-    const Bytes write = encode_adu(kOurs, Bytes{0x06, 0, 0, 0xBE, 0xEF});
-    for (const Bytes& glitch : {Bytes{0xFF}, Bytes{0, 0xFF}, Bytes{0xF0, 0xFF, 0xFF}}) {
-        RtuHearing hearing(Talk::served());
-        EXPECT_THAT(heard(hearing, joined({glitch, write})), ElementsAre(kOurs));
-    }
-}
-
-TEST(RtuHearing, HearsExceptionsOfOtherStations) {
-    RtuHearing hearing(Talk::served());
-    const Bytes no = encode_adu(kOther, Bytes{0x83, 0x02});
-    EXPECT_THAT(heard(hearing, joined({encode_adu(kOther, kReadOne), no, kRequest})),
-                ElementsAre(kOther, kOther, kOurs));
-}
-
 TEST(RtuHearing, EndsVendorsFunctionsBySilence) {
-    RtuHearing hearing(Talk::served());
     const Bytes vendor = encode_adu(kOurs, Bytes{0x65, 1, 2, 3});
-    EXPECT_THAT(heard(hearing, vendor, false), IsEmpty());
-    hearing.on_silence();
-    const auto adu = hearing.next();
-    ASSERT_TRUE(adu);
-    EXPECT_EQ(adu->pdu, (Bytes{0x65, 1, 2, 3}));
-}
-
-TEST(RtuHearing, HearsARequestBehindHalfAFrame) {
-    RtuHearing hearing(Talk::served());
-    const Bytes half(kRequest.begin(), kRequest.begin() + 5);
-    EXPECT_THAT(heard(hearing, joined({half, kRequest})), ElementsAre(kOurs));
+    EXPECT_THAT(heard(vendor, false), IsEmpty());
+    EXPECT_THAT(heard(vendor), ElementsAre(kOurs));
 }
 
 TEST(RtuHearing, GivesUpAFrameThatDoesNotGoOnForTheOneBehindIt) {
@@ -164,16 +134,16 @@ TEST(RtuHearing, KeepsLittleWhateverComes) {
     RtuHearing hearing(Talk::served());
     std::mt19937 random(14);
     std::size_t most = 0;
-    int frames = 0;
+    std::size_t frames = 0;
     for (int i = 0; i < 20'000; ++i) {
         Bytes bytes;
         for (unsigned n = random() % 40; n > 0; --n)
             bytes.push_back(static_cast<std::uint8_t>(random() % (i % 2 == 0 ? 256 : 32)));
-        frames += static_cast<int>(heard(hearing, bytes, random() % 4 == 0).size());
+        frames += heard(hearing, bytes, random() % 4 == 0).size();
         most = std::max(most, hearing.pending());
     }
     EXPECT_LE(most, 260u);
-    EXPECT_LT(frames, 40);  // one start in 65536 fits its CRC
+    EXPECT_LT(frames, 40u);  // one start in 65536 fits its CRC
 }
 
 }  // namespace

@@ -3,9 +3,13 @@
 #include <gmock/gmock.h>
 
 #include <boost/asio/io_context.hpp>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
+#include <vector>
 
+#include "panelgate/base/fault.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/fake_bus.hpp"
 #include "support/manual_clock.hpp"
@@ -22,9 +26,6 @@ using panelgate::test::MemoryLine;
 using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
-
-const Bytes kRequest = encode_adu(kOurs, kReadOne);
-const Bytes kWrite = modbus::encode_write_register(1, 2);
 
 Settings with_access(Settings settings) {
     settings.access.lines = {"floor1"};
@@ -59,11 +60,12 @@ struct House {
         io.poll();
         clock.advance(100ms);
     }
-    /// Returns what the master receives.
+    /// Returns what the master has received since the last call.
+    std::vector<Bytes> told() { return std::exchange(wire->written, {}); }
     std::vector<Bytes> told(Fault fault) {
         hear(kRequest);
         answer(FakeBus::fault(fault, true));
-        return std::exchange(wire->written, {});
+        return told();
     }
 
     boost::asio::io_context io;
@@ -76,20 +78,19 @@ struct House {
 
 TEST(SerialMaster, AsksTheStationBehindTheUnitUnderItsName) {
     House house;
+    house.hear(encode_adu(6, kReadOne));
+    EXPECT_THAT(house.bus.requests, IsEmpty()) << "an unlisted unit";
     house.hear(kRequest);
     ASSERT_THAT(house.bus.requests, SizeIs(1));
     EXPECT_EQ(house.bus.requests[0].station, 3);
     EXPECT_EQ(house.bus.names.at(house.bus.requests[0].client), "serial plc");
     house.answer(FakeBus::reply(kOneValue));
-    EXPECT_THAT(house.wire->written, ElementsAre(encode_adu(kOurs, kOneValue)));
-}
-
-TEST(SerialMaster, AsksNothingOfUnlistedUnits) {
-    House house;
-    house.hear(encode_adu(6, kReadOne));
-    EXPECT_THAT(house.bus.requests, IsEmpty());
+    EXPECT_THAT(house.told(), ElementsAre(kReply));
     house.hear(encode_adu(5, kReadOne));
-    EXPECT_THAT(house.bus.requests, SizeIs(1));
+    EXPECT_THAT(house.bus.requests, SizeIs(2)) << "a configured station";
+    house.answer(FakeBus::reply({0x83, 0x06}));
+    EXPECT_THAT(house.told(), ElementsAre(encode_adu(5, Bytes{0x83, 0x06}))) << "it refuses";
+    EXPECT_EQ(house.master.counters().exceptions, 1u);
 }
 
 TEST(SerialMaster, HearsTheMasterBeforeItAnswersLate) {
@@ -98,34 +99,23 @@ TEST(SerialMaster, HearsTheMasterBeforeItAnswersLate) {
     house.clock.advance(300ms);
     house.wire->come(encode_adu(5, kReadOne));  // not processed yet
     house.answer(FakeBus::reply(kOneValue));
-    EXPECT_THAT(house.wire->written, IsEmpty());
+    EXPECT_THAT(house.told(), IsEmpty());
     EXPECT_THAT(house.bus.cancelled, ElementsAre(house.bus.requests[0].client));
 }
 
-TEST(SerialMaster, IsSilentWhereTheGatewayHasNoAnswer) {
+TEST(SerialMaster, IsSilentWhereTheGatewayHasNoAnswerOrReturnsTheException) {
     House house;
     for (const Fault fault : {Fault::busy, Fault::expired, Fault::not_routed, Fault::line_down,
                               Fault::line_lost, Fault::timeout, Fault::damaged, Fault::offline})
         EXPECT_THAT(house.told(fault), IsEmpty());
     EXPECT_EQ(house.master.counters().silent, 8u);
-}
-
-TEST(SerialMaster, OrReturnsTheExceptionThatStatesTheReason) {
     Settings settings = Talk::rtu();
     settings.on_failure = OnFailure::exception;
-    House house(settings);
+    House other(settings);
     const auto exception = [](std::uint8_t code) { return encode_adu(kOurs, Bytes{0x83, code}); };
-    EXPECT_THAT(house.told(Fault::busy), ElementsAre(exception(0x06)));
-    EXPECT_THAT(house.told(Fault::line_down), ElementsAre(exception(0x0A)));
-    EXPECT_THAT(house.told(Fault::timeout), ElementsAre(exception(0x0B)));
-}
-
-TEST(SerialMaster, PassesWhatAPanelRefuses) {
-    House house;
-    house.hear(kRequest);
-    house.answer(FakeBus::reply({0x83, 0x06}));
-    EXPECT_THAT(house.wire->written, ElementsAre(encode_adu(kOurs, Bytes{0x83, 0x06})));
-    EXPECT_EQ(house.master.counters().exceptions, 1u);
+    EXPECT_THAT(other.told(Fault::busy), ElementsAre(exception(0x06)));
+    EXPECT_THAT(other.told(Fault::line_down), ElementsAre(exception(0x0A)));
+    EXPECT_THAT(other.told(Fault::timeout), ElementsAre(exception(0x0B)));
 }
 
 TEST(SerialMaster, RefusesWritesWhereOnlyReadsAreAllowed) {
@@ -134,7 +124,7 @@ TEST(SerialMaster, RefusesWritesWhereOnlyReadsAreAllowed) {
     House house(settings);
     house.hear(encode_adu(kOurs, kWrite));
     house.run();
-    EXPECT_THAT(house.wire->written, ElementsAre(encode_adu(kOurs, Bytes{0x86, 0x01})));
+    EXPECT_THAT(house.told(), ElementsAre(encode_adu(kOurs, Bytes{0x86, 0x01})));
     EXPECT_EQ(house.bus.told_refused, 1);
     house.hear(encode_adu(0, kWrite));
     EXPECT_THAT(house.bus.requests, IsEmpty());
@@ -161,23 +151,20 @@ TEST(SerialMaster, KeepsAFewBroadcastsOpen) {
     EXPECT_THAT(house.bus.requests, SizeIs(house.settings.open_broadcasts + 1));
 }
 
-TEST(SerialMaster, AnswersWhatItTookBeforeItEnds) {
+TEST(SerialMaster, AnswersWhatItTookBeforeItEndsAndTakesItBackWhenItStops) {
     House house;
     house.hear(kRequest);
     house.master.finish();
     EXPECT_FALSE(house.master.idle());
     house.answer(FakeBus::reply(kOneValue));
-    EXPECT_THAT(house.wire->written, SizeIs(1));
+    EXPECT_THAT(house.told(), SizeIs(1));
     EXPECT_TRUE(house.master.idle());
-}
-
-TEST(SerialMaster, TakesBackWhatWaitsWhenItStops) {
-    House house;
-    house.hear(kRequest);
-    house.master.stop();
-    EXPECT_THAT(house.bus.cancelled, ElementsAre(house.bus.requests[0].client));
-    house.run();
-    EXPECT_THAT(house.wire->written, IsEmpty());
+    House other;
+    other.hear(kRequest);
+    other.master.stop();
+    EXPECT_THAT(other.bus.cancelled, ElementsAre(other.bus.requests[0].client));
+    other.run();
+    EXPECT_THAT(other.told(), IsEmpty());
 }
 
 TEST(SerialMaster, OutlivesAPortThatGoesWhileItReplies) {
@@ -187,11 +174,11 @@ TEST(SerialMaster, OutlivesAPortThatGoesWhileItReplies) {
     house.answer(FakeBus::reply(kOneValue));
     EXPECT_FALSE(house.master.counters().up);
     house.wire->fail_writes = false;
-    house.wire->written.clear();
+    house.told();
     house.wire->events()->on_up();
     house.hear(kRequest);
     house.answer(FakeBus::reply(kOneValue));
-    EXPECT_THAT(house.wire->written, SizeIs(1));
+    EXPECT_THAT(house.told(), SizeIs(1));
 }
 
 }  // namespace

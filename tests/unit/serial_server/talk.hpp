@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "conversation.hpp"
+#include "panelgate/base/bytes.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
@@ -117,7 +118,6 @@ struct Talk {
 
     std::string told;  ///< its actions: "ask 31, withdraw, ask 32, reply 32"
     std::vector<Ask> asks;
-    std::vector<ForwardBroadcast> spreads;
     std::vector<Bytes> sent;
     std::vector<TimePoint> sent_at;
     TimePoint now{1h};
@@ -160,8 +160,7 @@ struct Talk {
                 asks.push_back(*ask);
                 tell("ask " + std::to_string(ask->adu.station));
             } else if (const auto* spread = std::get_if<ForwardBroadcast>(&*action)) {
-                spreads.push_back(*spread);
-                tell("forward");
+                tell("forward " + to_hex(spread->adu.pdu));
             } else if (const auto* send = std::get_if<Send>(&*action)) {
                 sent.push_back(send->bytes);
                 sent_at.push_back(now);

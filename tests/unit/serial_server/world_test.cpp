@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -47,12 +48,10 @@ class World {
     int wrong = 0;        ///< wrongly accepted replies
     int interrupted = 0;  ///< sent while the master was transmitting, or before silence
     int retries = 0;
-    const Talk& talk() const { return conversation_; }
 
   private:
     Settings settings() const {
-        Settings made = Talk::rtu();
-        made.echo = EchoMode::automatic;
+        Settings made = Talk::rtu(EchoMode::automatic);
         if (faults_.tells_timeout) made.response_timeout = kTimeout;
         return made;
     }
@@ -76,10 +75,7 @@ class World {
     void hear_others() {
         say(modbus::encode_adu(kOther, kReadOne));
         pass(5ms);
-        Bytes pdu{3, 8};
-        const Bytes inside = modbus::encode_adu(kOurs, kReadOne);
-        pdu.insert(pdu.end(), inside.begin(), inside.end());
-        say(modbus::encode_adu(kOther, pdu));
+        say(modbus::encode_adu(kOther, joined({{3, 8}, kRequest})));
     }
 
     /// Delivers it as an adapter would.
@@ -93,11 +89,10 @@ class World {
             }
         }
         const std::size_t piece = 1 + random_() % 8;
-        for (std::size_t at = 0; at < frame.size(); at += piece) {
-            const std::size_t end = std::min(at + piece, frame.size());
-            pass(wire_time(Talk::rtu().device.serial, end - at));
-            conversation_.hear({frame.begin() + static_cast<std::ptrdiff_t>(at),
-                                frame.begin() + static_cast<std::ptrdiff_t>(end)});
+        while (!frame.empty()) {
+            const Bytes part = take_first(frame, piece);
+            pass(wire_time(Talk::rtu().device.serial, part.size()));
+            conversation_.hear(part);
             talking_ = true;
         }
         talking_ = false;

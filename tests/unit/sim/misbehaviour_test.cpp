@@ -15,7 +15,7 @@ const SerialFormat k8n1{38400, 8, Parity::none, 1};
 const SerialFormat k8e1{9600, 8, Parity::even, 1};
 const SerialFormat kAscii{9600, 7, Parity::even, 1, SerialMode::ascii};
 const Bytes kPdu = "03 02 12 34"_hex;
-const Bytes kReply = modbus::encode_adu(20, kPdu);
+const Bytes kReply = modbus::encode_adu(7, kPdu);
 
 Spoken once(const Misbehaviour& faults, const SerialFormat& format = {}) {
     std::mt19937 chance(1);
@@ -34,7 +34,7 @@ TEST(Misbehaviour, EachFaultHasTheEffectOfItsName) {
     EXPECT_FALSE(modbus::crc_ok(damaged));
     EXPECT_EQ(damaged.size(), kReply.size());
     EXPECT_EQ(once({.truncate = 1}).adu, Bytes(kReply.begin(), kReply.begin() + 4));
-    EXPECT_EQ(once({.foreign_id = 1}).adu, modbus::encode_adu(21, kPdu));
+    EXPECT_EQ(once({.foreign_id = 1}).adu, modbus::encode_adu(8, kPdu));
 }
 
 TEST(Misbehaviour, IsEncodedInTheModeOfTheLine) {
@@ -43,7 +43,7 @@ TEST(Misbehaviour, IsEncodedInTheModeOfTheLine) {
     const Bytes damaged = once({.damage = 1}, kAscii).adu;
     EXPECT_EQ(damaged.size(), good.size());
     EXPECT_NE(damaged, good);
-    EXPECT_EQ(once({.foreign_id = 1}, kAscii).adu, modbus::encode_ascii(21, kPdu));
+    EXPECT_EQ(once({.foreign_id = 1}, kAscii).adu, modbus::encode_ascii(8, kPdu));
 }
 
 TEST(Misbehaviour, AShareIsOfManyAnswers) {
@@ -96,12 +96,12 @@ TEST(Collision, OneAfterTheOtherBothComeCleanWithThePauseBetweenThem) {
 }
 
 TEST(Collision, WhatOverlapsIsGarbledAndWhatDoesNotIsClean) {
-    const Bytes reply = modbus::encode_adu(7, kPdu);
-    const HeardBytes heard = collide(reply, reply, 30, k8n1);  // three characters later
+    const HeardBytes heard = collide(kReply, kReply, 30, k8n1);  // three characters later
     ASSERT_EQ(heard.bytes.size(), 10u);
     EXPECT_EQ(Bytes(heard.bytes.begin(), heard.bytes.begin() + 3), "07 03 02"_hex);
     EXPECT_EQ(heard.bytes[3], 0x12 & 0x07);
-    EXPECT_EQ(Bytes(heard.bytes.end() - 3, heard.bytes.end()), Bytes(reply.end() - 3, reply.end()));
+    EXPECT_EQ(Bytes(heard.bytes.end() - 3, heard.bytes.end()),
+              Bytes(kReply.end() - 3, kReply.end()));
 }
 
 TEST(Collision, ADuplicatePanelComesTwiceADamagedOrASingleTime) {

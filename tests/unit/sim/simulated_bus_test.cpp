@@ -51,10 +51,13 @@ class SimulatedBusTest : public testing::Test {
         context.restart();
         while (context.run_one() == 0) context.restart();
     }
+    /// The kernel may hand over what was written in parts, but all of it before EAGAIN.
     Bytes heard() {
+        Bytes bytes;
         std::array<std::uint8_t, 512> buffer;
-        const ssize_t n = ::read(master, buffer.data(), buffer.size());
-        return n <= 0 ? Bytes{} : Bytes(buffer.begin(), buffer.begin() + n);
+        for (ssize_t n; (n = ::read(master, buffer.data(), buffer.size())) > 0;)
+            bytes.insert(bytes.end(), buffer.begin(), buffer.begin() + n);
+        return bytes;
     }
     /// Station of the valid reply received; 0: none.
     int answered() {

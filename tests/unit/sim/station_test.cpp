@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <initializer_list>
+#include <map>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -12,8 +14,10 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "support/hex.hpp"
+#include "support/vectors.hpp"
 
 namespace panelgate::sim::station_test {
 namespace {
@@ -30,14 +34,12 @@ const profile::Catalogue& catalogue() {
 const profile::PanelProfile& shipped(std::string_view name) { return *catalogue().find(name); }
 
 /// A panel with requests and replies in hex.
-class Panel {
-  public:
-    explicit Panel(std::string_view name, std::uint8_t id = 7) : Panel(shipped(name), id) {}
-    explicit Panel(const profile::PanelProfile& profile, std::uint8_t id = 7)
-        : station_(profile, id) {}
+struct Panel : Station {
+    explicit Panel(std::string_view name, std::uint8_t id = 7) : Station(shipped(name), id) {}
+    using Station::Station;
 
     std::string ask(const Bytes& pdu, Duration at = 0s, std::int64_t wall = kWall) {
-        return to_hex(station_.handle(TimePoint{} + at, wall, pdu));
+        return to_hex(handle(TimePoint{} + at, wall, pdu));
     }
     std::string ask(std::string_view pdu, Duration at = 0s, std::int64_t wall = kWall) {
         return ask(from_hex(pdu).value(), at, wall);
@@ -54,18 +56,7 @@ class Panel {
             EXPECT_EQ(ask(pdu), to_hex(Bytes{function, code})) << request;
         }
     }
-    void tell_all(std::string_view pdu) {
-        station_.broadcast(TimePoint{}, kWall, from_hex(pdu).value());
-    }
-    int peek(const std::string& area, std::uint32_t address) const {
-        return station_.peek(area, address);
-    }
-    void poke(const std::string& area, std::uint32_t address, std::uint16_t value) {
-        station_.poke(area, address, value);
-    }
-
-  private:
-    Station station_;
+    void tell_all(std::string_view pdu) { broadcast(TimePoint{}, kWall, from_hex(pdu).value()); }
 };
 
 TEST(Station, RefusesFunctionsThatTheManualDoesNotListWith01) {
@@ -162,7 +153,7 @@ TEST(Station, AnswersProtectedWritesAsTheProfileChooses) {
     chosen.simulation.protected_exception = 2;
     for (profile::Area& one : chosen.areas)
         if (one.name == "UW") one.writable->last = 100;
-    Panel gplp(chosen);
+    Panel gplp(chosen, 7);
     gplp.expect_refusals(2, {"10 00 0E 00 01 02 00 01", "0F 00 EF 00 01 01 01",
                              "10 00 64 00 02 04 00 01 00 02"});  // UW100 and UW101
     EXPECT_EQ(gplp.peek("UW", 100), 0);
@@ -196,7 +187,7 @@ TEST(Station, HasAWordForEachItemButNoneForTheBitsOfWords) {
     profile.areas = {area("W", Table::holding_registers, {100, 109}),
                      area("B", Table::coils, {1600, 1759}), area("R", Table::coils, {0, 19})};
     profile.areas[1].view_of = "W";
-    Panel panel(profile);
+    Panel panel(profile, 7);
     for (const auto& [name, address] :
          {std::pair("W", 100u), std::pair("W", 109u), std::pair("B", 1759u), std::pair("R", 19u)})
         EXPECT_EQ(panel.peek(name, address), 0) << name << address;
@@ -286,12 +277,12 @@ TEST(Station, MovesSomeValuesWithTime) {
 
 TEST(Station, KeepsMovingValuesInTheirLimits) {
     for (const auto& [name, profile] : catalogue().all()) {
-        Panel panel(profile);
+        Panel panel(profile, 7);
         for (int second = 0; second < 400; ++second) {
             panel.ask("03 FF FF 00 01", Duration(second * 1s));
             for (const auto& motion : profile.simulation.motion) {
                 if (motion.kind == Kind::clock) continue;
-                const int value = panel.peek(motion.area, motion.address);
+                const double value = panel.peek(motion.area, motion.address);
                 ASSERT_LE(value, motion.high) << name << ' ' << motion.address;
                 ASSERT_GE(value, motion.kind == Kind::toggle ? 0 : motion.low)
                     << name << ' ' << motion.address;
@@ -386,6 +377,94 @@ TEST(GenericStation, ReachesEveryAddressAndRefusesWhatIsNotSimulatedWith01) {
                 {"03 FF FF 00 02", "83 02"}});
     any.expect_refusals(
         1, {"0C", "18 00 04", "14 07 06 00 04 00 01 00 02", "15 09 06 00 04 00 07 00 01 06 AF"});
+}
+
+/// Prefix of a vector's name -> the demo panel that it is sent to.
+struct Demo {
+    const char* prefix;
+    const char* profile;
+    std::uint8_t id;
+};
+constexpr Demo kDemos[] = {{"gplp_", "autonics-gplp-s", 31},
+                           {"gp2005_", "autonics-gp-2005", 5},
+                           {"arm_", "autonics-arm", 17},
+                           {"gt_", "panasonic-gt", 20},
+                           {"cp2e_", "omron-cp2e", 1}};
+
+const Demo& demo_of(const Vector& v) {
+    for (const Demo& demo : kDemos)
+        if (v.name().starts_with(demo.prefix)) return demo;
+    throw std::logic_error("no panel for " + v.name());
+}
+
+/// The frames of the manuals (part 7) whose reply is shown, or not.
+std::vector<Vector> vectors_of_panels(bool with_reply) {
+    std::vector<Vector> chosen;
+    for (Vector& v : load_vectors(TEST_DATA "/vectors.yaml")) {
+        const bool wanted = v.text("part") == "7" && v.kind() != "broadcast";
+        if (wanted && v.bytes("response").has_value() == with_reply) chosen.push_back(std::move(v));
+    }
+    return chosen;
+}
+std::string name_of(const ::testing::TestParamInfo<Vector>& info) { return info.param.name(); }
+
+Bytes pdu_of(const Bytes& adu) { return Bytes(adu.begin() + 1, adu.end() - 2); }
+
+/// The frame with the right CRC: as printed, or as corrected where the print is an erratum.
+Bytes good_frame(const Vector& v, const std::string& key) {
+    return v.bytes(key + "_corrected").value_or(*v.bytes(key));
+}
+
+/// Reply of a fresh panel, `running` after its first request.
+Bytes reply_to(const Vector& v, Duration running) {
+    Station station(shipped(demo_of(v).profile), demo_of(v).id);
+    const TimePoint start{};
+    station.handle(start, 0, "03 FF FF 00 01"_hex);
+    return station.handle(start + running, 0, pdu_of(good_frame(v, "request")));
+}
+
+class FrameOfAManual : public ::testing::TestWithParam<Vector> {};
+
+TEST_P(FrameOfAManual, IsAnsweredByteForByte) {
+    const Vector& v = GetParam();
+    const Bytes expected = good_frame(v, "response");
+    const std::uint8_t station = expected[0];
+    for (const Duration running : {Duration(0s), Duration(7s), Duration(3601s)}) {
+        const Bytes reply = modbus::encode_adu(station, reply_to(v, running));
+        EXPECT_EQ(to_hex(reply), to_hex(expected)) << to_seconds(running) << " s after the start";
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Vectors, FrameOfAManual, ::testing::ValuesIn(vectors_of_panels(true)),
+                         name_of);
+
+class FrameWithoutAPrintedReply : public ::testing::TestWithParam<Vector> {};
+
+TEST_P(FrameWithoutAPrintedReply, IsAnsweredAsItsLayoutSays) {
+    const Vector& v = GetParam();
+    const Bytes request = pdu_of(*v.bytes("request"));
+    const Bytes reply = reply_to(v, 1s);
+    if (v.name() == "cp2e_fc01_w0_00_to_w127_14") {  // 2047 bits fit no byte count
+        EXPECT_EQ(to_hex(reply), "81 03");
+        return;
+    }
+    EXPECT_TRUE(modbus::answers(request, reply)) << to_hex(reply);
+    EXPECT_FALSE(modbus::exception_of(reply)) << to_hex(reply);
+}
+
+INSTANTIATE_TEST_SUITE_P(Vectors, FrameWithoutAPrintedReply,
+                         ::testing::ValuesIn(vectors_of_panels(false)), name_of);
+
+TEST(FramesOfTheManuals, AreAllThere) {
+    EXPECT_EQ(vectors_of_panels(true).size(), 21u);
+    EXPECT_EQ(vectors_of_panels(false).size(), 11u);
+    std::map<std::string, int> panels;
+    for (const Vector& v : vectors_of_panels(true)) ++panels[demo_of(v).profile];
+    EXPECT_EQ(panels, (std::map<std::string, int>{{"autonics-gplp-s", 5},
+                                                  {"autonics-gp-2005", 3},
+                                                  {"autonics-arm", 5},
+                                                  {"panasonic-gt", 4},
+                                                  {"omron-cp2e", 4}}));
 }
 
 }  // namespace

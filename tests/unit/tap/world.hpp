@@ -117,7 +117,7 @@ class World {
                 return out.u8(0x41).u16(number(5)).take();
             default:
                 out.u8(0x03).u16(number(2) * 100);
-                return out.u16(number(2) == 0 ? 10 : 2 + number(20)).take();
+                return out.u16(number(2) == 0 ? 10u : 2 + number(20)).take();
         }
     }
 

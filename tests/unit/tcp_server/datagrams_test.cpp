@@ -262,14 +262,13 @@ TEST_F(DatagramsTest, P3WhatIsOutstandingAtTheEndIsAnswered) {
     Sender client = sender();
     client.read(1);
     read(client, 2, 1);
-    bool stopped = false;
-    listener->stop([&] { stopped = true; });
+    stop();
     do_all_that_is_due();
     EXPECT_FALSE(stopped);
     bus1.answer(0, reply_to_read(1));
     EXPECT_EQ(client.receive(), read_adu(1));
     EXPECT_EQ(client.receive(), adu(2, 1, "83 0a"_hex)) << "it has never started";
-    EXPECT_TRUE(run_until([&] { return stopped; }));
+    EXPECT_TRUE(run_until_stopped());
 }
 
 TEST_F(DatagramsTest, P2CutOffItTakesItsRequestsBack) {

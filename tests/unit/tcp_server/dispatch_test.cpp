@@ -194,7 +194,8 @@ TEST_F(DispatchTest, MissingRightsAreReportedBeforeTheRequestIsChecked) {
 TEST_F(DispatchTest, ARefusalIsCountedByTheTargetBus) {
     const auto asked = [&](std::uint8_t unit, const Bytes& pdu) {
         std::string text;
-        for (const Target& target : std::get<Refuse>(decision_on(unit, pdu)).asked)
+        const auto decision = decision_on(unit, pdu);
+        for (const Target& target : std::get<Refuse>(decision).asked)
             text += name_of(target.bus) + '/' + std::to_string(target.station) + ' ';
         return text;
     };

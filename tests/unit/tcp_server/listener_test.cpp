@@ -229,8 +229,7 @@ TEST_F(ListenerTest, AnswersWhatIsOutstandingBeforeItStops) {
     Client idle = connect();
     Client busy = connect();
     read(busy, 1, 1);
-    bool stopped = false;
-    listener->stop([&] { stopped = true; });
+    stop();
     EXPECT_TRUE(idle.sees_close());
     busy.read(2);
     do_all_that_is_due();
@@ -239,7 +238,7 @@ TEST_F(ListenerTest, AnswersWhatIsOutstandingBeforeItStops) {
     bus1.answer(0, reply_to_read(1));
     EXPECT_EQ(busy.receive(), read_reply(1));
     EXPECT_TRUE(busy.sees_close());
-    EXPECT_TRUE(run_until([&] { return stopped; }));
+    EXPECT_TRUE(run_until_stopped());
     EXPECT_THROW(connect(), boost::system::system_error);
 }
 
@@ -248,15 +247,15 @@ TEST_F(ListenerTest, StopsAsynchronouslyAlsoWithoutConnectionsOrWhenTheyAreCut) 
         start();
         std::optional<Client> client;
         if (connected) read(client.emplace(connect()), 1, 1);
-        bool stopped = false;
-        listener->stop([&] { stopped = true; });
+        stopped = false;
+        stop();
         EXPECT_FALSE(stopped);
         if (connected) {
             listener->close_now();
             EXPECT_EQ(bus1.cancelled.size(), 1U);
             EXPECT_TRUE(client->sees_close());
         }
-        EXPECT_TRUE(run_until([&] { return stopped; }));
+        EXPECT_TRUE(run_until_stopped());
     }
 }
 
@@ -317,19 +316,10 @@ TEST(Places, P9AnAddressReplacesItsOwnIdleConnectionsAndThoseOfTheAddressWithMos
     expect_gives_way({
         {"an empty house", {}, 1, {}},
         {"a free place", {busy(1, 1), idle(1, 2), idle(2, 3)}, 1, {}},
-        {"one address may have them all, and replaces its longest idle one",
-         {busy(1, 1), idle(1, 3), idle(1, 2), idle(1, 4)},
-         1,
-         2U},
-        {"the address with most loses its longest idle one",
-         {idle(2, 1), busy(1, 2), idle(1, 4), idle(1, 3)},
-         3,
-         3U},
-        {"of several with most, the longest idle gives way",
-         {busy(2, 1), idle(2, 4), busy(1, 2), idle(1, 3)},
-         3,
-         3U},
-        {"its share", {idle(2, 1), idle(1, 2), busy(1, 3)}, 1, 1U, {4, 2}},
+        {"one may have them all", {busy(1, 1), idle(1, 3), idle(1, 2), idle(1, 4)}, 1, 2U},
+        {"longest idle of the most", {idle(2, 1), busy(1, 2), idle(1, 4), idle(1, 3)}, 3, 3U},
+        {"two with most", {busy(2, 1), idle(2, 4), busy(1, 2), idle(1, 3)}, 3, 3U},
+        {"its share is used", {idle(2, 1), idle(1, 2), busy(1, 3)}, 1, 1U, {4, 2}},
     });
     const Place place = find_place(Guests{idle(2, 1), busy(1, 2), busy(1, 3)}, 1, {4, 2});
     EXPECT_FALSE(place.found) << "it takes none of another";
@@ -339,15 +329,12 @@ TEST(Places, P9AnAddressReplacesItsOwnIdleConnectionsAndThoseOfTheAddressWithMos
 
 TEST(Places, P9AnAddressWithoutAConnectionFindsAPlaceHoweverBusyTheOthersAre) {
     expect_gives_way({
-        {"busy ones", {busy(1, 3), busy(1, 1), busy(1, 2), busy(1, 4)}, 2, 1U},
-        {"of the address with most, not the idle one of another",
-         {busy(1, 3), busy(1, 2), busy(1, 4), idle(2, 1)},
-         3,
-         1U},
+        {"all busy", {busy(1, 3), busy(1, 1), busy(1, 2), busy(1, 4)}, 2, 1U},
+        {"not another's idle one", {busy(1, 3), busy(1, 2), busy(1, 4), idle(2, 1)}, 3, 1U},
         {"the only one", {busy(1, 1)}, 2, 0U, {1, 1}},
-        {"with less", {busy(1, 1), busy(1, 2), busy(1, 3), busy(2, 4)}, 2, 0U},
+        {"with two less", {busy(1, 1), busy(1, 2), busy(1, 3), busy(2, 4)}, 2, 0U},
         {"with the same", {busy(1, 1), busy(1, 2), busy(2, 3), busy(2, 4)}, 2, {}},
-        {"the other would take it back", {busy(1, 1), busy(1, 2), busy(2, 3)}, 2, {}, {3, 3}},
+        {"it would be taken back", {busy(1, 1), busy(1, 2), busy(2, 3)}, 2, {}, {3, 3}},
     });
 }
 

@@ -201,9 +201,15 @@ class Loopback : public ::testing::Test {
         return Client(context, listener->port(), receive_buffer, own_address);
     }
     Counters counters() const { return listener->counters(); }
+    void stop() {
+        listener->stop([this] { stopped = true; });
+    }
 
     bool run_until(const std::function<bool()>& reached) {
         return tcp_server::run_until(context, reached);
+    }
+    bool run_until_stopped() {
+        return run_until([&] { return stopped; });
     }
     /// Runs until an alarm is armed: input so far has started the partial-ADU timeout.
     bool run_until_armed(std::size_t count = 1) {
@@ -259,6 +265,7 @@ class Loopback : public ::testing::Test {
     Settings settings;
     std::vector<LineInfo> lines;
     rt::LogTap log;
+    bool stopped = false;  ///< what stop() waits for
     std::unique_ptr<Listener> listener;
 };
 

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,64 +17,6 @@
 
 namespace panelgate::tcp_server::pipeline_test {
 namespace {
-
-using Ticket = ReplyQueue::Ticket;
-
-/// Pops and returns the next reply; nothing if its turn has not come.
-std::optional<Bytes> take(ReplyQueue& queue) {
-    const Bytes* front = queue.front();
-    if (front == nullptr) return std::nullopt;
-    Bytes adu = *front;
-    queue.pop();
-    return adu;
-}
-
-TEST(ReplyQueue, LetsNoReplyOvertakeAnotherAndStepsOverWhatGetsNone) {
-    ReplyQueue queue;
-    const Ticket first = queue.open(1, 5);
-    const Ticket second = queue.open(2, 6);
-    queue.push(3, 7, "83 0a"_hex);
-    queue.settle(second, "03 02 0002"_hex);
-    EXPECT_EQ(take(queue), std::nullopt);
-    queue.settle(first, "03 02 0001"_hex);
-    EXPECT_EQ(take(queue), "0001 0000 0005 05 03 02 0001"_hex);
-    EXPECT_EQ(take(queue), "0002 0000 0005 06 03 02 0002"_hex);
-    EXPECT_EQ(take(queue), "0003 0000 0003 07 83 0a"_hex);
-    EXPECT_EQ(take(queue), std::nullopt);
-    EXPECT_TRUE(queue.empty());
-    const Ticket silent = queue.open(1, 0);
-    const Ticket last = queue.open(2, 0);
-    queue.settle(last, "83 02"_hex);
-    queue.drop(silent);
-    EXPECT_EQ(queue.size(), 1U) << "at once: nobody has to take it";
-    EXPECT_EQ(take(queue), "0002 0000 0003 00 83 02"_hex);
-    queue.drop(queue.open(3, 0));
-    EXPECT_EQ(take(queue), std::nullopt);
-    EXPECT_TRUE(queue.empty());
-}
-
-TEST(ReplyQueue, CountsAReplyUntilItHasLeftAndWhatIsLeavingStaysWhereItIs) {
-    ReplyQueue queue;
-    queue.push(1, 1, "83 0a"_hex);
-    const Ticket slow = queue.open(2, 1);
-    const Ticket quick = queue.open(3, 1);
-    queue.settle(quick, "83 02"_hex);
-    EXPECT_EQ(queue.size(), 3U);
-    EXPECT_EQ(queue.in_flight(), 2U) << "the third only waits for the second";
-    queue.settle(slow, "83 02"_hex);
-    EXPECT_EQ(queue.in_flight(), 3U) << "all wait for the client";
-    for (std::size_t left = 3; left != 0; --left) {
-        EXPECT_EQ(queue.size(), left);
-        EXPECT_TRUE(take(queue));
-        EXPECT_EQ(queue.in_flight(), left - 1);
-    }
-    EXPECT_TRUE(queue.empty());
-    queue.push(1, 1, "83 0a"_hex);
-    const Bytes* leaving = queue.front();
-    for (std::uint16_t i = 0; i < 1000; ++i) queue.push(i, 2, "83 02"_hex);
-    EXPECT_EQ(queue.front(), leaving);
-    EXPECT_EQ(*leaving, "0001 0000 0003 01 83 0a"_hex);
-}
 
 /// Two answers in each millisecond.
 class OwnAnswersTest : public testing::Test {
@@ -182,16 +123,6 @@ TEST_F(SmallPipeline, P3EverythingIsAnsweredInOrderHoweverSlowlyItIsTaken) {
     }
     EXPECT_TRUE(pipeline->empty());
     EXPECT_EQ(bus.seen.size(), 5U);
-}
-
-TEST_F(SmallPipeline, ARequestWithoutAReplyGivesItsPlaceBackAtOnce) {
-    shared->settings.broadcast = BroadcastMode::silent;
-    for (std::uint16_t i = 0; i < 5; ++i) pipeline->take({i, 0, "06 0000 0001"_hex});
-    for (int i = 0; i < 5; ++i) {
-        ASSERT_FALSE(bus.held.empty());
-        bus.answer(0, "06 0000 0001"_hex);
-    }
-    EXPECT_TRUE(pipeline->empty());
 }
 
 TEST_F(SmallPipeline, P5WhatNeedsNoLineIsAnsweredAFewTimesAMillisecond) {

@@ -97,16 +97,6 @@ TEST_P(SessionSerial, ABroadcastGetsNoReplyWhateverItsOutcome) {
     expect_next(client, 255, "03 02 0001"_hex);
 }
 
-TEST_P(SessionSerial, TakesRequestsByteByByte) {
-    bus1.instant = reply_to_read(7);
-    Client client = connect();
-    for (const std::uint8_t byte : read_adu(7)) {
-        client.send(Bytes{byte});
-        do_all_that_is_due();
-    }
-    expect_read(client, 7);
-}
-
 TEST_P(SessionSerial, ADamagedRequestIsNotAnsweredAndClosesNothing) {
     bus1.instant = reply_to_read(7);
     Client client = connect();

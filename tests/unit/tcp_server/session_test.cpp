@@ -23,6 +23,7 @@ TEST_F(Session, EchoesTransactionAndUnit) {
     EXPECT_EQ(bus1.held[0].request.station, 1);
     EXPECT_EQ(bus1.held[0].request.request.pdu(), read_pdu(5));
     EXPECT_NE(bus1.held[0].request.client, 0U);
+    EXPECT_FALSE(bus1.held[0].request.poll);
     bus1.answer(0, reply_to_read(42));
     EXPECT_EQ(client.receive(), (modbus::Adu{0xBEEF, 101, reply_to_read(42)}));
 }
@@ -56,19 +57,6 @@ TEST_F(Session, KeepsTwoClientsWithEqualTransactionIdsApart) {
     EXPECT_EQ(second.receive()->pdu, reply_to_read(20));
 }
 
-TEST_F(Session, TakesAdusByteByByteAndManyAtOnce) {
-    bus1.instant = reply_to_read(1);
-    Client client = connect();
-    const Bytes adu = modbus::encode_mbap(1, 1, read_pdu(1));
-    for (const std::uint8_t byte : adu) {
-        client.send(ByteView(&byte, 1));
-        do_all_that_is_due();
-    }
-    EXPECT_EQ(client.receive(), read_reply(1));
-    client.send(adu + adu + adu);
-    for (int i = 0; i < 3; ++i) EXPECT_EQ(client.receive(), read_reply(1));
-}
-
 TEST_F(Session, AnswersTheSameHoweverTheStreamIsCut) {
     bus1.instant = reply_to_read(9);
     settings.in_flight = 1000;
@@ -87,7 +75,8 @@ TEST_F(Session, AnswersTheSameHoweverTheStreamIsCut) {
     for (int round = 0; round < 5; ++round) {
         Client client = connect();
         for (ByteView left(stream); !left.empty();) {
-            const std::size_t n = std::min<std::size_t>(left.size(), 1 + chance() % 700);
+            const std::size_t most = round == 0 ? 20 : 700;
+            const std::size_t n = std::min(left.size(), 1 + chance() % most);
             client.send(left.first(n));
             left = left.subspan(n);
             do_all_that_is_due();
@@ -147,17 +136,6 @@ TEST_F(Session, PassesRepliesAndExceptionsOfThePanelUnchangedIfAFrameCanCarryThe
         EXPECT_EQ(ask_bus(client, 1, reply == large ? "41 01 02"_hex : read_pdu(0), reply), reply);
     EXPECT_EQ(ask_bus(client, 1, "41"_hex, "41"_hex + Bytes(253, 0)), "c1 03"_hex);
     EXPECT_EQ(ask_bus(client, 1, "41"_hex, Bytes{}), "c1 03"_hex);
-}
-
-TEST_F(Session, HandsReadsAndWritesOverAsTheyAreAndNeverAsPolls) {
-    bus1.instant = "00"_hex;
-    Client client = connect();
-    for (const Bytes& pdu : {read_pdu(0), "06 0000 0001"_hex, "41 00"_hex}) client.ask(1, pdu);
-    ASSERT_EQ(bus1.seen.size(), 3U);
-    EXPECT_TRUE(bus1.seen[0].request.is_read());
-    EXPECT_FALSE(bus1.seen[1].request.is_read());
-    EXPECT_FALSE(bus1.seen[2].request.is_read());
-    for (const bus::Request& seen : bus1.seen) EXPECT_FALSE(seen.poll);
 }
 
 const Bytes kWrite = "10 0064 0001 02 00ff"_hex;

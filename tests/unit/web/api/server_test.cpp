@@ -88,7 +88,7 @@ TEST_F(WebServer, RefusesWhatIsTooLargeAndWhatIsNotHttp) {
 
 TEST_F(WebServer, EndsAConnectionThatKeepsItWaiting) {
     struct Row {
-        Duration Settings::*patience;
+        Duration Settings::* patience;
         std::string text;
     };
     const Row rows[] = {{&Settings::first_request_timeout, ""},

@@ -9,11 +9,14 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter::strays_test {
+namespace panelgate::arbiter::unsolicited_test {
 namespace {
+
+using modbus::encode_adu;
 
 const Bytes kRead = "03 00 6B 00 01"_hex;
 const Bytes kReply = "03 02 02 2B"_hex;
+const Bytes kAnswer = encode_adu(17, kReply);
 
 Settings one_station() {
     Settings settings;
@@ -27,7 +30,7 @@ Settings one_station() {
 class UnsolicitedFramesTest : public testing::Test {
   protected:
     UnsolicitedFramesTest() {
-        unsolicited.on_sent(modbus::encode_adu(17, kRead));
+        unsolicited.on_sent(encode_adu(17, kRead));
         quiet.on_sent(now, 17);
         stations.of(17);
     }
@@ -47,6 +50,9 @@ class UnsolicitedFramesTest : public testing::Test {
         }
         return words;
     }
+    bool is_wrong_reply(const Bytes& adu) const {
+        return unsolicited.is_wrong_reply(now, adu, stations);
+    }
     const StationCounters& counters() const { return outbox.stations().at(17); }
 
     Settings settings = one_station();
@@ -57,72 +63,53 @@ class UnsolicitedFramesTest : public testing::Test {
     TimePoint now{1h};
 };
 
-TEST_F(UnsolicitedFramesTest, TheFrameSentLastIsItsEcho) {
-    EXPECT_EQ(heard(modbus::encode_adu(17, kRead)), "echo");
+TEST_F(UnsolicitedFramesTest, AreClassifiedAndCounted) {
+    EXPECT_EQ(heard(encode_adu(17, kRead)), "echo") << "sent last";
     EXPECT_EQ(counters().symptoms.echoes, 1u);
     EXPECT_EQ(counters().foreign_frames, 0u);
-}
-
-TEST_F(UnsolicitedFramesTest, ARequestThatIsNotOursIsAnotherMasters) {
-    EXPECT_EQ(heard(modbus::encode_adu(18, kRead)), "foreign request");
+    EXPECT_EQ(heard(encode_adu(18, kRead)), "foreign request") << "another master's";
     EXPECT_EQ(counters().symptoms.requests, 1u);
     EXPECT_EQ(counters().foreign_frames, 1u);
+    EXPECT_EQ(heard(kAnswer), "foreign") << "it was not asked";
+    EXPECT_EQ(heard(encode_adu(99, kReply)), "foreign");
+    EXPECT_EQ(counters().symptoms.unasked, 2u);
+    EXPECT_EQ(counters().foreign_frames, 3u);
+    const auto discarded = counters().discarded_bytes;
+    EXPECT_EQ(heard("FF 00 FF"_hex), "damaged");
+    EXPECT_EQ(counters().symptoms.strays, 1u);
+    EXPECT_EQ(counters().discarded_bytes, discarded + 3);
+    EXPECT_EQ(heard(Writer().raw(encode_adu(99, kReply)).u8(0xFF).take()), "foreign damaged");
+}
+
+TEST_F(UnsolicitedFramesTest, AnOutstandingReplyIsLate) {
+    stations.of(17).add_outstanding(now, kRead, now - 500ms);
+    EXPECT_EQ(heard(kAnswer), "late");
+    EXPECT_EQ(counters().late_frames, 1u);
+    EXPECT_EQ(counters().foreign_frames, 0u);
+    EXPECT_EQ(heard(kAnswer), "foreign") << "it was outstanding once only";
 }
 
 TEST_F(UnsolicitedFramesTest, BehindAnotherMastersRequestTheLineRestsForItsReply) {
-    const TimePoint before = quiet.free_at(2ms);
-    heard(modbus::encode_adu(18, kRead));
+    EXPECT_LT(quiet.free_at(2ms), now + 1s);
+    heard(encode_adu(18, kRead));
     EXPECT_GE(quiet.free_at(2ms), now + 20ms) << "a panel may think as long";
     EXPECT_LE(quiet.free_at(2ms), now + 200ms);
-    EXPECT_LT(before, now);
 }
 
 TEST_F(UnsolicitedFramesTest, UnansweredOrAlreadyAnsweredRequestsNeedNoRest) {
-    heard(modbus::encode_adu(0, "10 00 01 00 01 02 00 05"_hex));
+    heard(encode_adu(0, "10 00 01 00 01 02 00 05"_hex));
     EXPECT_EQ(quiet.free_at(2ms), now + 2ms) << "a broadcast";
-    Bytes both = modbus::encode_adu(18, kRead);
-    const Bytes reply = modbus::encode_adu(18, kReply);
-    both.insert(both.end(), reply.begin(), reply.end());
-    heard(both);
+    heard(Writer().raw(encode_adu(18, kRead)).raw(encode_adu(18, kReply)).take());
     EXPECT_EQ(quiet.free_at(2ms), now + 2ms) << "its reply was heard with it";
 }
 
-TEST_F(UnsolicitedFramesTest, AGoodFrameOfAPanelThatWasNotAskedIsForeign) {
-    EXPECT_EQ(heard(modbus::encode_adu(17, kReply)), "foreign");
-    EXPECT_EQ(heard(modbus::encode_adu(99, kReply)), "foreign");
-    EXPECT_EQ(counters().symptoms.unasked, 2u);
-    EXPECT_EQ(counters().foreign_frames, 2u);
-}
-
-TEST_F(UnsolicitedFramesTest, AnOutstandingReplyIsLateAndShowsByHowMuch) {
-    stations.of(17).add_outstanding(now, kRead, now - 500ms);
-    EXPECT_EQ(heard(modbus::encode_adu(17, kReply)), "late");
-    EXPECT_EQ(counters().late_frames, 1u);
-    EXPECT_EQ(counters().foreign_frames, 0u);
-    EXPECT_EQ(heard(modbus::encode_adu(17, kReply)), "foreign") << "it was owed once only";
-}
-
-TEST_F(UnsolicitedFramesTest, BytesThatAreNoFrameAreDamagedAndCounted) {
-    EXPECT_EQ(heard("FF 00 FF"_hex), "damaged");
-    EXPECT_EQ(counters().symptoms.strays, 1u);
-    EXPECT_EQ(counters().discarded_bytes, 3u);
-    Bytes mixed = modbus::encode_adu(99, kReply);
-    mixed.push_back(0xFF);
-    EXPECT_EQ(heard(mixed), "foreign damaged");
-}
-
 TEST_F(UnsolicitedFramesTest, AWrongReplyIsNeitherEchoNorRequestNorOutstanding) {
-    EXPECT_TRUE(unsolicited.is_wrong_reply(now, modbus::encode_adu(17, kReply), stations));
-    EXPECT_FALSE(unsolicited.is_wrong_reply(now, modbus::encode_adu(17, kRead), stations))
-        << "echo";
-    EXPECT_FALSE(
-        unsolicited.is_wrong_reply(now, modbus::encode_adu(17, "03 00 00 00 01"_hex), stations))
-        << "a request";
-    EXPECT_FALSE(unsolicited.is_wrong_reply(now, modbus::encode_adu(99, kReply), stations))
-        << "nobody";
+    EXPECT_TRUE(is_wrong_reply(kAnswer));
+    EXPECT_FALSE(is_wrong_reply(encode_adu(17, kRead))) << "echo";
+    EXPECT_FALSE(is_wrong_reply(encode_adu(17, "03 00 00 00 01"_hex))) << "a request";
+    EXPECT_FALSE(is_wrong_reply(encode_adu(99, kReply))) << "nobody";
     stations.of(17).add_outstanding(now, kRead, now - 500ms);
-    EXPECT_FALSE(unsolicited.is_wrong_reply(now, modbus::encode_adu(17, kReply), stations))
-        << "owed";
+    EXPECT_FALSE(is_wrong_reply(kAnswer)) << "outstanding";
 }
 
 TEST_F(UnsolicitedFramesTest, GathersNoMoreThanAnyFrameHas) {
@@ -140,11 +127,11 @@ TEST_F(UnsolicitedFramesTest, TheTrailBelongsToTheStationThatAnsweredLast) {
     EXPECT_EQ(unsolicited.replied_before(), 0);
     unsolicited.on_replied(17);
     EXPECT_EQ(unsolicited.replied_before(), 0) << "it answered what is on the wire";
-    unsolicited.on_sent(modbus::encode_adu(18, kRead));
+    unsolicited.on_sent(encode_adu(18, kRead));
     EXPECT_EQ(unsolicited.replied_before(), 17);
-    unsolicited.on_sent(modbus::encode_adu(18, kRead));
+    unsolicited.on_sent(encode_adu(18, kRead));
     EXPECT_EQ(unsolicited.replied_before(), 0) << "the one between was not answered";
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter::strays_test
+}  // namespace panelgate::arbiter::unsolicited_test

@@ -1,5 +1,5 @@
 // What others see of the plant: REST, metrics, events, and the histories of its lines.
-#include "scene.hpp"
+#include "snapshot.hpp"
 
 #include <gmock/gmock.h>
 
@@ -17,7 +17,7 @@
 #include "support/fake_bus.hpp"
 #include "support/manual_clock.hpp"
 
-namespace panelgate::app::scene_test {
+namespace panelgate::app::snapshot_test {
 namespace {
 
 using ::testing::AllOf;
@@ -25,9 +25,9 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 /// press 31 has one point and one poll block; meter 5 is read-only.
-class SceneTest : public testing::Test {
+class SnapshotTest : public testing::Test {
   protected:
-    SceneTest() {
+    SnapshotTest() {
         panel.name = "test-panel";
         floor.name = "floor1";
         floor.device.device = "/dev/ttyUSB0";
@@ -73,7 +73,7 @@ class SceneTest : public testing::Test {
     profile::PanelProfile generic;
 };
 
-TEST_F(SceneTest, RestSeesTheStationsOfThePlantAndPanelsOfAnyKind) {
+TEST_F(SnapshotTest, RestSeesTheStationsOfThePlantAndPanelsOfAnyKind) {
     const web::Directory directory = directory_of(plant, generic);
     ASSERT_EQ(directory.lines.size(), 1u);
     EXPECT_EQ(directory.find_line("floor1")->device, "/dev/ttyUSB0");
@@ -105,7 +105,7 @@ std::deque<points::PointSample> all_points(const Plant& plant, TimePoint now) {
     return samples;
 }
 
-TEST_F(SceneTest, P10AScrapeHasEveryPointButNoValueThatWasNeverRead) {
+TEST_F(SnapshotTest, P10AScrapeHasEveryPointButNoValueThatWasNeverRead) {
     auto samples = all_points(plant, now);
     ASSERT_EQ(samples.size(), 1u);
     EXPECT_EQ(samples[0].line, "floor1");
@@ -121,7 +121,7 @@ TEST_F(SceneTest, P10AScrapeHasEveryPointButNoValueThatWasNeverRead) {
     EXPECT_TRUE(bus.requests.empty());
 }
 
-TEST_F(SceneTest, AScrapeCopiesManyPointsSomeAtATime) {
+TEST_F(SnapshotTest, AScrapeCopiesManyPointsSomeAtATime) {
     Plant wide;
     auto& many = floor.stations[0].points;
     many.resize(2 * PointCopy::kPiece + 1);
@@ -140,7 +140,7 @@ TEST_F(SceneTest, AScrapeCopiesManyPointsSomeAtATime) {
     EXPECT_EQ(samples.back().point, std::to_string(2 * PointCopy::kPiece));
 }
 
-TEST_F(SceneTest, TellsOfStationsByTheirNames) {
+TEST_F(SnapshotTest, TellsOfStationsByTheirNames) {
     const auto listener = hub.listen({});
     for (const std::uint8_t id : Bytes{31, 9}) {
         arbiter::StationEvent event;
@@ -153,7 +153,7 @@ TEST_F(SceneTest, TellsOfStationsByTheirNames) {
     EXPECT_THAT(told, HasSubstr(R"("station":"9")"));
 }
 
-TEST_F(SceneTest, TellsEachEventOnlyToThoseWhoWantWhatItIsAbout) {
+TEST_F(SnapshotTest, TellsEachEventOnlyToThoseWhoWantWhatItIsAbout) {
     web::EventFilter press;
     press.stations = {{"floor1", "press"}};
     web::EventFilter temperature;
@@ -175,7 +175,7 @@ TEST_F(SceneTest, TellsEachEventOnlyToThoseWhoWantWhatItIsAbout) {
     EXPECT_EQ(of_line->take(), "");
 }
 
-TEST_F(SceneTest, TellsWhatHasBecomeOfPointsAndNotOfPollBlocks) {
+TEST_F(SnapshotTest, TellsWhatHasBecomeOfPointsAndNotOfPollBlocks) {
     const auto listener = hub.listen({});
     listener->take();
     poll();
@@ -244,4 +244,4 @@ TEST(LineHistories, OfManyLinesHaveWiderSlots) {
 }
 
 }  // namespace
-}  // namespace panelgate::app::scene_test
+}  // namespace panelgate::app::snapshot_test

@@ -1,0 +1,276 @@
+// What is reported: counters, shares, names, and with `explain` each transaction and decision.
+#include "panelgate/arbiter/outbox.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "arbiter_fixture.hpp"
+#include "panelgate/arbiter/job.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "support/attempts.hpp"
+#include "support/hex.hpp"
+#include "support/request.hpp"
+
+namespace panelgate::arbiter::outbox_test {
+namespace {
+
+class OutboxTest : public testing::Test {
+  protected:
+    Attempt answered(Group group) const {
+        return test::answered(now - 30ms, now, std::move(group), kReply);
+    }
+    static modbus::Unused frame_of(std::uint8_t station) {
+        return {modbus::Unused::Kind::foreign, station, Bytes(6)};
+    }
+    const StationCounters& of(std::uint8_t station) const { return outbox.stations().at(station); }
+
+    Settings settings = settings_38400();
+    Outbox outbox{settings};
+    TimePoint now{1h};
+};
+
+TEST_F(OutboxTest, AnAnswerSaysWhetherItsRequestWasEverSent) {
+    Job job{.ticket = 5, .request = test::request_of(kRead)};
+    outbox.finish(job, Fault::timeout);
+    job.attempts = 1;
+    outbox.finish(job, kReply, true);
+    outbox.finish_from_memory(6, kReply, 3s);
+    const auto never = std::get<Finish>(*outbox.poll());
+    EXPECT_EQ(never.ticket, 5u);
+    EXPECT_FALSE(never.transmitted);
+    const auto shared = std::get<Finish>(*outbox.poll());
+    EXPECT_TRUE(shared.transmitted);
+    EXPECT_TRUE(shared.shared);
+    EXPECT_FALSE(shared.age);
+    const auto remembered = std::get<Finish>(*outbox.poll());
+    EXPECT_FALSE(remembered.transmitted);
+    EXPECT_EQ(remembered.age, Duration(3s));
+}
+
+TEST_F(OutboxTest, UnlistedStationsShareOneAccount) {
+    outbox.on_unsolicited(now, frame_of(98), Outbox::Part::late, 17, 5ms);
+    outbox.on_unsolicited(now, frame_of(99), Outbox::Part::late, 17, 5ms);
+    EXPECT_EQ(of(0).late_frames, 2u);
+    EXPECT_EQ(of(17).late_frames, 0u);
+    EXPECT_EQ(outbox.stations().size(), 3u) << "no stranger can add one";
+}
+
+TEST_F(OutboxTest, DamageInsideAnAttemptIsCountedWithTheAttempt) {
+    const modbus::Unused damaged{modbus::Unused::Kind::damaged, 0, Bytes(3)};
+    for (const bool inside : {true, false}) {
+        outbox.inside_attempt(inside);
+        outbox.on_unsolicited(now, damaged, Outbox::Part::damaged, 17);
+        EXPECT_EQ(of(17).symptoms.strays, inside ? 0u : 1u);
+    }
+    EXPECT_EQ(of(17).discarded_bytes, 6u) << "its bytes are, in both";
+}
+
+TEST_F(OutboxTest, EachCollisionIsCountedAndReportedOnceIn10Seconds) {
+    outbox.on_echo_mismatch(now, 17);
+    EXPECT_TRUE(outbox.poll());
+    outbox.on_echo_mismatch(now + 9s, 17);
+    EXPECT_FALSE(outbox.poll());
+    outbox.on_echo_mismatch(now + 10s, 17);
+    EXPECT_TRUE(outbox.poll());
+    EXPECT_EQ(of(17).echo_mismatches, 3u);
+}
+
+TEST_F(OutboxTest, TheTimeOfATransactionIsFromItsFirstBitToTheGapBehindIt) {
+    const Attempt attempt = answered(test::group_of(17, kRead));
+    outbox.on_ended(now, attempt, 2ms);
+    EXPECT_EQ(outbox.line().busy, now - attempt.timing().started + 2ms);
+    EXPECT_EQ(outbox.shares().all().at(1).busy, outbox.line().busy);
+}
+
+TEST_F(OutboxTest, AClientThatHasLeftPaysForNothing) {
+    Group group = test::group_of(17, kRead);
+    group.jobs.push_back(group.jobs.front());
+    group.jobs[1].client = 2;
+    group.on_client_gone(2);
+    outbox.on_ended(now, answered(group), 2ms);
+    const auto& shares = outbox.shares().all();
+    ASSERT_EQ(shares.size(), 1u);
+    EXPECT_EQ(shares.at(1).busy, outbox.line().busy / 2) << "its half is nobody's";
+    outbox.on_client_gone(1);
+    EXPECT_TRUE(outbox.shares().all().empty());
+}
+
+TEST_F(OutboxTest, ReasonsAreOnlyPutIntoWordsWithExplain) {
+    outbox.decide(now, [] {
+        ADD_FAILURE() << "nobody wants it";
+        return std::string();
+    });
+    EXPECT_FALSE(outbox.poll());
+    settings.explain = true;
+    Outbox explaining(settings);
+    explaining.decide(now, [] { return std::string("because"); });
+    const auto decision = std::get<Decision>(*explaining.poll());
+    EXPECT_EQ(decision.text, "because");
+    EXPECT_EQ(decision.at, now);
+}
+
+TEST(ClientNames, P9AreBoundedAndTheLastOneCountsUntilTheClientHasGone) {
+    ClientNames names;
+    for (Client client = 1; client <= ClientNames::kClients + 1; ++client) names.set(client, "x");
+    EXPECT_EQ(names.of(ClientNames::kClients), "x");
+    EXPECT_EQ(names.of(ClientNames::kClients + 1), "a client without a name");
+    names.set(1, "y");
+    EXPECT_EQ(names.of(1), "y");
+    names.forget(1);
+    EXPECT_EQ(names.of(1), "a client without a name");
+}
+
+/// With `explain`: each transaction's number, its instants, and how it ended.
+class ExchangeTest : public testing::Test {
+  protected:
+    static Settings explained(bool explain = true) {
+        Settings made = settings_38400();
+        made.explain = explain;
+        made.paced = true;
+        return made;
+    }
+    /// Asks 17; its reply comes byte by byte after 5 ms.
+    static void answer_one(BusScript& script) {
+        script.submit(17, kRead);
+        script.run_to_end_of_request();
+        script.run_for(5ms);
+        script.hear_paced(modbus::encode_adu(17, kReply));
+        script.run_for(20ms);
+    }
+    std::vector<std::string> ends() const {
+        std::vector<std::string> words;
+        for (const Exchange& one : bus.exchanges) words.emplace_back(label(one.end));
+        return words;
+    }
+
+    BusScript bus{explained()};
+};
+
+TEST_F(ExchangeTest, ReportsTheInstantsOfATransaction) {
+    const TimePoint asked = bus.now();
+    answer_one(bus);
+    ASSERT_EQ(bus.exchanges.size(), 1u);
+    const Exchange& told = bus.exchanges[0];
+    EXPECT_EQ(told.transaction, 1u);
+    EXPECT_EQ(told.station, 17);
+    EXPECT_EQ(told.end, TransactionEnd::ok);
+    EXPECT_EQ(told.arrived, asked);
+    EXPECT_EQ(told.granted, bus.sent[0].at);
+    EXPECT_EQ(told.first_bit_out, told.granted);
+    const SerialFormat& serial = bus.settings().serial;
+    EXPECT_EQ(told.last_bit_out - told.first_bit_out, frame_time(serial, 8));
+    EXPECT_NEAR(to_milliseconds(*told.first_byte_in - told.last_bit_out), 5, 0.3);
+    EXPECT_NEAR(to_milliseconds(*told.last_byte_in - *told.first_byte_in),
+                to_milliseconds(frame_time(serial, 11)), 0.3);
+}
+
+TEST_F(ExchangeTest, BeginsToSendWhenTheLinesLeadIsOver) {
+    bus.arbiter().set_lead(3ms);
+    bus.submit(17, kRead);
+    bus.run_for(2s);
+    ASSERT_FALSE(bus.exchanges.empty());
+    EXPECT_EQ(bus.exchanges[0].first_bit_out, bus.exchanges[0].granted + 3ms);
+}
+
+TEST_F(ExchangeTest, EachAttemptIsATransactionAndTheAnswerNamesThemAll) {
+    const Ticket ticket = bus.submit(17, kRead);
+    bus.run_for(3s);
+    EXPECT_EQ(ends(), (std::vector<std::string>{"timeout", "timeout"}));
+    EXPECT_EQ(bus.answer(ticket).transactions, (std::vector<Transaction>{1, 2}));
+    EXPECT_FALSE(bus.exchanges[0].first_byte_in);
+    const Ticket other = bus.submit(18, kRead);
+    answer(bus, 18, "83 02"_hex, 5ms);
+    bus.run_for(20ms);
+    EXPECT_EQ(bus.answer(other).transactions, std::vector<Transaction>{3});
+    EXPECT_EQ(ends().back(), "exception");
+}
+
+TEST_F(ExchangeTest, ReadsThatShareATransactionNameTheSame) {
+    bus.submit(18, kRead, 9);
+    const Ticket one = bus.submit(17, kRead, 1);
+    const Ticket two = bus.submit(17, kRead, 2);
+    answer(bus, 18, kReply, 5ms);
+    answer_next(bus, 17, kReply, 5ms);
+    bus.run_for(20ms);
+    EXPECT_EQ(bus.answer(one).transactions, std::vector<Transaction>{2});
+    EXPECT_EQ(bus.answer(two).transactions, std::vector<Transaction>{2});
+}
+
+TEST_F(ExchangeTest, ReportsWhatWasDamagedWrongBroadcastOrLost) {
+    Settings settings = explained();
+    settings.stations[0].retries = settings.stations[1].retries = 0;
+    bus.apply(settings);
+    bus.submit(17, kRead);
+    bus.run_to_end_of_request();
+    bus.run_for(5ms);
+    bus.hear("11 03 06 02 2B 00 00 00 64 C8 BB"_hex);
+    bus.run_for(2s);
+    bus.submit(18, kRead);
+    answer(bus, 18, "84 01"_hex, 5ms);
+    bus.run_for(2s);
+    bus.submit(0, kWrite);
+    bus.run_for(1s);
+    bus.submit(18, kRead);
+    bus.line_down();
+    EXPECT_EQ(ends(), (std::vector<std::string>{"damaged", "wrong", "ok", "line_down"}));
+    EXPECT_EQ(bus.exchanges[2].station, 0);
+    EXPECT_TRUE(bus.exchanges[0].first_byte_in);
+}
+
+TEST_F(ExchangeTest, WhatIsRefusedHasCostNone) {
+    bus.line_down();
+    EXPECT_FALSE(bus.try_submit(17, kRead).has_value());
+    EXPECT_TRUE(bus.exchanges.empty());
+}
+
+TEST_F(ExchangeTest, NothingIsReportedWithoutExplain) {
+    BusScript script{explained(false)};
+    answer_one(script);
+    EXPECT_TRUE(script.exchanges.empty());
+}
+
+TEST_F(ArbiterTest, ExplainsWhyEachRequestGoesNowAndWhyOneIsRefused) {
+    settings.explain = true;
+    settings.quarantine = Quarantine::line;
+    settings.queue.per_client = 1;
+    settings.stations[0].retries = settings.stations[1].retries = 0;
+    BusScript script(settings);
+    script.arbiter().name_client(1, "modbus_tcp 10.0.0.5:50012");
+    script.submit(17, kRead, 1);
+    script.submit(18, kRead, 2);
+    EXPECT_FALSE(script.try_submit(18, "03 00 00 00 03"_hex, 2));
+    EXPECT_EQ(text_of(script.notes[0].why),
+              "read of modbus_tcp 10.0.0.5:50012 to station 17: next in turn after 0.0 ms, 0 wait");
+    ASSERT_EQ(script.decisions.size(), 1u);
+    EXPECT_EQ(
+        script.decisions[0].text,
+        "read of a client without a name to station 18 refused: 1 of 256 wait on this line, at "
+        "most 1 of one client");
+    script.run_for(3s);
+    ASSERT_GE(script.decisions.size(), 2u);
+    EXPECT_EQ(
+        script.decisions[1].text,
+        "only this request is sent for 500.0 ms: station 17 did not answer and may do so late");
+}
+
+TEST_F(ArbiterTest, ExplainsWhyAReadThatWasAnsweredIsAskedOnceMore) {
+    settings.explain = true;
+    BusScript script(settings);
+    for (const Bytes& read : {kRead, "03 01 00 00 03"_hex}) {
+        script.submit(17, read, 1);
+        answer(script, 17, kReply, 3ms);
+    }
+    ASSERT_TRUE(script.next_sent(100ms));
+    ASSERT_EQ(script.decisions.size(), 1u);
+    EXPECT_EQ(script.decisions[0].text,
+              "read of a client without a name to station 17 asked once more: its answer repeats "
+              "an earlier one and may be a duplicate of it");
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter::outbox_test
