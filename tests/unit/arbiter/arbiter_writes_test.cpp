@@ -29,7 +29,7 @@ std::vector<Finish> finished(Arbiter& arbiter) {
     return all;
 }
 
-TEST_F(ArbiterTest, P2NeverRepeatsAWrite) {
+TEST_F(ArbiterTest, P2NeverRepeatsAWriteUnlessTheStationAllowsIt) {
     for (const Bytes& write :
          {kWrite, "05 00 01 FF 00"_hex, "10 00 01 00 01 02 00 03"_hex, "0F 00 01 00 01 01 01"_hex,
           "16 00 04 00 F2 00 25"_hex, "17 00 03 00 01 00 0E 00 01 02 00 FF"_hex, "41 01 02"_hex}) {
@@ -40,9 +40,6 @@ TEST_F(ArbiterTest, P2NeverRepeatsAWrite) {
         EXPECT_EQ(script.answer(ticket).pdu.error(), Fault::timeout);
         EXPECT_TRUE(script.answer(ticket).transmitted);
     }
-}
-
-TEST_F(ArbiterTest, RepeatsAWriteWhenTheStationAllowsIt) {
     settings.stations[0].retry_writes = true;
     BusScript script{settings};
     script.submit(17, kWrite);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cctype>
+#include <cstdint>
 #include <string_view>
 
 #include "arbiter_fixture.hpp"
@@ -53,19 +54,6 @@ TEST_F(AsciiLine, HandsTheReplyOnAtItsLastCharacter) {
     EXPECT_EQ(bus.answer(ticket).at, bus.now());
 }
 
-TEST_F(AsciiLine, SendsTheNextRequestBehindAShortTurnaround) {
-    const Duration gap = silent_interval(settings.serial);
-    EXPECT_LT(gap, 3 * character_time(settings.serial));
-    bus.submit(17, kRead, 1);
-    bus.submit(18, kRead, 2);
-    answer(bus, 17, kReply, 2ms);
-    const TimePoint last = bus.now();
-    const auto next = bus.next_sent();
-    ASSERT_TRUE(next);
-    EXPECT_EQ(next->adu[2], '2');
-    EXPECT_EQ(next->at - last, gap);
-}
-
 TEST_F(AsciiLine, CountsTheTimeoutFromTheEndOfItsLongerRequest) {
     settings.stations[0].retries = 0;
     BusScript script{settings};
@@ -74,24 +62,21 @@ TEST_F(AsciiLine, CountsTheTimeoutFromTheEndOfItsLongerRequest) {
     EXPECT_EQ(script.answer(ticket).pdu.error(), Fault::timeout);
 }
 
-TEST_F(AsciiLine, CountsDamageThatIsLowerCase) {
-    ask();
-    bus.hear_paced(lower(modbus::encode_ascii(17, "03 06 02 2B 00 00 00 AE"_hex)));
-    bus.run_for(20ms);
-    EXPECT_EQ(counters().symptoms.damaged(), 1u);
-    EXPECT_EQ(counters().symptoms.lower_case, 1u);
-}
-
-TEST_F(AsciiLine, LowerCaseIsTakenOnlyWhereConfigured) {
-    ASSERT_NE(lower(kReplyText), kReplyText);
+TEST_F(AsciiLine, LowerCaseIsTakenOnlyWhereConfiguredAndElseCountedAsThat) {
+    const Bytes reply = "03 06 02 2B 00 00 00 AE"_hex;
     for (const bool taken : {false, true}) {
         if (taken) settings.ascii_digits = modbus::HexDigits::any_case;
         BusScript script{settings};
         const Ticket ticket = script.submit(17, kRead);
         script.run_to_end_of_request();
-        script.hear(lower(kReplyText));
+        script.run_for(2ms);
+        script.hear_paced(lower(modbus::encode_ascii(17, reply)));
         ASSERT_EQ(script.answered(ticket), taken);
-        if (taken) EXPECT_EQ(script.answer(ticket).pdu.value(), kReply);
+        if (taken) EXPECT_EQ(script.answer(ticket).pdu.value(), reply);
+        script.run_for(20ms);
+        const Symptoms& symptoms = script.arbiter().station_counters().at(17).symptoms;
+        EXPECT_EQ(symptoms.damaged(), taken ? 0u : 1u);
+        EXPECT_EQ(symptoms.lower_case, taken ? 0u : 1u);
     }
 }
 

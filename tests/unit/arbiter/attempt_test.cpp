@@ -69,14 +69,6 @@ TEST_F(AttemptTest, IsSilentWhenItsPatienceIsOverAndNotBefore) {
     EXPECT_FALSE(attempt_.heard());
 }
 
-TEST_F(AttemptTest, AReplyMayComeBehindNoiseAndBehindAnotherStationsFrame) {
-    EXPECT_EQ(hear(5ms, "FF 00 FF"_hex), Verdict::open);
-    EXPECT_EQ(hear(20ms, encode_adu(kStation + 1, kReply)), Verdict::open);
-    EXPECT_EQ(hear(40ms, kReplyAdu), Verdict::replied);
-    EXPECT_EQ(attempt_.reply(), kReply);
-    EXPECT_FALSE(attempt_.take_unsolicited().empty());
-}
-
 TEST_F(AttemptTest, AHoleInAReplyIsWaitedForAndALongerOneMakesItDamage) {
     const Bytes front(kReplyAdu.begin(), kReplyAdu.begin() + 5);
     const Bytes rest(kReplyAdu.begin() + 5, kReplyAdu.end());

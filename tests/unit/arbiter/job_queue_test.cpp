@@ -7,6 +7,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <sstream>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include "panelgate/base/bytes.hpp"
@@ -145,22 +148,64 @@ class JobQueueLimits : public test::QueueFixture {
         EXPECT_TRUE(queue_.consistent());
         return !pushed.taken;
     }
+    /// "w1/2@100" comes: a write of client 1, of host 100, to station 2. "!w1/2": it is refused;
+    /// "w1/2-3": the third one is dropped for it.
+    void come(const std::string& word) {
+        SCOPED_TRACE(word);
+        std::istringstream in(word.substr(word.find_first_not_of('!')));
+        char what = 0;
+        char mark = 0;
+        Client client = 0;
+        unsigned station = 0;
+        Host host = 0;
+        Ticket shed = 0;
+        in >> what >> client >> mark >> station;
+        while (in >> mark) in >> (mark == '@' ? host : shed);
+        const auto priority = static_cast<PriorityClass>(std::string_view("wrp").find(what));
+        Job made = job(host, client, static_cast<std::uint8_t>(station), priority);
+        if (word.front() == '!') {
+            EXPECT_TRUE(refuses(std::move(made)));
+        } else {
+            EXPECT_EQ(shed_for(std::move(made)), shed);
+        }
+    }
 };
 
-TEST_F(JobQueueLimits, P9RefusesMoreThanOneClientMayHave) {
-    limits(10, 2);
-    add(read(1, 1));
-    add(read(1, 2));
-    EXPECT_TRUE(refuses(read(1, 3)));
-    EXPECT_TRUE(refuses(write(1, 3)));
-    add(read(2, 3));
-}
-
-TEST_F(JobQueueLimits, P9RefusesMoreThanTheLimitWhenAllHaveTheSame) {
-    limits(4, 4);
-    for (Client client = 1; client <= 4; ++client) add(read(client, 1));
-    EXPECT_TRUE(refuses(read(5, 1)));
-    EXPECT_TRUE(refuses(read(1, 1)));
+TEST_F(JobQueueLimits, P9WhoComesWhenItIsFullIsRefusedOrTakesThePlaceOfAnother) {
+    struct Row {
+        std::size_t limit;
+        std::size_t per_client;
+        std::string comes;
+    };
+    const Row rows[] = {
+        // More than one client may have; more than the limit, when all have the same.
+        {10, 2, "r1/1 r1/2 !r1/3 !w1/3 r2/3"},
+        {4, 4, "r1/1 r2/1 r3/1 r4/1 !r5/1 !r1/1"},
+        // The newest of the greediest host goes.
+        {6, 6, "r1/1@100 r2/1@100 r2/1@100 r2/2@100 r1/1@100 r3/1@200 r4/1@300-4"},
+        // Polls go before reads, and reads before writes: half of the queue is not more than half.
+        {4, 4, "w1/1 p1/2 r1/3 w1/4 r2/1-2 w3/1-3 !r4/1 !r2/2"},
+        // A write goes for a read only where one host holds more than half.
+        {4, 4, "w1/1 w1/2 w1/3 r2/1 r3/1-3 !r4/1"},
+        // A write takes the place of a read, even of its own.
+        {3, 4, "r1/1 w1/2 r1/3 !r1/4 w1/4-3"},
+        // A flood of writes does not drop the reads of clients with less.
+        {6, 6, "w1/1 w1/2 w1/3 w1/4 r2/1 r3/1 !w1/5"},
+        // What goes is the newest of its lane, and nothing from before a broadcast.
+        {4, 4, "p1/1 w1/1 r1/1 w1/1 w2/1-4 w3/1-3 w4/1-2 w5/1-1 !w6/1"},
+        {3, 3, "r1/1 r1/2 w1/0 w2/1-3"},
+    };
+    for (const Row& row : rows) {
+        limits(row.limit, row.per_client);
+        ticket_ = 0;
+        std::size_t kept = 0;
+        std::istringstream words(row.comes);
+        for (std::string word; words >> word;) {
+            come(word);
+            if (word.find_first_of("!-") == std::string::npos) ++kept;
+        }
+        EXPECT_EQ(queue_.size(), kept) << row.comes;
+    }
 }
 
 /// Otherwise the same client would lose every time and never be served.
@@ -223,31 +268,6 @@ TEST_F(JobQueueLimits, NeverHoldsMoreThanItsMost) {
     EXPECT_EQ(queue_.waiting(), JobQueue::kMost + 1);
 }
 
-TEST_F(JobQueueLimits, P9ANewcomerTakesTheNewestPlaceOfTheGreediestHost) {
-    limits(6, 6);
-    add(read(1, 1, 100));
-    add(read(2, 1, 100));
-    add(read(2, 1, 100));
-    const Ticket newest_of_greediest = add(read(2, 2, 100));
-    add(read(1, 1, 100));
-    add(read(3, 1, 200));
-    EXPECT_EQ(shed_for(read(4, 1, 300)), newest_of_greediest);
-    EXPECT_EQ(queue_.size(), 6u);
-}
-
-TEST_F(JobQueueLimits, P9PollsGoBeforeReadsAndReadsBeforeWrites) {
-    limits(4, 4);
-    const Ticket write_ = add(write(1, 1));
-    const Ticket poll_ = add(poll(1, 2));
-    const Ticket read_ = add(read(1, 3));
-    add(write(1, 4));
-    EXPECT_EQ(shed_for(read(2, 1)), poll_);
-    EXPECT_EQ(shed_for(write(3, 1)), read_);
-    EXPECT_TRUE(refuses(read(4, 1)));  // half of the queue is not more than half
-    EXPECT_TRUE(refuses(read(2, 2)));
-    EXPECT_TRUE(queue_.has(1, 1) && write_ != 0);
-}
-
 /// Otherwise no client could read beside more writers than there are places.
 TEST_F(JobQueueLimits, P9WritesLeaveAFifthOfThePlacesToReads) {
     limits(5, 5);
@@ -258,45 +278,6 @@ TEST_F(JobQueueLimits, P9WritesLeaveAFifthOfThePlacesToReads) {
     EXPECT_TRUE(refuses(write(7, 1)));
     for (int i = 0; i < 4; ++i) next();
     EXPECT_EQ(next(), first);
-}
-
-TEST_F(JobQueueLimits, P9AWriteGoesForAReadOnlyWhereOneHostHoldsMoreThanHalf) {
-    limits(4, 4);
-    for (std::uint8_t station = 1; station <= 3; ++station) add(write(1, station));
-    add(read(2, 1));
-    const Ticket newest = ticket_ - 1;
-    EXPECT_EQ(shed_for(read(3, 1)), newest);
-    EXPECT_TRUE(refuses(read(4, 1)));
-}
-
-TEST_F(JobQueueLimits, P9AWriteTakesThePlaceOfAReadEvenOfItsOwn) {
-    limits(3, 4);
-    add(read(1, 1));
-    add(write(1, 2));
-    const Ticket own = add(read(1, 3));
-    EXPECT_TRUE(refuses(read(1, 4)));
-    EXPECT_EQ(shed_for(write(1, 4)), own);
-}
-
-TEST_F(JobQueueLimits, P9AFloodOfWritesDoesNotDropTheReadsOfClientsWithLess) {
-    limits(6, 6);
-    for (std::uint8_t station = 1; station <= 4; ++station) add(write(1, station));
-    add(read(2, 1));
-    add(read(3, 1));
-    EXPECT_TRUE(refuses(write(1, 5)));
-}
-
-TEST_F(JobQueueLimits, WhatGoesIsTheNewestOfItsLane) {
-    limits(4, 4);
-    const Ticket first = add(poll(1, 1));
-    const Ticket second = add(write(1, 1));
-    const Ticket third = add(read(1, 1));
-    const Ticket fourth = add(write(1, 1));
-    EXPECT_EQ(shed_for(write(2, 1)), fourth);
-    EXPECT_EQ(shed_for(write(3, 1)), third);
-    EXPECT_EQ(shed_for(write(4, 1)), second);
-    EXPECT_EQ(shed_for(write(5, 1)), first);
-    EXPECT_TRUE(refuses(write(6, 1)));
 }
 
 TEST_F(JobQueueLimits, P9AHostWhoseReadsAreAllDoubledStillMakesRoom) {

@@ -104,14 +104,6 @@ TEST(ReadCache, P6WhatWasReadBeforeAWriteIsNotKeptWhenItComesBehindIt) {
     }
 }
 
-TEST(ReadCache, BitsOfAWiderReadAreCutOut) {
-    ReadCache cache;
-    cache.store(*test::read_span(17, "01 00 13 00 13"_hex), "01 03 CD 6B 05"_hex, kStart);
-    const auto hit = cache.find(*test::read_span(17, "01 00 15 00 03"_hex), kStart, 1s);
-    ASSERT_TRUE(hit);
-    EXPECT_EQ(hit->pdu, "01 01 03"_hex) << "CD is 1100 1101: items 13h to 1Ah from the right";
-}
-
 bool bit_of(std::uint32_t item) { return (item * item * 7 + item / 3) % 5 < 2; }
 unsigned register_of(std::uint32_t item) { return (item * 40503 + 257) % 65536; }
 
@@ -160,16 +152,6 @@ TEST(SlicedReply, P6BitsAreSlicedAtEveryOffsetAndThoseBehindTheEndAreZero) {
     }
     for (const Span& whole : {Span{Table::coils, 5, 2000}, Span{Table::discrete_inputs, 0, 1999}})
         EXPECT_EQ(slice_reply(whole, panel_reply(whole), whole), panel_reply(whole));
-}
-
-TEST(ReadSpan, ReadsOfAnotherStationOrTableHaveNothingInCommon) {
-    const ReadSpan whole{17, {kRegisters, 0, 100}};
-    EXPECT_TRUE(whole.contains({17, {kRegisters, 0, 100}}));
-    for (const ReadSpan& other :
-         {ReadSpan{18, {kRegisters, 0, 100}}, ReadSpan{17, {Table::coils, 0, 100}}}) {
-        EXPECT_FALSE(whole.contains(other));
-        EXPECT_FALSE(whole.same_table(other));
-    }
 }
 
 using Counts = std::map<Client, int>;
@@ -232,7 +214,7 @@ class WaitingReadsTest : public testing::Test {
 TEST_F(WaitingReadsTest, AnyOrderOfComingAndGoingCountsTheSame) {
     std::mt19937 random(3);
     const auto below = [&](unsigned limit) { return static_cast<std::uint32_t>(random() % limit); };
-    const modbus::Request request = test::request_of(kRead);  // spans are passed separately
+    const modbus::Request request = test::request_of(kRead);
     Jobs gone;  // one may come back: older than those that came meanwhile
     Ticket ticket = 0;
     for (int i = 0; i < 4000 && !HasFatalFailure(); ++i) {

@@ -3,24 +3,25 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <ostream>
 #include <string>
+#include <vector>
 
+#include "arbiter_fixture.hpp"
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "support/bus_script.hpp"
 #include "support/bus_script_replay.hpp"
+#include "support/bus_step.hpp"
 #include "support/hex.hpp"
 
 namespace panelgate::arbiter::replay_test {
 namespace {
 
-using test::BusScript;
-
-const Bytes kRead = "03 00 6B 00 03"_hex;
-const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
 const Bytes kOther = "03 01 00 00 03"_hex;
-const Bytes kWrite = "06 00 01 00 03"_hex;
 
 struct Script {
     const char* name = "";
@@ -31,20 +32,16 @@ struct Script {
 };
 
 Settings settings_of(const Script& script) {
-    Settings settings;
-    settings.serial = {38400, 8, Parity::none, 1};
+    Settings settings = settings_38400();
     settings.unlisted.response_timeout = 200ms;
-    settings.unlisted.vouched = true;
-    settings.stations = {settings.unlisted, settings.unlisted};
-    settings.stations[0].id = 17;
-    settings.stations[1].id = 18;
+    for (StationSettings& station : settings.stations) station.response_timeout = 200ms;
     settings.offline.after = 2;
     script.set(settings);
     return settings;
 }
 
 /// The station answers the request sent last after 3 ms, in two pieces.
-void answer(BusScript& bus, std::uint8_t station, const Bytes& pdu) {
+void in_pieces(BusScript& bus, std::uint8_t station, const Bytes& pdu) {
     bus.run_to_end_of_request();
     bus.run_for(3ms);
     const Bytes adu = modbus::encode_adu(station, pdu);
@@ -52,16 +49,19 @@ void answer(BusScript& bus, std::uint8_t station, const Bytes& pdu) {
     bus.run_for(1ms);
     bus.hear(ByteView(adu).subspan(3));
 }
+/// ... and the one that is sent next.
+void next_in_pieces(BusScript& bus, std::uint8_t station, const Bytes& pdu) {
+    bus.next_sent();
+    in_pieces(bus, station, pdu);
+}
 
 void read_and_write(BusScript& bus) {
     bus.submit(17, kRead, 1);
     bus.submit(17, kWrite, 2, PriorityClass::write);
     bus.submit(18, kRead, 1);
-    answer(bus, 17, kReply);
-    bus.next_sent();
-    answer(bus, 17, kWrite);
-    bus.next_sent();
-    answer(bus, 18, kReply);
+    in_pieces(bus, 17, kReply);
+    next_in_pieces(bus, 17, kWrite);
+    next_in_pieces(bus, 18, kReply);
 }
 
 void shared_reads(BusScript& bus) {
@@ -69,32 +69,27 @@ void shared_reads(BusScript& bus) {
     bus.submit(17, "03 00 0A 00 02"_hex, 1);
     bus.submit(17, "03 00 0C 00 01"_hex, 2);
     bus.submit(17, "03 00 0B 00 01"_hex, 3);
-    answer(bus, 18, kReply);
+    in_pieces(bus, 18, kReply);
     bus.next_sent();
     bus.submit(17, "03 00 0A 00 01"_hex, 4);  // joins while the request leaves
-    answer(bus, 17, "03 06 00 01 00 02 00 03"_hex);
+    in_pieces(bus, 17, "03 06 00 01 00 02 00 03"_hex);
 }
 
 void refused_join(BusScript& bus) {
     bus.submit(18, kRead, 9);
     bus.submit(17, "03 00 0A 00 02"_hex, 1);
     bus.submit(17, "03 00 0C 00 01"_hex, 2);
-    answer(bus, 18, kReply);
-    bus.next_sent();
-    answer(bus, 17, "83 02"_hex);
-    bus.next_sent();
-    answer(bus, 17, "03 04 00 01 00 02"_hex);
-    bus.next_sent();
-    answer(bus, 17, "03 02 00 01"_hex);
+    in_pieces(bus, 18, kReply);
+    next_in_pieces(bus, 17, "83 02"_hex);
+    next_in_pieces(bus, 17, "03 04 00 01 00 02"_hex);
+    next_in_pieces(bus, 17, "03 02 00 01"_hex);
 }
 
 void retry(BusScript& bus) {
     bus.submit(17, kRead, 1);
     bus.submit(18, kRead, 2);
-    bus.next_sent();
-    answer(bus, 17, kReply);
-    bus.next_sent();
-    answer(bus, 18, kReply);
+    next_in_pieces(bus, 17, kReply);
+    next_in_pieces(bus, 18, kReply);
 }
 
 void late_reply(BusScript& bus) {
@@ -116,9 +111,9 @@ void noise(BusScript& bus) {
     bus.run_for(30ms);
     bus.hear("00"_hex);
     bus.run_for(30ms);
-    answer(bus, 17, kReply);
+    in_pieces(bus, 17, kReply);
     bus.run_for(300ms);
-    answer(bus, 17, kReply);
+    in_pieces(bus, 17, kReply);
 }
 
 void write_without_answer(BusScript& bus) {
@@ -127,7 +122,7 @@ void write_without_answer(BusScript& bus) {
     bus.run_for(300ms);
     bus.hear_reply(17, kWrite);
     bus.run_for(300ms);
-    answer(bus, 17, kReply);
+    in_pieces(bus, 17, kReply);
 }
 
 void broadcast(BusScript& bus) {
@@ -136,18 +131,18 @@ void broadcast(BusScript& bus) {
     bus.run_for(50ms);
     bus.hear_reply(17, kWrite);
     bus.run_for(100ms);
-    answer(bus, 17, kReply);
+    in_pieces(bus, 17, kReply);
 }
 
 void learned_echo(BusScript& bus) {
     bus.submit(17, kWrite, 1, PriorityClass::write);
     bus.run_to_end_of_request();
     bus.hear(bus.sent.back().adu);
-    answer(bus, 17, kReply);
+    in_pieces(bus, 17, kReply);
     bus.next_sent();
     bus.run_to_end_of_request();
     bus.hear(bus.sent.back().adu);
-    answer(bus, 17, kWrite);
+    in_pieces(bus, 17, kWrite);
 }
 
 void offline_and_back(BusScript& bus) {
@@ -166,14 +161,13 @@ void offline_and_back(BusScript& bus) {
 
 void memory(BusScript& bus) {
     bus.submit(17, kRead, 1);
-    answer(bus, 17, kReply);
+    in_pieces(bus, 17, kReply);
     bus.run_for(100ms);
     bus.submit(17, kRead, 2);
     bus.submit(17, "06 00 6B 00 01"_hex, 1, PriorityClass::write);
     bus.submit(17, kRead, 2);
-    answer(bus, 17, "06 00 6B 00 01"_hex);
-    bus.next_sent();
-    answer(bus, 17, kReply);
+    in_pieces(bus, 17, "06 00 6B 00 01"_hex);
+    next_in_pieces(bus, 17, kReply);
 }
 
 void each_station(Settings& settings, const std::function<void(StationSettings&)>& change) {

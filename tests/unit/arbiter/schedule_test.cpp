@@ -196,13 +196,6 @@ TEST_F(ScheduleTest, P8BeforeTheFirstWriteAReadShowsWhetherTheLineHasAnEcho) {
     EXPECT_EQ(writing.jobs.front().ticket, write);
 }
 
-TEST_F(ScheduleTest, ABroadcastGoesAloneAndToNoStation) {
-    wait(0, true);
-    const Group group = next().group.value();
-    EXPECT_EQ(group.station, 0);
-    EXPECT_EQ(group.jobs.size(), 1u);
-}
-
 TEST_F(ScheduleTest, P1OnALineThatMayStallOutstandingRepliesNeedAReopening) {
     settings.may_stall = true;
     rebuild();
@@ -238,20 +231,6 @@ TEST_F(ScheduleTest, P1TheWholeLineRestsWhereTheConfigurationSaysSo) {
         << "a probe lets the others go on";
 }
 
-TEST_F(ScheduleTest, PartsOfAJoinedReadGoAgainExceptForClientsThatHaveLeft) {
-    Group group = failed(1);
-    group.jobs.push_back(job(1));
-    group.jobs.push_back(job(1));
-    group.request = test::request_of(Writer().u8(3).u16(0).u16(100).take());
-    group.span = group.request.span();
-    const Ticket left = group.jobs[1].ticket;
-    group.jobs[1].gone = true;
-    const auto gone = schedule.give_back(group);
-    ASSERT_EQ(gone.size(), 1u);
-    EXPECT_EQ(gone.front().ticket, left);
-    EXPECT_EQ(order(), "1 1");
-}
-
 constexpr TimePoint kStart{1h};
 
 /// What waits for its first turn, and what goes again.
@@ -283,19 +262,6 @@ class BacklogTest : public test::QueueFixture {
 
     Backlog backlog_{QueueSettings{}};
 };
-
-TEST_F(BacklogTest, HoldsWhatWaitsAndWhatGoesAgain) {
-    EXPECT_TRUE(backlog_.empty());
-    wait(read(1, 17));
-    retry({read(2, 18)});
-    EXPECT_FALSE(backlog_.empty());
-    EXPECT_TRUE(backlog_.has(1, 17));
-    EXPECT_FALSE(backlog_.has(1, 18));
-    EXPECT_TRUE(backlog_.has(2, 18));
-    EXPECT_FALSE(backlog_.has(2, 17));
-    EXPECT_TRUE(backlog_.has_retry(18));
-    EXPECT_FALSE(backlog_.has_retry(17)) << "it was not sent yet";
-}
 
 TEST_F(BacklogTest, TheOldestRetryThatMayGoIsTaken) {
     for (const std::uint8_t station : Bytes{17, 18, 19}) retry({read(1, station)});

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -37,51 +39,47 @@ class SharingTest : public test::QueueFixture {
     Client client_ = 100;
 };
 
-TEST_F(SharingTest, P6ContainedReadsComeAlongWhateverIsKnownOfTheStation) {
-    wait(registers(12, 3));
-    wait(registers(10, 10));
-    const Group group = gather(registers(10, 10), station_that_takes(0));
-    EXPECT_EQ(group.jobs.size(), 3u);
-    EXPECT_EQ(group.request.pdu(), registers(10, 10));
-    EXPECT_FALSE(group.joined());
-    EXPECT_TRUE(queue_.empty());
-}
-
-TEST_F(SharingTest, P6ReadsThatTouchAreJoinedAlsoByOneThatLiesBetween) {
-    wait(registers(14, 2));
-    wait(registers(12, 2));
-    const Group group = gather(registers(10, 2));
-    EXPECT_EQ(group.jobs.size(), 3u);
-    EXPECT_EQ(group.request.pdu(), registers(10, 6));
-    EXPECT_TRUE(group.joined());
-}
-
-TEST_F(SharingTest, P6NothingIsReadThatNoClientAskedFor) {
-    wait(registers(13, 2));
-    wait("04 00 0C 00 01"_hex);
-    wait("06 00 0A 00 01"_hex);
-    const Group group = gather(registers(10, 2));
-    EXPECT_EQ(group.jobs.size(), 1u);
-    EXPECT_EQ(group.request.pdu(), registers(10, 2));
-    EXPECT_EQ(queue_.waiting(), 3u);
-}
-
-TEST_F(SharingTest, P6NoLongerReadIsMadeThanTheProfileVouchesForOrTheStationHasAnswered) {
-    const auto joined = [&](const Station& station) {
-        wait(registers(12, 2));
-        const std::size_t jobs = gather(registers(10, 2), station).jobs.size();
-        queue_.remove_if(test::any);
-        return jobs == 2;
+TEST_F(SharingTest, P6ContainedReadsComeAlongAndTouchingOnesUpToWhatTheProfileVouchesFor) {
+    struct Row {
+        std::vector<Bytes> waiting;
+        Bytes leader;
+        std::uint16_t vouched;  ///< registers; 0: none
+        std::size_t jobs;       ///< of the transaction
+        Bytes request;
     };
-    EXPECT_FALSE(joined(station_that_takes(3)));
-    EXPECT_TRUE(joined(station_that_takes(4)));
+    const Bytes other_table = "04 00 0C 00 01"_hex;
+    const Bytes a_write = "06 00 0A 00 01"_hex;
+    const Row rows[] = {
+        // Contained ones, whatever is known of the station.
+        {{registers(12, 3), registers(10, 10)}, registers(10, 10), 0, 3, registers(10, 10)},
+        // Touching ones, also by one that lies between.
+        {{registers(14, 2), registers(12, 2)}, registers(10, 2), 125, 3, registers(10, 6)},
+        // Nothing is read that no client asked for.
+        {{registers(13, 2), other_table, a_write}, registers(10, 2), 125, 1, registers(10, 2)},
+        // No longer read is made than the profile vouches for.
+        {{registers(12, 2)}, registers(10, 2), 3, 1, registers(10, 2)},
+        {{registers(12, 2)}, registers(10, 2), 4, 2, registers(10, 4)},
+        {{registers(12, 2)}, registers(10, 2), 0, 1, registers(10, 2)},
+    };
+    for (const Row& row : rows) {
+        queue_.remove_if(test::any);
+        for (const Bytes& pdu : row.waiting) wait(pdu);
+        const Group group = gather(row.leader, station_that_takes(row.vouched));
+        EXPECT_EQ(group.jobs.size(), row.jobs);
+        EXPECT_EQ(group.request.pdu(), row.request);
+        EXPECT_EQ(group.joined(), row.request != row.leader);
+        EXPECT_EQ(queue_.waiting(), row.waiting.size() + 1 - row.jobs);
+    }
+}
+
+TEST_F(SharingTest, P6AReadAsLongAsOneThatTheStationHasAnsweredIsMade) {
     Station station = station_that_takes(0);
-    EXPECT_FALSE(joined(station));
     const Bytes reply = Writer().u8(3).u8(8).raw(Bytes(8)).take();
     const TimePoint now{1h};
     station.on_reply(now, test::answered(now, now, test::group_of(1, registers(50, 4)), reply), 5ms,
                      5ms);
-    EXPECT_TRUE(joined(station));
+    wait(registers(12, 2));
+    EXPECT_EQ(gather(registers(10, 2), station).jobs.size(), 2u);
 }
 
 TEST_F(SharingTest, P6AJoinThatDidNotComeAboutIsRememberedAndItsPartsGoAlone) {
@@ -129,9 +127,7 @@ TEST_F(SharingTest, P2ForAClientThatHasLeftNothingIsSentWhenAJoinIsSplit) {
 TEST_F(SharingTest, OnALineThatDoesNotShareEachGoesAlone) {
     sharing_ = Sharing(false);
     wait(registers(10, 2));
-    const Group group = gather(registers(10, 2));
-    EXPECT_EQ(group.jobs.size(), 1u);
-    EXPECT_EQ(group.request.pdu(), registers(10, 2));
+    EXPECT_EQ(gather(registers(10, 2)).jobs.size(), 1u);
 }
 
 TEST_F(SharingTest, P6EachGetsItsPartAndAllGetTheException) {

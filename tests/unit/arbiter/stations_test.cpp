@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cstdint>
 
 #include "support/attempts.hpp"
 #include "support/hex.hpp"

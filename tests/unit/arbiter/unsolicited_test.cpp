@@ -70,7 +70,11 @@ TEST_F(UnsolicitedFramesTest, AreClassifiedAndCounted) {
     EXPECT_EQ(heard(encode_adu(18, kRead)), "foreign request") << "another master's";
     EXPECT_EQ(counters().symptoms.requests, 1u);
     EXPECT_EQ(counters().foreign_frames, 1u);
-    EXPECT_EQ(heard(kAnswer), "foreign") << "it was not asked";
+    stations.of(17).add_outstanding(now, kRead, now - 500ms);
+    EXPECT_EQ(heard(kAnswer), "late") << "outstanding";
+    EXPECT_EQ(counters().late_frames, 1u);
+    EXPECT_EQ(counters().foreign_frames, 1u);
+    EXPECT_EQ(heard(kAnswer), "foreign") << "it was outstanding once only";
     EXPECT_EQ(heard(encode_adu(99, kReply)), "foreign");
     EXPECT_EQ(counters().symptoms.unasked, 2u);
     EXPECT_EQ(counters().foreign_frames, 3u);
@@ -79,14 +83,6 @@ TEST_F(UnsolicitedFramesTest, AreClassifiedAndCounted) {
     EXPECT_EQ(counters().symptoms.strays, 1u);
     EXPECT_EQ(counters().discarded_bytes, discarded + 3);
     EXPECT_EQ(heard(Writer().raw(encode_adu(99, kReply)).u8(0xFF).take()), "foreign damaged");
-}
-
-TEST_F(UnsolicitedFramesTest, AnOutstandingReplyIsLate) {
-    stations.of(17).add_outstanding(now, kRead, now - 500ms);
-    EXPECT_EQ(heard(kAnswer), "late");
-    EXPECT_EQ(counters().late_frames, 1u);
-    EXPECT_EQ(counters().foreign_frames, 0u);
-    EXPECT_EQ(heard(kAnswer), "foreign") << "it was outstanding once only";
 }
 
 TEST_F(UnsolicitedFramesTest, BehindAnotherMastersRequestTheLineRestsForItsReply) {

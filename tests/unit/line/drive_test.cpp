@@ -47,6 +47,11 @@ class DriveTest : public testing::Test, public Line {
     void write(ByteView) override {}
     void hold_input(bool hold) override { held = hold; }
     const Counters& counters() override { return counters_; }
+    /// An event without effect arms the alarm.
+    void hear_nothing() {
+        drive.hear([](TimePoint) {});
+        event_trace.clear();
+    }
 
     struct Host {
         void act(const Send& send) {
@@ -85,9 +90,8 @@ TEST_F(DriveTest, ReadsPendingInputBeforeACall) {
 
 TEST_F(DriveTest, ReadsPendingInputBeforeTheClock) {
     machine.deadline = clock.now() + 5ms;
-    drive.tell([](TimePoint) {});
+    hear_nothing();
     device = "xy";
-    event_trace.clear();
     clock.advance(5ms);
     EXPECT_EQ(event_trace, "pxy.!.");
 }
@@ -95,7 +99,7 @@ TEST_F(DriveTest, ReadsPendingInputBeforeTheClock) {
 TEST_F(DriveTest, ACallGetsTheTimeAfterReading) {
     const TimePoint late = clock.now() + 7ms;
     machine.deadline = clock.now() + 5ms;
-    drive.tell([](TimePoint) {});
+    hear_nothing();
     clock.pass(7ms);
     clock.jump();
     EXPECT_EQ(rang, late);
@@ -114,52 +118,40 @@ TEST_F(DriveTest, AVerbFromInsideAnActionIsDrainedByTheOuterLoop) {
         << "the write failed, the line went down, the rest is still done once";
 }
 
-TEST_F(DriveTest, TheAlarmFollowsTheMachinesDeadline) {
-    machine.deadline = clock.now() + 5ms;
-    drive.hear([](TimePoint) {});
-    EXPECT_EQ(clock.next(), machine.deadline);
-    machine.deadline = clock.now() + 3ms;
-    drive.hear([](TimePoint) {});
-    EXPECT_EQ(clock.next(), machine.deadline);
+TEST_F(DriveTest, TheAlarmFollowsTheMachinesDeadlineAndRestsUntilTheNextVerb) {
+    for (const Duration from_now : {5ms, 3ms}) {
+        machine.deadline = clock.now() + from_now;
+        hear_nothing();
+        EXPECT_EQ(clock.next(), machine.deadline);
+        drive.rest();
+        EXPECT_EQ(clock.next(), std::nullopt);
+        hear_nothing();
+        EXPECT_EQ(clock.next(), machine.deadline);
+    }
     machine.deadline.reset();
-    drive.hear([](TimePoint) {});
+    hear_nothing();
     EXPECT_EQ(clock.next(), std::nullopt);
-}
-
-TEST_F(DriveTest, RestsUntilTheNextVerb) {
-    machine.deadline = clock.now() + 5ms;
-    drive.hear([](TimePoint) {});
-    drive.rest();
-    EXPECT_EQ(clock.next(), std::nullopt);
-    drive.hear([](TimePoint) {});
-    EXPECT_EQ(clock.next(), machine.deadline);
 }
 
 TEST_F(DriveTest, InputThatChangesNothingWaitsForItsTimeAndIsReadThen) {
     machine.deadline = clock.now() + 50ms;
     machine.busy = clock.now() + 5ms;
-    drive.hear([](TimePoint) {});
+    hear_nothing();
     EXPECT_TRUE(held);
     EXPECT_EQ(clock.next(), machine.busy);
     device = "xy";
-    event_trace.clear();
     clock.advance(5ms);
     EXPECT_EQ(event_trace, "pxy.!.");
     EXPECT_FALSE(held) << "its time is over: every byte matters again";
 }
 
-TEST_F(DriveTest, DeferredInputIsReadBeforeAnyCall) {
+TEST_F(DriveTest, DeferredInputIsReadBeforeAnyCallAndRestEndsDeferral) {
     machine.busy = clock.now() + 5ms;
-    drive.hear([](TimePoint) {});
+    hear_nothing();
     device = "xy";
-    event_trace.clear();
     drive.tell([&](TimePoint) { event_trace += 'v'; });
     EXPECT_EQ(event_trace, "pxy.v.");
-}
-
-TEST_F(DriveTest, RestEndsDeferral) {
-    machine.busy = clock.now() + 5ms;
-    drive.hear([](TimePoint) {});
+    EXPECT_TRUE(held);
     drive.rest();
     EXPECT_FALSE(held);
     EXPECT_EQ(clock.next(), std::nullopt);

@@ -3,12 +3,16 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "panelgate/metrics/process.hpp"
 
 namespace panelgate::metrics::exposition_test {
 namespace {
@@ -30,9 +34,7 @@ bus::StationReport press() {
     station.wire.damaged_frames = 6;
     station.wire.discarded_bytes = 70;
     station.wire.exceptions[0x81] = 9;
-    station.request_duration.observe(1ms);
-    station.request_duration.observe(15ms);
-    station.request_duration.observe(60s);
+    for (const Duration took : {1ms, 15ms, 60'000ms}) station.request_duration.observe(took);
     return station;
 }
 
@@ -56,79 +58,84 @@ Snapshot filled() {
     return snapshot;
 }
 
-void expect_lines(const std::string& text, std::initializer_list<const char*> lines) {
-    for (const char* line : lines) EXPECT_THAT(text, HasSubstr("\n" + std::string(line) + "\n"));
+/// Each sample is `NAME{LABELS} VALUE`, without "panelgate_". LINE, PRESS and OTHER stand for the
+/// labels of the line and its stations.
+std::string spelled(std::string sample) {
+    const std::pair<std::string_view, std::string_view> names[] = {
+        {"LINE", R"(line="floor1")"},
+        {"PRESS", R"(line="floor1",station="press")"},
+        {"OTHER", R"(line="floor1",station="other")"},
+    };
+    for (const auto& [name, labels] : names)
+        if (const auto at = sample.find(name); at != sample.npos)
+            sample.replace(at, name.size(), labels);
+    return "\npanelgate_" + sample + '\n';
+}
+
+void expect_samples(const Snapshot& snapshot, std::initializer_list<const char*> samples) {
+    const std::string text = exposition(snapshot);
+    for (const char* sample : samples) EXPECT_THAT(text, HasSubstr(spelled(sample)));
+}
+
+TEST(Exposition, GivesTheCountersOfAStationExactly) {
+    expect_samples(filled(), {R"(requests_total{PRESS,function="3",outcome="ok"} 7)",
+                              "retries_total{PRESS} 3",
+                              "late_frames_total{PRESS} 4",
+                              "foreign_frames_total{PRESS} 5",
+                              "damaged_frames_total{PRESS} 6",
+                              "discarded_bytes_total{PRESS} 70",
+                              R"(exceptions_total{PRESS,code="129"} 9)",
+                              "station_up{PRESS} 1",
+                              "station_last_success_timestamp_seconds{PRESS} 1700000000.5",
+                              // series from the start, with 0
+                              R"(exceptions_total{OTHER,code="2"} 0)",
+                              "retries_total{OTHER} 0"});
+}
+
+TEST(Exposition, GivesTheFiguresOfLinesListenersAndTheBuild) {
+    expect_samples(filled(),
+                   {"broadcasts_total{LINE} 8", "line_up{LINE} 1", "line_reopens_total{LINE} 2",
+                    "bus_busy_seconds_total{LINE} 1.5", "queue_depth{LINE} 12",
+                    R"(queue_wait_seconds_count{LINE,class="write"} 1)",
+                    R"(queue_wait_seconds_count{LINE,class="probe"} 0)",
+                    R"(tcp_connections{listener="127.0.0.1:1502"} 3)",
+                    R"(tcp_connections_total{listener="127.0.0.1:1502"} 30)",
+                    R"(tcp_protocol_errors_total{listener="127.0.0.1:1502"} 1)",
+                    R"(tcp_retransmissions_joined_total{listener="127.0.0.1:1502"} 4)",
+                    R"(build_info{version="1.2.3"} 1)"});
+}
+
+TEST(Exposition, CumulatesTheBucketsOfAHistogram) {
+    expect_samples(filled(), {R"(request_duration_seconds_bucket{PRESS,le="0.001"} 1)",
+                              R"(request_duration_seconds_bucket{PRESS,le="0.01"} 1)",
+                              R"(request_duration_seconds_bucket{PRESS,le="0.02"} 2)",
+                              R"(request_duration_seconds_bucket{PRESS,le="30"} 2)",
+                              R"(request_duration_seconds_bucket{PRESS,le="+Inf"} 3)",
+                              "request_duration_seconds_count{PRESS} 3"});
 }
 
 TEST(Exposition, CountsHttpRepliesAndLoginFailures) {
     Snapshot snapshot = filled();
     EXPECT_THAT(exposition(snapshot), Not(HasSubstr("login_failures")));
     snapshot.http.emplace();
-    expect_lines(exposition(snapshot), {"panelgate_login_failures_total 0"});
+    expect_samples(snapshot, {"login_failures_total 0"});
     snapshot.http->requests = {{200, 17}, {421, 2}};
     snapshot.http->login_failures = 3;
-    expect_lines(exposition(snapshot), {"# TYPE panelgate_http_requests_total counter",
-                                        "panelgate_http_requests_total{code=\"200\"} 17",
-                                        "panelgate_http_requests_total{code=\"421\"} 2",
-                                        "panelgate_login_failures_total 3"});
+    expect_samples(snapshot, {R"(http_requests_total{code="200"} 17)",
+                              R"(http_requests_total{code="421"} 2)", "login_failures_total 3"});
+    EXPECT_THAT(exposition(snapshot), HasSubstr("\n# TYPE panelgate_http_requests_total counter\n"));
 }
 
 TEST(Exposition, ShowsTheBrokerWhereThereIsOne) {
     Snapshot snapshot = filled();
     EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_mqtt")));
     snapshot.mqtt = {true, 5, 100, 7, 2, 3, 4, 1, 6};
-    expect_lines(exposition(snapshot),
-                 {"panelgate_mqtt_connected 1", "panelgate_mqtt_stored 5",
-                  "panelgate_mqtt_published_total 100", "panelgate_mqtt_dropped_total 7",
-                  "panelgate_mqtt_results_dropped_total 6", "panelgate_mqtt_reconnects_total 2",
-                  "panelgate_mqtt_writes_total{outcome=\"ok\"} 3",
-                  "panelgate_mqtt_writes_total{outcome=\"refused\"} 4",
-                  "panelgate_mqtt_writes_total{outcome=\"failed\"} 1"});
-}
-
-TEST(Exposition, GivesTheCountersOfAStationExactly) {
-    expect_lines(
-        exposition(filled()),
-        {R"(panelgate_requests_total{line="floor1",station="press",function="3",outcome="ok"} 7)",
-         R"(panelgate_retries_total{line="floor1",station="press"} 3)",
-         R"(panelgate_late_frames_total{line="floor1",station="press"} 4)",
-         R"(panelgate_foreign_frames_total{line="floor1",station="press"} 5)",
-         R"(panelgate_damaged_frames_total{line="floor1",station="press"} 6)",
-         R"(panelgate_discarded_bytes_total{line="floor1",station="press"} 70)",
-         R"(panelgate_exceptions_total{line="floor1",station="press",code="129"} 9)",
-         R"(panelgate_station_up{line="floor1",station="press"} 1)",
-         R"(panelgate_station_last_success_timestamp_seconds{line="floor1",station="press"} 1700000000.5)"});
-}
-
-TEST(Exposition, GivesTheFiguresOfLinesListenersAndTheBuild) {
-    expect_lines(
-        exposition(filled()),
-        {R"(panelgate_broadcasts_total{line="floor1"} 8)", R"(panelgate_line_up{line="floor1"} 1)",
-         R"(panelgate_line_reopens_total{line="floor1"} 2)",
-         R"(panelgate_bus_busy_seconds_total{line="floor1"} 1.5)",
-         R"(panelgate_queue_depth{line="floor1"} 12)",
-         R"(panelgate_queue_wait_seconds_count{line="floor1",class="write"} 1)",
-         R"(panelgate_queue_wait_seconds_count{line="floor1",class="probe"} 0)",
-         R"(panelgate_tcp_connections{listener="127.0.0.1:1502"} 3)",
-         R"(panelgate_tcp_connections_total{listener="127.0.0.1:1502"} 30)",
-         R"(panelgate_tcp_protocol_errors_total{listener="127.0.0.1:1502"} 1)",
-         R"(panelgate_tcp_retransmissions_joined_total{listener="127.0.0.1:1502"} 4)",
-         R"(panelgate_build_info{version="1.2.3"} 1)"});
-}
-
-TEST(Exposition, CumulatesTheBucketsOfAHistogram) {
-    const std::string head =
-        R"(panelgate_request_duration_seconds_bucket{line="floor1",station="press",le=)";
-    const std::string text = exposition(filled());
-    EXPECT_THAT(text, HasSubstr(head + "\"0.001\"} 1\n"));
-    EXPECT_THAT(text, HasSubstr(head + "\"0.01\"} 1\n"));
-    EXPECT_THAT(text, HasSubstr(head + "\"0.02\"} 2\n"));
-    EXPECT_THAT(text, HasSubstr(head + "\"30\"} 2\n"));
-    EXPECT_THAT(text, HasSubstr(head + "\"+Inf\"} 3\n"));
-    EXPECT_THAT(
-        text,
-        HasSubstr(
-            "panelgate_request_duration_seconds_count{line=\"floor1\",station=\"press\"} 3\n"));
+    expect_samples(snapshot,
+                   {"mqtt_connected 1", "mqtt_stored 5", "mqtt_published_total 100",
+                    "mqtt_dropped_total 7", "mqtt_results_dropped_total 6",
+                    "mqtt_reconnects_total 2", R"(mqtt_writes_total{outcome="ok"} 3)",
+                    R"(mqtt_writes_total{outcome="refused"} 4)",
+                    R"(mqtt_writes_total{outcome="failed"} 1)"});
 }
 
 /// Returns the station's series of requests_total.
@@ -141,32 +148,22 @@ std::size_t request_series(const Snapshot& snapshot, const std::string& station)
     return count;
 }
 
-TEST(Exposition, ShowsSeriesFromTheStartWithZero) {
-    expect_lines(exposition(filled()),
-                 {R"(panelgate_exceptions_total{line="floor1",station="other",code="2"} 0)",
-                  R"(panelgate_retries_total{line="floor1",station="other"} 0)"});
-}
-
 TEST(Exposition, ShowsTheFunctionsOfAPanelWithZeroBeforeTheyAreUsed) {
     Snapshot snapshot = filled();
-    snapshot.lines[0].stations[0].requests.clear();
-    for (const int function : {1, 2, 3, 4, 5, 6, 15, 16})
-        snapshot.lines[0].stations[0].requests[static_cast<std::uint8_t>(function)];
-    expect_lines(
-        exposition(snapshot),
-        {R"(panelgate_requests_total{line="floor1",station="press",function="16",outcome="ok"} 0)"});
+    auto& requests = snapshot.lines[0].stations[0].requests;
+    requests.clear();
+    for (const std::uint8_t function : {1, 2, 3, 4, 5, 6, 15, 16}) requests[function];
+    expect_samples(snapshot, {R"(requests_total{PRESS,function="16",outcome="ok"} 0)"});
     EXPECT_EQ(request_series(snapshot, "press"), 8u);
     EXPECT_EQ(request_series(snapshot, "other"), 0u) << "nobody knows what those are asked";
 }
 
 TEST(Exposition, ShowsHowAFunctionEndsOnAnyDayFromItsFirstUseAndTheRestWhenItHappens) {
     Snapshot snapshot = filled();
-    expect_lines(
-        exposition(snapshot),
-        {R"(panelgate_requests_total{line="floor1",station="press",function="3",outcome="exception"} 0)",
-         R"(panelgate_requests_total{line="floor1",station="press",function="3",outcome="timeout"} 0)",
-         R"(panelgate_requests_total{line="floor1",station="press",function="43",outcome="ok"} 0)",
-         R"(panelgate_requests_total{line="floor1",station="press",function="43",outcome="shared"} 2)"});
+    expect_samples(snapshot, {R"(requests_total{PRESS,function="3",outcome="exception"} 0)",
+                              R"(requests_total{PRESS,function="3",outcome="timeout"} 0)",
+                              R"(requests_total{PRESS,function="43",outcome="ok"} 0)",
+                              R"(requests_total{PRESS,function="43",outcome="shared"} 2)"});
     EXPECT_EQ(request_series(snapshot, "press"), 3u + 4u);
     snapshot.lines[0].stations[0].requests[3][Outcome::busy] = 1;
     EXPECT_EQ(request_series(snapshot, "press"), 4u + 4u);
@@ -175,9 +172,9 @@ TEST(Exposition, ShowsHowAFunctionEndsOnAnyDayFromItsFirstUseAndTheRestWhenItHap
 TEST(Exposition, ShowsHowLateTheLoopCame) {
     Snapshot snapshot;
     snapshot.runtime.loop_lag.observe(3ms);
-    expect_lines(exposition(snapshot), {R"(panelgate_loop_lag_seconds_bucket{le="0.002"} 0)",
-                                        R"(panelgate_loop_lag_seconds_bucket{le="0.005"} 1)",
-                                        "panelgate_loop_lag_seconds_count 1"});
+    expect_samples(snapshot,
+                   {R"(loop_lag_seconds_bucket{le="0.002"} 0)",
+                    R"(loop_lag_seconds_bucket{le="0.005"} 1)", "loop_lag_seconds_count 1"});
 }
 
 TEST(Exposition, GivesEachFamilyAsOneTextAndStopsWhenNoMoreIsWanted) {
@@ -193,30 +190,31 @@ TEST(Exposition, GivesEachFamilyAsOneTextAndStopsWhenNoMoreIsWanted) {
     }
 }
 
-TEST(Exposition, P10LeavesOutTheLastSuccessOfAStationThatNeverAnswered) {
+TEST(Exposition, P10LeavesOutWhatAStationNeverSaidAndOthersCannotSay) {
     Snapshot snapshot = filled();
-    snapshot.lines[0].stations[0].last_success_unix = 0;
-    EXPECT_THAT(exposition(snapshot), Not(HasSubstr("last_success")));
-}
-
-TEST(Exposition, P10LeavesOutTheStateOfAStationThatWasNeverPolled) {
-    Snapshot snapshot = filled();
-    snapshot.lines[0].stations[0].up.reset();
-    EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_station_up{")));
-    snapshot.lines[0].stations[0].up = false;
     EXPECT_THAT(exposition(snapshot),
-                HasSubstr(R"(panelgate_station_up{line="floor1",station="press"} 0)"));
+                Not(HasSubstr(R"(panelgate_station_up{line="floor1",station="other"})")));
+    bus::StationReport& station = snapshot.lines[0].stations[0];
+    station.last_success_unix = 0;
+    station.up.reset();
+    EXPECT_THAT(exposition(snapshot), Not(HasSubstr("last_success")));
+    EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_station_up{")));
+    station.up = false;
+    expect_samples(snapshot, {"station_up{PRESS} 0"});
 }
 
-TEST(Exposition, HasNoStateForStationsThatAreNotConfigured) {
-    EXPECT_THAT(exposition(filled()),
-                Not(HasSubstr(R"(panelgate_station_up{line="floor1",station="other"})")));
+TEST(Exposition, P10DriverErrorsAreShownForLinesWhoseDriverCounts) {
+    Snapshot snapshot = filled();
+    EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_framing_errors_total{")));
+    snapshot.lines[0].device.uart = line::UartErrors{1, 2, 3, 4};
+    expect_samples(snapshot, {"framing_errors_total{LINE} 1", "parity_errors_total{LINE} 2",
+                              "overruns_total{LINE} 3", "breaks_total{LINE} 4"});
 }
 
 TEST(Exposition, EscapesLabelValues) {
     Snapshot snapshot;
     snapshot.version = "a\"b\\c\nd";
-    EXPECT_THAT(exposition(snapshot), HasSubstr(R"(panelgate_build_info{version="a\"b\\c\nd"} 1)"));
+    expect_samples(snapshot, {R"(build_info{version="a\"b\\c\nd"} 1)"});
 }
 
 TEST(Exposition, PassesPromtool) {
@@ -251,18 +249,8 @@ TEST(Process, UnderstandsANameWithBlanksAndParentheses) {
 }
 
 TEST(Process, HasNoFiguresForATextThatIsNoStat) {
-    EXPECT_FALSE(parse_stat("42 (cut", {}).cpu_seconds);
-    EXPECT_FALSE(parse_stat("42 (cut) S 1", {}).cpu_seconds);
-}
-
-TEST(Exposition, P10DriverErrorsAreShownForLinesWhoseDriverCounts) {
-    Snapshot snapshot = filled();
-    EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_framing_errors_total{")));
-    snapshot.lines[0].device.uart = line::UartErrors{1, 2, 3, 4};
-    expect_lines(exposition(snapshot), {R"(panelgate_framing_errors_total{line="floor1"} 1)",
-                                        R"(panelgate_parity_errors_total{line="floor1"} 2)",
-                                        R"(panelgate_overruns_total{line="floor1"} 3)",
-                                        R"(panelgate_breaks_total{line="floor1"} 4)"});
+    for (const char* stat : {"42 (cut", "42 (cut) S 1"})
+        EXPECT_FALSE(parse_stat(stat, {}).cpu_seconds) << stat;
 }
 
 }  // namespace

@@ -2,6 +2,13 @@
 
 #include <gmock/gmock.h>
 
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
 #include "mqtt_plant.hpp"
 
 namespace panelgate::mqtt::json_topics_test {
@@ -22,11 +29,18 @@ class MqttJson : public ::testing::Test {
   protected:
     Publisher publisher_{settings(), small_plant()};
 
+    std::vector<Publisher::Outgoing> connect() {
+        publisher_.connected();
+        return take_all(publisher_);
+    }
     /// Returns the single command parsed from it.
     Command command(std::string_view topic, std::string_view payload, bool retained = false) {
         const auto commands = publisher_.commands(topic, payload, retained);
         EXPECT_EQ(commands.size(), 1U);
         return commands.empty() ? Command(Rebirth{}) : commands.front();
+    }
+    points::Value written(std::string_view payload) {
+        return std::get<WriteCommand>(command("plant/hall/press/name/set", payload)).value;
     }
     std::string refusal(std::string_view topic, std::string_view payload, bool retained = false) {
         const Command made = command(topic, payload, retained);
@@ -37,8 +51,7 @@ class MqttJson : public ::testing::Test {
 
 TEST_F(MqttJson, PublishesValueQualityUnitAndTime) {
     publisher_.offer(2, good(*Decimal::parse("21.5")));
-    publisher_.connected();
-    const auto all = take_all(publisher_);
+    const auto all = connect();
     ASSERT_EQ(all.size(), 3U);
     EXPECT_EQ(all[0].message,
               (Message{"plant/hall/status",
@@ -50,33 +63,27 @@ TEST_F(MqttJson, PublishesValueQualityUnitAndTime) {
     EXPECT_EQ(all[2].message, all[1].message) << "everything is told at a birth";
 }
 
-TEST_F(MqttJson, PublishesLabelsAndMissingValues) {
-    State mode = good(std::int64_t{1});
+TEST_F(MqttJson, PublishesLabelsMissingValuesLinesAndStations) {
+    State mode = good_number(1);
     mode.text = "running";
-    publisher_.offer(3, mode);
     State bad;
     bad.quality = points::Quality::bad;
-    bad.time = kNoon;
-    publisher_.offer(6, bad);
-    publisher_.connected();
-    const auto all = take_all(publisher_);
-    EXPECT_THAT(all[1].message.payload,
-                HasSubstr(R"({"value":1,"label":"running","quality":"good")"));
-    EXPECT_EQ(all[2].message.topic, "plant/hall/oven/level");
-    EXPECT_THAT(all[2].message.payload, HasSubstr(R"({"value":null,"quality":"bad","unit":"")"));
-}
-
-TEST_F(MqttJson, PublishesLinesAndStations) {
-    State line = good(false);
-    line.text = "down: no such device";
-    publisher_.offer(0, line);
+    publisher_.offer(0, station(false, "down: no such device"));
+    publisher_.offer(3, mode);
     publisher_.offer(5, station(true, "online"));
-    publisher_.connected();
-    const auto all = take_all(publisher_);
-    EXPECT_EQ(all[1].message.topic, "plant/hall/line/floor1/state");
-    EXPECT_THAT(all[1].message.payload, HasSubstr(R"({"state":"down: no such device")"));
-    EXPECT_EQ(all[2].message.topic, "plant/hall/station/oven/state");
-    EXPECT_TRUE(all[2].message.retain);
+    publisher_.offer(6, bad);
+    std::string all;
+    for (const auto& [message, change] : connect()) {
+        all += message.topic + ' ' + message.payload + '\n';
+        EXPECT_TRUE(message.retain);
+    }
+    const char* const parts[] = {
+        R"(plant/hall/line/floor1/state {"state":"down: no such device")",
+        R"(plant/hall/press/mode {"value":1,"label":"running","quality":"good")",
+        R"(plant/hall/station/oven/state {"state":"online")",
+        R"(plant/hall/oven/level {"value":null,"quality":"bad","unit":"")",
+    };
+    for (const char* part : parts) EXPECT_THAT(all, HasSubstr(part));
 }
 
 TEST_F(MqttJson, WillAndFarewellAreRetained) {
@@ -94,45 +101,43 @@ TEST_F(MqttJson, TakesAValueOrAnObjectThatHasOne) {
     EXPECT_EQ(object.point, 6U);
     EXPECT_EQ(object.value, points::Value(std::uint64_t{18446744073709551615U}));
     EXPECT_EQ(object.id, R"("a\"7")");
-    EXPECT_EQ(std::get<WriteCommand>(command("plant/hall/press/name/set", R"("on")")).value,
-              points::Value(std::string("on")));
-    EXPECT_EQ(std::get<WriteCommand>(command("plant/hall/press/name/set", "true")).value,
-              points::Value(true));
+    EXPECT_EQ(written(R"("on")"), points::Value(std::string("on")));
+    EXPECT_EQ(written("true"), points::Value(true));
 }
 
 TEST_F(MqttJson, ReportsWhatIsWrongWithACommand) {
-    EXPECT_EQ(refusal("plant/hall/press/nobody/set", "1"), "there is no such point");
-    EXPECT_EQ(refusal("plant/hall/a/b/c/set", "1"), "there is no such point");
-    EXPECT_THAT(refusal("plant/hall/press/level/set", "{"), HasSubstr("not JSON"));
-    EXPECT_THAT(refusal("plant/hall/press/level/set", ""), HasSubstr("not JSON"));
-    EXPECT_THAT(refusal("plant/hall/press/level/set", R"({"value":1,"value":2})"),
-                HasSubstr("comes a second time"));
-    EXPECT_EQ(refusal("plant/hall/press/level/set", "{}"), "there is no value");
-    EXPECT_THAT(refusal("plant/hall/press/level/set", "[1]"), HasSubstr("value must be a number"));
+    const std::pair<std::string, const char*> payloads[] = {
+        {"{", "not JSON"},
+        {"", "not JSON"},
+        {R"({"value":1,"value":2})", "comes a second time"},
+        {"{}", "there is no value"},
+        {"[1]", "value must be a number"},
+        {std::string(5000, '1'), "at most 4096 bytes"},
+    };
+    for (const auto& [payload, why] : payloads)
+        EXPECT_THAT(refusal("plant/hall/press/level/set", payload), HasSubstr(why)) << payload;
     EXPECT_THAT(refusal("plant/hall/press/level/set", "1", true),
                 HasSubstr("must not be retained"));
-    EXPECT_THAT(refusal("plant/hall/press/level/set", std::string(5000, '1')),
-                HasSubstr("at most 4096 bytes"));
+    for (const char* topic : {"plant/hall/press/nobody/set", "plant/hall/a/b/c/set"})
+        EXPECT_EQ(refusal(topic, "1"), "there is no such point");
 }
 
 TEST_F(MqttJson, OtherTopicsAreNoCommands) {
-    EXPECT_THAT(publisher_.commands("plant/hall/press/level", "1", false), IsEmpty());
-    EXPECT_THAT(publisher_.commands("plant/hall/set", "1", false), IsEmpty());
-    EXPECT_THAT(publisher_.commands("plant/hallway/press/level/set", "1", false), IsEmpty());
-    EXPECT_THAT(publisher_.commands("plant/hall/press/level/set/result", "1", false), IsEmpty());
+    for (const char* topic : {"plant/hall/press/level", "plant/hall/set",
+                              "plant/hallway/press/level/set", "plant/hall/press/level/set/result"})
+        EXPECT_THAT(publisher_.commands(topic, "1", false), IsEmpty()) << topic;
 }
 
 TEST_F(MqttJson, WithoutTheSwitchWritesAreIgnored) {
     Settings closed = settings();
     closed.write = false;
-    Publisher publisher(closed, small_plant());
+    const Publisher publisher(closed, small_plant());
     EXPECT_THAT(publisher.subscriptions(), IsEmpty());
     EXPECT_THAT(publisher.commands("plant/hall/press/level/set", "1", false), IsEmpty());
 }
 
 TEST_F(MqttJson, ResultsSayWhichWriteTheyAreOf) {
-    publisher_.connected();
-    take_all(publisher_);
+    connect();
     publisher_.answer({publisher_.topic_of(2), "7", R"({"ok":true})"}, false);
     publisher_.answer({publisher_.topic_of(2), "", R"({"ok":false})"}, false);
     const auto all = take_all(publisher_);

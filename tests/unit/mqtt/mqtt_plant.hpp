@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -11,31 +12,27 @@
 
 namespace panelgate::mqtt {
 
+inline points::Point point(std::string name, points::Type type) {
+    points::Point made;
+    made.name = std::move(name);
+    made.type = type;
+    return made;
+}
+
 /// Subject 0: line floor1; 1: station press; 2: its level (scaled, celsius), 3: mode (i16), 4: name
 /// (a text); 5: station oven; 6: its level (u32).
 inline Subjects small_plant() {
+    points::Point level = point("level", points::Type::i16);
+    level.scale = 0.1;
+    level.unit = "celsius";
     Subjects subjects;
     subjects.add_line("floor1");
     subjects.add_station("press");
-    points::Point level;
-    level.name = "level";
-    level.type = points::Type::i16;
-    level.scale = 0.1;
-    level.unit = "celsius";
     subjects.add_point(level);
-    points::Point mode;
-    mode.name = "mode";
-    mode.type = points::Type::i16;
-    subjects.add_point(mode);
-    points::Point name;
-    name.name = "name";
-    name.type = points::Type::string;
-    subjects.add_point(name);
+    subjects.add_point(point("mode", points::Type::i16));
+    subjects.add_point(point("name", points::Type::string));
     subjects.add_station("oven");
-    points::Point other;
-    other.name = "level";
-    other.type = points::Type::u32;
-    subjects.add_point(other);
+    subjects.add_point(point("level", points::Type::u32));
     return subjects;
 }
 
@@ -48,6 +45,8 @@ inline State good(points::Value value, WallTime time = kNoon) {
     return state;
 }
 
+inline State good_number(std::int64_t value) { return good(value); }
+
 inline State station(bool alive, std::string word) {
     State state = good(alive);
     state.text = std::move(word);
@@ -59,6 +58,10 @@ inline std::vector<Publisher::Outgoing> take_all(Publisher& publisher, WallTime 
     std::vector<Publisher::Outgoing> all;
     while (auto outgoing = publisher.next(now)) all.push_back(std::move(*outgoing));
     return all;
+}
+
+inline void deliver(Publisher& publisher, const std::vector<Publisher::Outgoing>& all) {
+    for (const Publisher::Outgoing& one : all) publisher.delivered(one.change);
 }
 
 inline std::vector<std::string> topics(const std::vector<Publisher::Outgoing>& all) {

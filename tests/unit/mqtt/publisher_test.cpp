@@ -2,13 +2,19 @@
 
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "connection.hpp"
 #include "mqtt_plant.hpp"
 
 namespace panelgate::mqtt::publisher_test {
 namespace {
 
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 Settings settings() {
@@ -23,7 +29,14 @@ class MqttPublisher : public ::testing::Test {
     Publisher publisher_{settings(), small_plant()};
 
     void count(int from, int to) {
-        for (int i = from; i <= to; ++i) publisher_.offer(3, good(std::int64_t{i}));
+        for (int i = from; i <= to; ++i) publisher_.offer(3, good_number(i));
+    }
+    std::vector<Publisher::Outgoing> connect() {
+        publisher_.connected();
+        return take_all(publisher_);
+    }
+    void answer(const std::string& topic, bool refused = false) {
+        publisher_.answer({topic, "", "{}"}, refused);
     }
     /// The values of t/press/mode among these.
     static std::vector<std::string> counted(const std::vector<Publisher::Outgoing>& all) {
@@ -35,9 +48,6 @@ class MqttPublisher : public ::testing::Test {
         }
         return values;
     }
-    void deliver(const std::vector<Publisher::Outgoing>& all) {
-        for (const Publisher::Outgoing& one : all) publisher_.delivered(one.change);
-    }
 };
 
 TEST_F(MqttPublisher, SendsNothingWithoutAConnection) {
@@ -47,52 +57,54 @@ TEST_F(MqttPublisher, SendsNothingWithoutAConnection) {
 }
 
 TEST_F(MqttPublisher, InitialStatesTakeNoRoomAndArePublishedByTheBirth) {
-    publisher_.know(3, good(std::int64_t{7}));
-    publisher_.know(3, good(std::int64_t{8}));  // a state is already known
-    EXPECT_FALSE(publisher_.offer(3, good(std::int64_t{7})));
+    publisher_.know(3, good_number(7));
+    publisher_.know(3, good_number(8));  // a state is already known
+    EXPECT_FALSE(publisher_.offer(3, good_number(7)));
     EXPECT_EQ(publisher_.store().size(), 0U);
-    publisher_.connected();
-    EXPECT_THAT(counted(take_all(publisher_)), ElementsAre("7"));
+    EXPECT_THAT(counted(connect()), ElementsAre("7"));
 }
 
 TEST_F(MqttPublisher, PublishesChangesOnly) {
-    EXPECT_TRUE(publisher_.offer(3, good(std::int64_t{1})));
+    EXPECT_TRUE(publisher_.offer(3, good_number(1)));
     EXPECT_FALSE(publisher_.offer(3, good(std::int64_t{1}, kNoon + std::chrono::seconds(1))));
-    State stale = good(std::int64_t{1});
+    State stale = good_number(1);
     stale.quality = points::Quality::stale;
     EXPECT_TRUE(publisher_.offer(3, stale));
 }
 
 TEST_F(MqttPublisher, ABirthEndsWithWhatIsNowBehindWhatHasBeen) {
     count(1, 3);
-    publisher_.connected();
-    const auto all = take_all(publisher_);
+    const auto all = connect();
     EXPECT_EQ(all.front().message.topic, "t/status");
     EXPECT_THAT(counted(all), ElementsAre("1", "2", "3", "3"));
 }
 
-TEST_F(MqttPublisher, OnlyUnacknowledgedMessagesAreSentAgain) {
-    publisher_.connected();
-    deliver(take_all(publisher_));
+TEST_F(MqttPublisher, OnlyUnacknowledgedMessagesAreSentAgainInTheirOrder) {
+    deliver(publisher_, connect());
     count(1, 3);
+    EXPECT_EQ(publisher_.store().in_flight(), 0U);
     auto all = take_all(publisher_);
-    publisher_.delivered(all[0].change);
+    EXPECT_EQ(publisher_.store().in_flight(), 3U);
+    publisher_.delivered(all[1].change);
     publisher_.disconnected();
     count(4, 4);
-    publisher_.connected();
-    all = take_all(publisher_);
-    EXPECT_THAT(counted(all), ElementsAre("2", "3", "4", "4"));
-    deliver(all);
+    all = connect();
+    EXPECT_THAT(counted(all), ElementsAre("1", "3", "4", "4"));
+    deliver(publisher_, all);
+    EXPECT_EQ(publisher_.store().size(), 0U);
     publisher_.disconnected();
-    publisher_.connected();
-    EXPECT_THAT(counted(take_all(publisher_)), ElementsAre("4"));
+    EXPECT_THAT(counted(connect()), ElementsAre("4"));
+    EXPECT_EQ(publisher_.store().dropped(), 0U);
 }
 
-TEST_F(MqttPublisher, OfWhatDoesNotFitTheOldestGoesAndIsCounted) {
-    count(1, 8);
+TEST_F(MqttPublisher, OfWhatDoesNotFitTheOldestThatWaitsGoesAndIsCounted) {
+    connect();
+    count(1, 1);
+    take_all(publisher_);  // in flight: it is not dropped
+    count(2, 8);
     EXPECT_EQ(publisher_.store().dropped(), 3U);
-    publisher_.connected();
-    EXPECT_THAT(counted(take_all(publisher_)), ElementsAre("4", "5", "6", "7", "8", "8"));
+    publisher_.disconnected();
+    EXPECT_THAT(counted(connect()), ElementsAre("1", "5", "6", "7", "8", "8"));
 }
 
 TEST_F(MqttPublisher, AChangeDuringABirthIsNotFollowedByWhatWasBefore) {
@@ -107,19 +119,17 @@ TEST_F(MqttPublisher, AChangeDuringABirthIsNotFollowedByWhatWasBefore) {
 }
 
 TEST_F(MqttPublisher, RepeatsWhatAWriterHasToSeeAgain) {
-    publisher_.connected();
-    take_all(publisher_);
+    connect();
     publisher_.repeat(3);  // it has no state
     EXPECT_THAT(take_all(publisher_), IsEmpty());
     count(1, 1);
-    deliver(take_all(publisher_));
+    deliver(publisher_, take_all(publisher_));
     publisher_.repeat(3);
     EXPECT_THAT(counted(take_all(publisher_)), ElementsAre("1"));
 }
 
 TEST_F(MqttPublisher, AnotherPlantTakesOverWhatItHasToo) {
-    publisher_.connected();
-    take_all(publisher_);
+    connect();
     count(1, 1);
     take_all(publisher_);                         // in flight
     publisher_.offer(4, good(std::string("x")));  // of a point that is removed
@@ -127,100 +137,82 @@ TEST_F(MqttPublisher, AnotherPlantTakesOverWhatItHasToo) {
     Subjects fewer;
     fewer.add_station("oven");
     fewer.add_station("press");
-    points::Point mode;
-    mode.name = "mode";
-    mode.type = points::Type::i16;
-    fewer.add_point(mode);
+    fewer.add_point(point("mode", points::Type::i16));
     Publisher next(settings(), fewer);
     next.take_over(publisher_);
     EXPECT_EQ(next.store().size(), 2U);
-    EXPECT_FALSE(next.offer(2, good(std::int64_t{2}))) << "it is known";
+    EXPECT_FALSE(next.offer(2, good_number(2))) << "it is known";
     next.connected();
     EXPECT_THAT(counted(take_all(next)), ElementsAre("1", "2", "2"));
 }
 
 TEST_F(MqttPublisher, AnswersAreBoundedAndWhatFindsNoRoomIsCounted) {
-    publisher_.connected();
-    take_all(publisher_);
-    for (std::size_t i = 0; i < settings().results + 3; ++i)
-        publisher_.answer({"x", "", "{}"}, false);
+    connect();
+    for (std::size_t i = 0; i < settings().results + 3; ++i) answer("x");
     EXPECT_EQ(take_all(publisher_).size(), settings().results);
     EXPECT_EQ(publisher_.results_dropped(), 3U);
 }
 
 TEST_F(MqttPublisher, P2WhatWasRefusedTakesNoPlaceFromWhatWasCarriedOut) {
-    const std::size_t all = settings().results;
-    for (std::size_t i = 0; i < 2 * all; ++i) publisher_.answer({"refused", "", "{}"}, true);
-    EXPECT_TRUE(publisher_.has_room_for_answer(settings().writes - 1));
-    EXPECT_FALSE(publisher_.has_room_for_answer(settings().writes));
-    for (std::size_t i = 0; i < settings().writes; ++i)
-        publisher_.answer({"done", "", "{}"}, false);
-    EXPECT_EQ(publisher_.results_dropped(), all + settings().writes);
+    const auto [results, writes] = std::pair(settings().results, settings().writes);
+    for (std::size_t i = 0; i < 2 * results; ++i) answer("refused", true);
+    EXPECT_TRUE(publisher_.has_room_for_answer(writes - 1));
+    EXPECT_FALSE(publisher_.has_room_for_answer(writes));
+    for (std::size_t i = 0; i < writes; ++i) answer("done");
+    EXPECT_EQ(publisher_.results_dropped(), results + writes);
     EXPECT_FALSE(publisher_.has_room_for_answer(0));
 }
 
 TEST_F(MqttPublisher, P2AResultIsSentUntilTheBrokerHasIt) {
-    publisher_.connected();
-    take_all(publisher_);
-    publisher_.answer({"t/a", "", "{}"}, false);
-    publisher_.answer({"t/b", "", "{}"}, false);
+    connect();
+    answer("t/a");
+    answer("t/b");
     const auto first = publisher_.next(kNoon);
     ASSERT_TRUE(first && first->change != 0);
     take_all(publisher_);
     publisher_.delivered(first->change);
     publisher_.disconnected();  // before the broker has the second one
-    publisher_.answer({"t/c", "", "{}"}, false);
-    publisher_.connected();
-    EXPECT_THAT(topics(take_all(publisher_)), ElementsAre("t/status", "t/b/result", "t/c/result"));
+    answer("t/c");
+    EXPECT_THAT(topics(connect()), ElementsAre("t/status", "t/b/result", "t/c/result"));
 }
 
-TEST_F(MqttPublisher, AnswersThatWaitGoWithTheirSessionToTheNext) {
-    publisher_.connected();
-    take_all(publisher_);
-    publisher_.answer({"t/a", "", "{}"}, false);
+TEST_F(MqttPublisher, AnswersThatWaitGoWithTheirSessionToTheNextAtTheSameBroker) {
+    connect();
+    answer("t/a");
     Publisher next(settings(), small_plant());
     next.take_over(publisher_);
     next.disconnected();  // the broker cannot be reached yet
     next.answer({"t/b", "", "{}"}, false);
     next.connected();
     EXPECT_THAT(topics(take_all(next)), ElementsAre("t/status", "t/a/result", "t/b/result"));
-}
-
-TEST_F(MqttPublisher, AnotherBrokerGetsNoResultsOfThisOne) {
-    publisher_.connected();
-    publisher_.answer({"t/a", "", "{}"}, false);
-    Settings other = settings();
-    other.port = 1884;
-    Publisher next(other, Subjects());
-    next.take_over(publisher_);
-    next.connected();
-    EXPECT_THAT(topics(take_all(next)), ElementsAre("t/status"));
+    Settings elsewhere = settings();
+    elsewhere.port = 1884;
+    Publisher other(elsewhere, Subjects());
+    other.take_over(publisher_);
+    other.connected();
+    EXPECT_THAT(topics(take_all(other)), ElementsAre("t/status"));
 }
 
 Subjects press_without_name() {
     Subjects subjects;
     subjects.add_line("floor1");
     subjects.add_station("press");
-    for (const char* name : {"level", "mode"}) {
-        points::Point point;
-        point.name = name;
-        subjects.add_point(point);
-    }
+    for (const char* name : {"level", "mode"}) subjects.add_point(point(name, points::Type::u16));
     return subjects;
 }
 
 TEST_F(MqttPublisher, WhatIsConfiguredNoMoreIsClearedOnce) {
     Publisher next(settings(), press_without_name());
     next.take_over(publisher_);
-    next.connected();
-    EXPECT_THAT(topics(take_all(next)),
-                ElementsAre("t/status", "t/oven/level", "t/press/name", "t/station/oven/state"));
-    next.disconnected();  // before the broker has it
-    next.connected();
-    const auto all = take_all(next);
-    ASSERT_EQ(all.size(), 4U);
-    EXPECT_EQ(all[1].message, (Message{"t/oven/level", "", 1, true}));
-    for (const Publisher::Outgoing& one : all) next.delivered(one.change);
+    for (int i = 0; i < 2; ++i) {
+        next.disconnected();  // the second time before the broker has it
+        next.connected();
+        const auto all = take_all(next);
+        ASSERT_THAT(topics(all), ElementsAre("t/status", "t/oven/level", "t/press/name",
+                                             "t/station/oven/state"));
+        EXPECT_EQ(all[1].message, (Message{"t/oven/level", "", 1, true}));
+        if (i == 1) deliver(next, all);
+    }
     next.disconnected();
     next.connected();
     EXPECT_THAT(topics(take_all(next)), ElementsAre("t/status"));
@@ -242,6 +234,48 @@ TEST_F(MqttPublisher, WhatIsNotClearedYetIsClearedByTheNextUnlessItIsBack) {
     back.take_over(next);
     back.connected();
     EXPECT_THAT(topics(take_all(back)), ElementsAre("t/status"));
+}
+
+TEST(MqttStore, AcknowledgementsOfNothingMeanNothing) {
+    Store store(3);
+    store.delivered(1);
+    store.add(0, good_number(1));
+    store.delivered(1);  // it was never sent
+    store.delivered(7);
+    EXPECT_EQ(store.size(), 1U);
+    store.skip();
+    EXPECT_EQ(store.next(), nullptr);
+    EXPECT_EQ(store.dropped(), 0U);
+}
+
+TEST(MqttOpenMessages, AreOpenUntilTheyAreAcknowledged) {
+    OpenMessages open;
+    open.sent(1, true, 11);
+    open.sent(2, true, 0);
+    EXPECT_EQ(open.size(), 2U);
+    EXPECT_FALSE(open.wants_barrier());
+    EXPECT_THAT(open.delivered(7), IsEmpty());
+    EXPECT_THAT(open.delivered(1), ElementsAre(11));
+    EXPECT_THAT(open.delivered(1), IsEmpty());
+    EXPECT_EQ(open.size(), 1U);
+    open.clear();
+    EXPECT_EQ(open.size(), 0U);
+}
+
+TEST(MqttOpenMessages, ABarrierAcknowledgesWhatIsBeforeIt) {
+    OpenMessages open;
+    open.sent(1, false, 11);
+    open.sent(2, false, 12);
+    EXPECT_TRUE(open.wants_barrier());
+    open.barrier(0);  // not sent
+    EXPECT_TRUE(open.wants_barrier());
+    open.barrier(3);
+    open.sent(4, false, 13);
+    EXPECT_FALSE(open.wants_barrier()) << "one at a time";
+    EXPECT_THAT(open.delivered(1), IsEmpty());
+    EXPECT_THAT(open.delivered(3), ElementsAre(11, 12));
+    EXPECT_TRUE(open.wants_barrier());
+    EXPECT_EQ(open.size(), 1U);
 }
 
 }  // namespace

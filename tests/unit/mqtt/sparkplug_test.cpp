@@ -2,6 +2,15 @@
 
 #include <gmock/gmock.h>
 
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
 #include "mqtt_plant.hpp"
 #include "sparkplug_payload.hpp"
 
@@ -22,11 +31,6 @@ Settings settings() {
     return made;
 }
 
-State with(State state, points::Quality quality) {
-    state.quality = quality;
-    return state;
-}
-
 /// Returns a payload's seq.
 std::optional<std::uint64_t> seq_of(const Message& message) {
     std::optional<std::uint64_t> seq;
@@ -41,17 +45,24 @@ bool is_historical(const Message& message) {
     return message.payload.find("\x28\x01") != message.payload.npos;
 }
 
+/// What is behind "spBv1.0/g/" in the topics.
+std::vector<std::string> kinds(const std::vector<Publisher::Outgoing>& all) {
+    std::vector<std::string> names = topics(all);
+    for (std::string& name : names) name.erase(0, std::string_view("spBv1.0/g/").size());
+    return names;
+}
+
 class MqttSparkplug : public ::testing::Test {
   protected:
     Publisher publisher_{settings(), small_plant()};
 
-    void deliver(const std::vector<Publisher::Outgoing>& all) {
-        for (const Publisher::Outgoing& one : all) publisher_.delivered(one.change);
-    }
     std::vector<Publisher::Outgoing> connect() {
         publisher_.will();
         publisher_.connected();
         return take_all(publisher_);
+    }
+    std::vector<Command> commands(std::string_view topic, const std::vector<Metric>& metrics) {
+        return publisher_.commands(topic, sparkplug_payload(kNoon, metrics, {}), false);
     }
 };
 
@@ -59,7 +70,9 @@ class MqttSparkplug : public ::testing::Test {
 TEST_F(MqttSparkplug, BirthsAreByteForByteThoseOfTahu) {
     publisher_.offer(0, good(true));
     publisher_.offer(2, good(*Decimal::parse("21.5")));
-    publisher_.offer(3, with(good(std::int64_t{-2}), points::Quality::stale));
+    State mode = good_number(-2);
+    mode.quality = points::Quality::stale;
+    publisher_.offer(3, mode);
     const Message will = publisher_.will();
     EXPECT_EQ(will.topic, "spBv1.0/g/NDEATH/n");
     EXPECT_EQ(hex(will.payload), "0800120d0a056264536571180020045800");
@@ -87,12 +100,12 @@ TEST_F(MqttSparkplug, BirthsAreByteForByteThoseOfTahu) {
 TEST_F(MqttSparkplug, WhatWaitedIsHistoryByteForByte) {
     publisher_.offer(6, good(std::uint64_t{4294967295U}));
     const auto all = connect();
-    ASSERT_THAT(topics(all), ElementsAre("spBv1.0/g/NBIRTH/n", "spBv1.0/g/DBIRTH/n/press",
-                                         "spBv1.0/g/DBIRTH/n/oven", "spBv1.0/g/DDATA/n/oven"));
+    ASSERT_THAT(kinds(all),
+                ElementsAre("NBIRTH/n", "DBIRTH/n/press", "DBIRTH/n/oven", "DDATA/n/oven"));
     EXPECT_EQ(hex(all[3].message.payload),
               "08fad195ffbc311225100618fad195ffbc31200728014a100a075175616c6974791205080318c00158ff"
               "ffffff0f1803");
-    deliver(all);
+    deliver(publisher_, all);
     publisher_.offer(6, good(std::uint64_t{5}));
     const auto live = take_all(publisher_);
     ASSERT_THAT(live, SizeIs(1));
@@ -103,7 +116,7 @@ TEST_F(MqttSparkplug, SequenceNumbersGoRoundWithoutAGap) {
     auto all = connect();
     std::uint64_t expected = 0;
     for (int i = 0; i < 600; ++i) {
-        publisher_.offer(3, good(std::int64_t{i}));
+        publisher_.offer(3, good_number(i));
         for (auto& one : take_all(publisher_)) all.push_back(std::move(one));
     }
     ASSERT_THAT(all, SizeIs(603));
@@ -113,29 +126,27 @@ TEST_F(MqttSparkplug, SequenceNumbersGoRoundWithoutAGap) {
 TEST_F(MqttSparkplug, AStationDiesAndIsBornAgain) {
     connect();
     publisher_.offer(1, station(false, "offline"));
-    publisher_.offer(3, good(std::int64_t{1}));  // no host knows this device now
+    publisher_.offer(3, good_number(1));  // no host knows this device now
     publisher_.offer(1, station(true, "online"));
     publisher_.offer(1, station(true, "suspect"));
-    publisher_.offer(3, good(std::int64_t{2}));
+    publisher_.offer(3, good_number(2));
     const auto all = take_all(publisher_);
-    EXPECT_THAT(topics(all), ElementsAre("spBv1.0/g/DDEATH/n/press", "spBv1.0/g/DBIRTH/n/press",
-                                         "spBv1.0/g/DDATA/n/press"));
+    EXPECT_THAT(kinds(all), ElementsAre("DDEATH/n/press", "DBIRTH/n/press", "DDATA/n/press"));
     EXPECT_EQ(seq_of(all[0].message), 3U);
 }
 
 TEST_F(MqttSparkplug, ADeadStationIsNotBornWithItsNode) {
     publisher_.offer(1, station(false, "offline"));
-    EXPECT_THAT(topics(connect()), ElementsAre("spBv1.0/g/NBIRTH/n", "spBv1.0/g/DBIRTH/n/oven"));
+    EXPECT_THAT(kinds(connect()), ElementsAre("NBIRTH/n", "DBIRTH/n/oven"));
 }
 
 TEST_F(MqttSparkplug, ARebirthPublishesEverythingAgainUnderTheSameDeath) {
     connect();
     publisher_.offer(0, good(false));
-    EXPECT_THAT(topics(take_all(publisher_)), ElementsAre("spBv1.0/g/NDATA/n"));
+    EXPECT_THAT(kinds(take_all(publisher_)), ElementsAre("NDATA/n"));
     publisher_.rebirth();
     const auto all = take_all(publisher_);
-    EXPECT_THAT(topics(all), ElementsAre("spBv1.0/g/NBIRTH/n", "spBv1.0/g/DBIRTH/n/press",
-                                         "spBv1.0/g/DBIRTH/n/oven"));
+    EXPECT_THAT(kinds(all), ElementsAre("NBIRTH/n", "DBIRTH/n/press", "DBIRTH/n/oven"));
     EXPECT_EQ(seq_of(all[0].message), 0U);
     EXPECT_EQ(hex(all[0].message.payload).substr(14, 42),
               "12120a05626453657118fad195ffbc312004580012");
@@ -144,23 +155,21 @@ TEST_F(MqttSparkplug, ARebirthPublishesEverythingAgainUnderTheSameDeath) {
 TEST_F(MqttSparkplug, RebirthsDuringOneAreOneMore) {
     publisher_.will();
     publisher_.connected();
-    std::vector<std::string> births;
+    std::vector<Publisher::Outgoing> births;
     for (int i = 0; i < 2; ++i) {
         publisher_.rebirth();  // at first nothing has been published
-        births.push_back(publisher_.next(kNoon)->message.topic);
+        births.push_back(*publisher_.next(kNoon));
         publisher_.rebirth();
     }
-    for (const std::string& topic : topics(take_all(publisher_))) births.push_back(topic);
-    EXPECT_THAT(births, ElementsAre("spBv1.0/g/NBIRTH/n", "spBv1.0/g/DBIRTH/n/press",
-                                    "spBv1.0/g/DBIRTH/n/oven", "spBv1.0/g/NBIRTH/n",
-                                    "spBv1.0/g/DBIRTH/n/press", "spBv1.0/g/DBIRTH/n/oven"));
+    for (auto& one : take_all(publisher_)) births.push_back(std::move(one));
+    EXPECT_THAT(kinds(births), ElementsAre("NBIRTH/n", "DBIRTH/n/press", "DBIRTH/n/oven",
+                                           "NBIRTH/n", "DBIRTH/n/press", "DBIRTH/n/oven"));
 }
 
 TEST_F(MqttSparkplug, EachConnectionHasItsDeath) {
     EXPECT_EQ(hex(publisher_.will().payload).substr(32), "00");
     EXPECT_EQ(hex(publisher_.will().payload).substr(32), "01");
-    const std::string farewell = hex(publisher_.farewell(kNoon).payload);
-    EXPECT_EQ(farewell.substr(farewell.size() - 4), "5801");
+    EXPECT_TRUE(hex(publisher_.farewell(kNoon).payload).ends_with("5801"));
     for (int i = 0; i < 254; ++i) publisher_.will();
     EXPECT_EQ(hex(publisher_.will().payload).substr(32), "00");
 }
@@ -170,14 +179,11 @@ TEST_F(MqttSparkplug, AHostAsksForARebirth) {
     Metric rebirth;
     rebirth.name = "Node Control/Rebirth";
     rebirth.value = true;
-    const auto commands =
-        publisher_.commands("spBv1.0/g/NCMD/n", sparkplug_payload(kNoon, {rebirth}, {}), false);
-    ASSERT_THAT(commands, SizeIs(1));
-    EXPECT_TRUE(std::holds_alternative<Rebirth>(commands[0]));
+    const auto asked = commands("spBv1.0/g/NCMD/n", {rebirth});
+    ASSERT_THAT(asked, SizeIs(1));
+    EXPECT_TRUE(std::holds_alternative<Rebirth>(asked[0]));
     rebirth.value = false;
-    EXPECT_THAT(
-        publisher_.commands("spBv1.0/g/NCMD/n", sparkplug_payload(kNoon, {rebirth}, {}), false),
-        IsEmpty());
+    EXPECT_THAT(commands("spBv1.0/g/NCMD/n", {rebirth}), IsEmpty());
 }
 
 TEST_F(MqttSparkplug, AHostWritesByNameOrAlias) {
@@ -189,34 +195,33 @@ TEST_F(MqttSparkplug, AHostWritesByNameOrAlias) {
     mode.alias = 3;
     mode.type = DataType::int16;
     mode.value = std::int64_t{-2};
-    const auto commands = publisher_.commands("spBv1.0/g/DCMD/n/press",
-                                              sparkplug_payload(kNoon, {level, mode}, {}), false);
-    ASSERT_THAT(commands, SizeIs(2));
-    EXPECT_EQ(std::get<WriteCommand>(commands[0]).point, 2U);
-    EXPECT_EQ(std::get<WriteCommand>(commands[0]).value, points::Value(21.5));
-    EXPECT_EQ(std::get<WriteCommand>(commands[1]).point, 3U);
-    EXPECT_EQ(std::get<WriteCommand>(commands[1]).value, points::Value(std::int64_t{-2}));
+    const auto writes = commands("spBv1.0/g/DCMD/n/press", {level, mode});
+    ASSERT_THAT(writes, SizeIs(2));
+    EXPECT_EQ(std::get<WriteCommand>(writes[0]).point, 2U);
+    EXPECT_EQ(std::get<WriteCommand>(writes[0]).value, points::Value(21.5));
+    EXPECT_EQ(std::get<WriteCommand>(writes[1]).point, 3U);
+    EXPECT_EQ(std::get<WriteCommand>(writes[1]).value, points::Value(std::int64_t{-2}));
 }
 
 TEST_F(MqttSparkplug, ReportsWhatIsWrongWithACommand) {
-    const auto why = [this](std::string_view topic, const std::string& payload,
+    const auto why = [this](std::string_view device, const std::string& payload,
                             bool retained = false) {
-        const auto commands = publisher_.commands(topic, payload, retained);
-        const auto* bad = commands.empty() ? nullptr : std::get_if<BadCommand>(&commands[0]);
+        const auto made =
+            publisher_.commands("spBv1.0/g/DCMD/n/" + std::string(device), payload, retained);
+        const auto* bad = made.empty() ? nullptr : std::get_if<BadCommand>(&made[0]);
         return bad != nullptr ? bad->why : "it is taken";
     };
     Metric other;
     other.alias = 6;  // the oven's
     other.value = true;
     const std::string payload = sparkplug_payload(kNoon, {other}, {});
-    EXPECT_EQ(why("spBv1.0/g/DCMD/n/press", payload), "there is no such metric");
-    EXPECT_EQ(why("spBv1.0/g/DCMD/n/nobody", payload), "there is no such device");
+    EXPECT_EQ(why("press", payload), "there is no such metric");
+    EXPECT_EQ(why("nobody", payload), "there is no such device");
     other.alias = 3;
     other.value.reset();
-    EXPECT_EQ(why("spBv1.0/g/DCMD/n/press", sparkplug_payload(kNoon, {other}, {})),
-              "the metric has no value");
-    EXPECT_THAT(why("spBv1.0/g/DCMD/n/press", "{}"), HasSubstr("no payload of Sparkplug B"));
-    EXPECT_THAT(why("spBv1.0/g/DCMD/n/press", payload, true), HasSubstr("must not be retained"));
+    EXPECT_EQ(why("press", sparkplug_payload(kNoon, {other}, {})), "the metric has no value");
+    EXPECT_THAT(why("press", "{}"), HasSubstr("no payload of Sparkplug B"));
+    EXPECT_THAT(why("press", payload, true), HasSubstr("must not be retained"));
     EXPECT_THAT(publisher_.commands("spBv1.0/g/DCMD/other/press", payload, false), IsEmpty());
 }
 
@@ -239,8 +244,9 @@ TEST(MqttSparkplugPayload, WhatAHostSendsMeansWhatItsTypeSays) {
     EXPECT_EQ(value_of(heard, DataType::int32), points::Value(std::uint64_t{0xFFFFFFFE}));
 }
 
-std::string payload_of(ProtobufWriter& metric) {
-    return ProtobufWriter().bytes(2, metric.take()).take();
+/// What a payload with this one metric is parsed to.
+std::optional<std::vector<ReceivedMetric>> parsed(ProtobufWriter& metric) {
+    return parse_sparkplug(ProtobufWriter().bytes(2, metric.take()).take(), 1);
 }
 
 TEST(MqttSparkplugPayload, WhatIsNullHasNoValue) {
@@ -248,7 +254,7 @@ TEST(MqttSparkplugPayload, WhatIsNullHasNoValue) {
     behind.bytes(1, "mode").varint(10, 9).varint(7, 1);
     before.bytes(1, "mode").varint(7, 1).varint(10, 9);
     for (ProtobufWriter* one : {&behind, &before}) {
-        const auto heard = parse_sparkplug(payload_of(*one), 1);
+        const auto heard = parsed(*one);
         ASSERT_TRUE(heard);
         EXPECT_EQ(heard->front().value, std::nullopt);
     }
@@ -256,19 +262,49 @@ TEST(MqttSparkplugPayload, WhatIsNullHasNoValue) {
 
 TEST(MqttSparkplugPayload, TextIsUtf8) {
     ProtobufWriter good, bad, unnamed;
-    good.bytes(1, "name").bytes(15, "\xc3\xa4");
-    bad.bytes(1, "name").bytes(15, "\xff\xfe");
-    unnamed.bytes(1, "\xff").varint(10, 9);
-    EXPECT_TRUE(parse_sparkplug(payload_of(good), 1));
-    EXPECT_FALSE(parse_sparkplug(payload_of(bad), 1));
-    EXPECT_FALSE(parse_sparkplug(payload_of(unnamed), 1));
+    EXPECT_TRUE(parsed(good.bytes(1, "name").bytes(15, "\xc3\xa4")));
+    EXPECT_FALSE(parsed(bad.bytes(1, "name").bytes(15, "\xff\xfe")));
+    EXPECT_FALSE(parsed(unnamed.bytes(1, "\xff").varint(10, 9)));
 }
 
 TEST(MqttSparkplugPayload, HasALimitOfMetrics) {
-    const std::vector<Metric> three(3);
-    const std::string payload = sparkplug_payload(kNoon, three, {});
+    const std::string payload = sparkplug_payload(kNoon, std::vector<Metric>(3), {});
     EXPECT_TRUE(parse_sparkplug(payload, 3));
     EXPECT_FALSE(parse_sparkplug(payload, 2));
+}
+
+TEST(MqttProtobuf, WritesWhatTheEncodingGuideShows) {
+    EXPECT_EQ(hex(ProtobufWriter().varint(1, 150).take()), "089601");
+    EXPECT_EQ(hex(ProtobufWriter().bytes(2, "testing").take()), "120774657374696e67");
+    EXPECT_EQ(hex(ProtobufWriter().fixed32(16, 1).take()), "850101000000");
+    EXPECT_EQ(hex(ProtobufWriter().fixed64(1, 1).take()), "090100000000000000");
+}
+
+TEST(MqttProtobuf, ReadsWhatItWrites) {
+    constexpr auto kMost = std::numeric_limits<std::uint64_t>::max();
+    const std::string text =
+        ProtobufWriter().varint(1, kMost).fixed64(2, kMost - 1).fixed32(3, 7).bytes(4, "").take();
+    ProtobufReader in(text);
+    for (const std::uint64_t value : {kMost, kMost - 1, std::uint64_t{7}})
+        EXPECT_EQ(in.next()->value, value);
+    const auto last = in.next();
+    EXPECT_TRUE(last->has_length);
+    EXPECT_EQ(last->bytes, "");
+    EXPECT_FALSE(in.next());
+    EXPECT_TRUE(in.ok());
+}
+
+TEST(MqttProtobuf, WhatIsBrokenEndsThere) {
+    for (const std::string_view text :
+         {std::string_view("\x08"), std::string_view("\x08\x80"), std::string_view("\x12\x05hi"),
+          std::string_view("\x09\x01\x02"), std::string_view("\x0d\x01"),
+          std::string_view("\x00\x01", 2), std::string_view("\x0b\x01"),
+          std::string_view("\x08\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff\x01")}) {
+        ProtobufReader in(text);
+        EXPECT_FALSE(in.next()) << hex(text);
+        EXPECT_FALSE(in.ok()) << hex(text);
+        EXPECT_FALSE(in.next());
+    }
 }
 
 }  // namespace
