@@ -102,7 +102,7 @@ void BrokerSession::start() {
     sweep();
 }
 
-std::unique_ptr<mqtt::Leaving> BrokerSession::stop() {
+std::unique_ptr<mqtt::GracefulClose> BrokerSession::stop() {
     alarm_->cancel();
     rebirth_alarm_->cancel();
     auto leaving = client_.stop();
@@ -299,7 +299,7 @@ void Northbound::stop() {
 
 void Northbound::leave() {
     auto leaving = session_ ? session_->stop() : nullptr;
-    if (leaving) leaving_ = std::move(leaving);
+    if (leaving) closing_ = std::move(leaving);
 }
 
 void Northbound::on_bus_event(const std::string& line, const bus::BusEvent& event) {

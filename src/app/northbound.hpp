@@ -12,8 +12,8 @@
 
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/mqtt/client.hpp"
-#include "panelgate/mqtt/publisher.hpp"
 #include "panelgate/mqtt/counters.hpp"
+#include "panelgate/mqtt/publisher.hpp"
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/web/api/point_order.hpp"
@@ -40,7 +40,7 @@ class BrokerSession {
     void start();
     /// Ends the session. The returned object keeps the connection until the broker has got the last
     /// message; null: there is none.
-    std::unique_ptr<mqtt::Leaving> stop();
+    std::unique_ptr<mqtt::GracefulClose> stop();
 
     /// Publishes what has happened on a line.
     void on_bus_event(const std::string& line, const bus::BusEvent& event);
@@ -103,7 +103,7 @@ class Northbound {
     /// Sends the last message. No effect if it was sent already.
     void stop();
     /// True if the broker has got the last message, or it is not waited for any more.
-    bool left() const { return !leaving_ || leaving_->done(); }
+    bool left() const { return !closing_ || closing_->done(); }
 
     /// Reports an event of a line of the snapshot.
     void on_bus_event(const std::string& line, const bus::BusEvent& event);
@@ -117,8 +117,8 @@ class Northbound {
 
     boost::asio::any_io_executor executor_;
     rt::Clock& clock_;
-    std::unique_ptr<BrokerSession> session_;  ///< null without a broker
-    std::unique_ptr<mqtt::Leaving> leaving_;  ///< of the previous or the last session
+    std::unique_ptr<BrokerSession> session_;        ///< null without a broker
+    std::unique_ptr<mqtt::GracefulClose> closing_;  ///< of the previous or the last session
     bool running_ = false;
 };
 

@@ -183,7 +183,7 @@ Servers::Modbus Servers::make(const tcp_server::Settings& settings, const Plant&
 
 Servers::Modbus* Servers::find(const tcp_server::Settings& settings) {
     const auto found = std::ranges::find_if(listeners_, [&](const Modbus& one) {
-        return one.listener && one.settings.is_same_door(settings);
+        return one.listener && one.settings.is_same_listener(settings);
     });
     return found == listeners_.end() ? nullptr : &*found;
 }
@@ -198,10 +198,11 @@ bool Servers::is_left_to(const ListenerHandle& handle, const config::Config& con
     };
     const auto leaves = [&](const Modbus& one) {
         return std::ranges::none_of(config.modbus_tcp, [&](const tcp_server::Settings& wanted) {
-            return one.settings.is_same_door(wanted);
+            return one.settings.is_same_listener(wanted);
         });
     };
-    const bool http_leaves = http_ && !(config.http && http_->settings.is_same_door(*config.http));
+    const bool http_leaves =
+        http_ && !(config.http && http_->settings.is_same_listener(*config.http));
     return (http_leaves && meets(http_->settings)) ||
            std::ranges::any_of(
                listeners_, [&](const Modbus& one) { return leaves(one) && meets(one.settings); });
@@ -229,7 +230,7 @@ void Servers::open_new(const config::Config& config, const Plant& plant, const W
         fresh_.listeners.push_back(make(settings, plant));
         add(handle_of(settings, fresh_.listeners.back().listener.get()));
     }
-    if (config.http && !(http_ && http_->settings.is_same_door(*config.http))) {
+    if (config.http && !(http_ && http_->settings.is_same_listener(*config.http))) {
         auto server = std::make_unique<web::Server>(executor_, *config.http, web.directory(),
                                                     web.providers());
         fresh_.http = Http{*config.http, std::move(server)};

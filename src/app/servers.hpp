@@ -80,7 +80,7 @@ class Openings {
 std::string listening_advice(const boost::system::error_code& why, std::uint16_t port);
 
 /// All servers for clients: Modbus listeners, serial ports with a master, HTTP. A reload keeps
-/// those that need not be reopened (is_same_door()), with their connections. One thread.
+/// those that need not be reopened (is_same_listener()), with their connections. One thread.
 class Servers {
   public:
     Servers(boost::asio::any_io_executor executor, rt::Clock& clock);

@@ -52,7 +52,7 @@ std::vector<Unused> UnsolicitedFrames::take(std::uint8_t asked) {
 std::vector<Unused> UnsolicitedFrames::take_delimited(std::uint8_t asked, bool good) {
     const Bytes bytes = std::exchange(idle_, {});
     if (bytes.empty()) return {};
-    return {modbus::told_part(bytes, asked, good && modbus::crc_ok(bytes, orders_))};
+    return {modbus::classify_frame(bytes, asked, good && modbus::crc_ok(bytes, orders_))};
 }
 
 /// A reply to a recent broadcast, from a panel that should be silent.

@@ -337,7 +337,7 @@ void Bus::transact(Request request, AnswerHandler handler) {
     state_->call([&] { state_->transact(std::move(request), std::move(handler)); });
 }
 
-void Bus::tell_refused(std::uint8_t station, ByteView pdu, ClientId client) {
+void Bus::count_refused(std::uint8_t station, ByteView pdu, ClientId client) {
     state_->account.add_refused(station, pdu, client, state_->arbiter.client_names());
 }
 
@@ -396,7 +396,7 @@ OutcomeCounts Bus::outcomes(std::uint8_t station) const {
     return state_->account.counters().outcomes(station);
 }
 
-std::optional<Refusal> Bus::refusal_of_write(std::uint8_t station) const {
+std::optional<Refusal> Bus::write_refusal(std::uint8_t station) const {
     return state_->rights.judge_write(station);
 }
 

@@ -390,7 +390,7 @@ void ListeningBus::transact(Request request, AnswerHandler handler) {
     state_->refuse(std::move(request), std::move(handler));
 }
 
-void ListeningBus::tell_refused(std::uint8_t station, ByteView pdu, ClientId client) {
+void ListeningBus::count_refused(std::uint8_t station, ByteView pdu, ClientId client) {
     state_->account.add_refused(station, pdu, client, state_->names);
 }
 
@@ -419,7 +419,7 @@ StationStatus ListeningBus::station_status(std::uint8_t station) const {
     return status;
 }
 
-std::optional<Refusal> ListeningBus::refusal_of_write(std::uint8_t station) const {
+std::optional<Refusal> ListeningBus::write_refusal(std::uint8_t station) const {
     return state_->refusal(station);
 }
 

@@ -116,7 +116,7 @@ void log_write(const Settings& settings, std::uint8_t station, const WriteRecord
     fields.push_back({"outcome", ended});
     const std::string transaction = std::to_string(write.transaction);
     if (write.transaction != 0) fields.push_back({"transaction", transaction});
-    if (!accepted) return rt::log_deed("write", place + ' ' + client, fields);
+    if (!accepted) return rt::log_collapsed("write", place + ' ' + client, fields);
     rt::log_each("write", place, client + ' ' + write.pdu + ' ' + ended, fields);
 }
 

@@ -87,7 +87,7 @@ class DescriptorLine : public Line {
     void start(Events& events) final;
     void stop() final;
     void poll_input() final;
-    void hold_input(bool hold) final {
+    void defer_input(bool hold) final {
         held_ = hold;
         want_input();
     }

@@ -111,7 +111,7 @@ std::optional<Bytes> ReplyFramer::on_end(bool good) {
     std::optional<Bytes> reply;
     const bool whole = good && crc_ok(heard_, orders_);
     if (whole && heard_[0] == station_) reply = answering(heard_);
-    if (!reply && !heard_.empty()) step_over(told_part(heard_, station_, whole));
+    if (!reply && !heard_.empty()) step_over(classify_frame(heard_, station_, whole));
     heard_.clear();
     forget_starts();
     open_length_ = false;
@@ -304,7 +304,7 @@ bool ReplyFramer::is_own_reply(ByteView damaged) const {
 
 void ReplyFramer::classify(ByteView bytes) {
     if (ends_ == Ends::told) {
-        if (!bytes.empty()) step_over(told_part(bytes, station_, false));
+        if (!bytes.empty()) step_over(classify_frame(bytes, station_, false));
         return;
     }
     for (Unused& part : classify_heard(bytes, station_, orders_)) step_over(std::move(part));
@@ -325,7 +325,7 @@ void ReplyFramer::step_over(Unused part) {
     }
 }
 
-Unused told_part(ByteView bytes, std::uint8_t own_station, bool good) {
+Unused classify_frame(ByteView bytes, std::uint8_t own_station, bool good) {
     Unused part;
     part.bytes.assign(bytes.begin(), bytes.end());
     if (!good) return part;

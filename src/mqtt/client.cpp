@@ -51,7 +51,7 @@ namespace asio = boost::asio;
 using asio::posix::stream_descriptor;
 using boost::system::error_code;
 
-struct Leaving::State : std::enable_shared_from_this<Leaving::State> {
+struct GracefulClose::State : std::enable_shared_from_this<GracefulClose::State> {
     State(asio::any_io_executor executor, int socket, rt::Clock& clock,
           std::shared_ptr<Connection> c)
         : descriptor(std::move(executor), socket),
@@ -69,7 +69,7 @@ struct Leaving::State : std::enable_shared_from_this<Leaving::State> {
     bool done = false;
 };
 
-void Leaving::State::send() {
+void GracefulClose::State::send() {
     if (connection->wants_write()) {
         descriptor.async_wait(stream_descriptor::wait_write,
                               [self = shared_from_this()](const error_code& error) {
@@ -84,7 +84,7 @@ void Leaving::State::send() {
     drain();
 }
 
-void Leaving::State::drain() {
+void GracefulClose::State::drain() {
     descriptor.async_wait(stream_descriptor::wait_read,
                           [self = shared_from_this()](const error_code& error) {
                               if (self->done) return;
@@ -94,7 +94,7 @@ void Leaving::State::drain() {
 }
 
 /// Discards input; false if the broker has closed or the connection failed.
-bool Leaving::State::discard() {
+bool GracefulClose::State::discard() {
     std::array<char, 4096> nobody_reads{};
     while (true) {
         const auto size = ::recv(descriptor.native_handle(), nobody_reads.data(),
@@ -105,7 +105,7 @@ bool Leaving::State::discard() {
     }
 }
 
-void Leaving::State::end() {
+void GracefulClose::State::end() {
     if (std::exchange(done, true)) return;
     alarm->cancel();
     error_code ignored;
@@ -113,16 +113,16 @@ void Leaving::State::end() {
     connection.reset();
 }
 
-Leaving::Leaving(asio::any_io_executor executor, int socket, rt::Clock& clock,
-                 std::shared_ptr<Connection> connection, Duration within)
+GracefulClose::GracefulClose(asio::any_io_executor executor, int socket, rt::Clock& clock,
+                             std::shared_ptr<Connection> connection, Duration within)
     : state_(std::make_shared<State>(std::move(executor), socket, clock, std::move(connection))) {
     state_->alarm->arm(clock.now() + within, [state = state_.get()] { state->end(); });
     state_->send();
 }
 
-Leaving::~Leaving() { state_->end(); }
+GracefulClose::~GracefulClose() { state_->end(); }
 
-bool Leaving::done() const { return state_->done; }
+bool GracefulClose::done() const { return state_->done; }
 
 struct Dialling::State : std::enable_shared_from_this<Dialling::State> {
     explicit State(asio::any_io_executor executor) : loop(std::move(executor)) {}
@@ -401,17 +401,17 @@ void Client::start() {
     state_->dial();
 }
 
-std::unique_ptr<Leaving> Client::stop() {
+std::unique_ptr<GracefulClose> Client::stop() {
     if (!std::exchange(state_->running, false)) return nullptr;
     state_->alarm->cancel();
     state_->dialling.cancel();
-    std::unique_ptr<Leaving> leaving;
+    std::unique_ptr<GracefulClose> leaving;
     if (std::exchange(state_->connected, false) && state_->connection) {
         state_->connection->publish(state_->publisher.farewell(rt::wall_now()));
         state_->connection->disconnect();
-        leaving = std::make_unique<Leaving>(state_->executor, state_->descriptor->release(),
-                                            state_->clock, std::move(state_->connection),
-                                            state_->settings.disconnect_timeout);
+        leaving = std::make_unique<GracefulClose>(state_->executor, state_->descriptor->release(),
+                                                  state_->clock, std::move(state_->connection),
+                                                  state_->settings.disconnect_timeout);
     }
     state_->descriptor.reset();
     state_->connection.reset();

@@ -6,7 +6,7 @@
 namespace panelgate::mqtt {
 
 /// The JSON format: one retained topic per point, TOPIC/STATION/POINT. See deploy/operations.md.
-class JsonTopics final : public Wording {
+class JsonTopics final : public MessageFormat {
   public:
     /// The subjects must outlive it.
     JsonTopics(const Settings& settings, const Subjects& subjects)

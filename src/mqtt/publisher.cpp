@@ -15,7 +15,8 @@ namespace {
 constexpr std::uint64_t kFirstCleared = std::uint64_t{1} << 63;
 constexpr std::uint64_t kFirstResult = std::uint64_t{1} << 62;
 
-std::unique_ptr<Wording> make_wording(const Settings& settings, const Subjects& subjects) {
+std::unique_ptr<MessageFormat> make_message_format(const Settings& settings,
+                                                   const Subjects& subjects) {
     if (settings.format == Format::sparkplug)
         return std::make_unique<Sparkplug>(settings, subjects);
     return std::make_unique<JsonTopics>(settings, subjects);
@@ -26,7 +27,7 @@ std::unique_ptr<Wording> make_wording(const Settings& settings, const Subjects& 
 Publisher::Publisher(const Settings& settings, Subjects subjects)
     : settings_(settings),
       subjects_(std::make_unique<const Subjects>(std::move(subjects))),
-      wording_(make_wording(settings_, *subjects_)),
+      format_(make_message_format(settings_, *subjects_)),
       states_(subjects_->size()),
       store_(settings.store),
       results_(kFirstResult),
@@ -49,12 +50,12 @@ void Publisher::take_over(const Publisher& before) {
 
 /// Clears all topics of the previous publisher; earlier ones up to the store's limit.
 void Publisher::clear_stale_topics(const Publisher& before) {
-    const std::vector<std::string> told = before.wording_->retained();
+    const std::vector<std::string> told = before.format_->retained();
     std::set<std::string> went(told.begin(), told.end());
     const std::size_t most = went.size() + settings_.store;
     for (const auto& [number, message] : before.cleared_.messages())
         if (went.size() < most) went.insert(message.topic);
-    for (const std::string& topic : wording_->retained()) went.erase(topic);
+    for (const std::string& topic : format_->retained()) went.erase(topic);
     for (const std::string& topic : went) cleared_.add({topic, "", 1, true});
 }
 
@@ -75,7 +76,7 @@ void Publisher::repeat(std::size_t subject) {
 }
 
 void Publisher::answer(const WriteResult& result, bool refused) {
-    auto message = wording_->result(result);
+    auto message = format_->result(result);
     if (!message) return;
     const std::size_t kept = refused ? std::min(settings_.writes, settings_.results) : 0;
     if (results_.size() + kept >= settings_.results) {
@@ -100,7 +101,7 @@ void Publisher::disconnected() {
 }
 
 void Publisher::rebirth() {
-    if (before_ < wording_->steps_before()) {
+    if (before_ < format_->steps_before()) {
         again_ = before_ > 0;
     } else {
         before_ = 0;
@@ -114,17 +115,17 @@ void Publisher::delivered(std::uint64_t change) {
 }
 
 std::optional<Message> Publisher::next_before(WallTime now) {
-    while (before_ < wording_->steps_before()) {
-        auto message = wording_->before(before_++, states_, store_.next_number(), now);
-        if (before_ == wording_->steps_before() && std::exchange(again_, false)) before_ = 0;
+    while (before_ < format_->steps_before()) {
+        auto message = format_->before(before_++, states_, store_.next_number(), now);
+        if (before_ == format_->steps_before() && std::exchange(again_, false)) before_ = 0;
         if (message) return message;
     }
     return std::nullopt;
 }
 
 std::optional<Message> Publisher::next_behind() {
-    while (behind_ < wording_->steps_behind()) {
-        auto message = wording_->behind(behind_++, states_);
+    while (behind_ < format_->steps_behind()) {
+        auto message = format_->behind(behind_++, states_);
         if (message) return message;
     }
     return std::nullopt;
@@ -135,7 +136,7 @@ std::optional<Publisher::Outgoing> Publisher::next(WallTime now) {
     if (auto message = next_before(now)) return Outgoing{std::move(*message)};
     if (auto cleared = cleared_.next()) return Outgoing{std::move(cleared->second), cleared->first};
     while (const Change* change = store_.next()) {
-        auto message = wording_->change(*change, states_, store_.next_number(), now);
+        auto message = format_->change(*change, states_, store_.next_number(), now);
         if (!message) {
             store_.skip();
             continue;

@@ -10,7 +10,7 @@ namespace panelgate::mqtt {
 
 /// Sparkplug B (Sparkplug 3.0): the gateway is an edge node, each station with points a device, a
 /// subject's number its alias.
-class Sparkplug final : public Wording {
+class Sparkplug final : public MessageFormat {
   public:
     /// The subjects must outlive it.
     Sparkplug(const Settings& settings, const Subjects& subjects);

@@ -217,7 +217,8 @@ void log_about(std::string_view subject, LogLevel level, std::string_view event,
                          LogThrottle::kIncidents);
 }
 
-void log_deed(std::string_view event, std::string_view subject, std::span<const LogField> fields) {
+void log_collapsed(std::string_view event, std::string_view subject,
+                   std::span<const LogField> fields) {
     if (!log_enabled(LogLevel::info)) return;
     write_throttled_line(LogLevel::info, event, subject, fields, LogThrottle::kActions);
 }

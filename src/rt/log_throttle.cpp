@@ -213,7 +213,7 @@ std::vector<LogThrottle::Held> LogThrottle::take_kept(TimePoint now) {
     std::vector<Held> all;
     for (auto& [key, seen] : seen_) {
         if (!seen.held || now - seen.last < seen.interval) continue;
-        if (may_be_told(now, key, seen)) {
+        if (may_be_logged(now, key, seen)) {
             all.push_back({seen.level, std::move(*seen.held), seen.left_out - 1});
             seen.last = now;
         }
@@ -224,7 +224,7 @@ std::vector<LogThrottle::Held> LogThrottle::take_kept(TimePoint now) {
 }
 
 /// Of any number of subjects, kept lines would fill the log, too.
-bool LogThrottle::may_be_told(TimePoint now, const std::string& key, const Seen& seen) {
+bool LogThrottle::may_be_logged(TimePoint now, const std::string& key, const Seen& seen) {
     if (seen.client.empty()) return true;
     Budget& all = all_clients(now, event_in(key));
     if (all.take()) return true;

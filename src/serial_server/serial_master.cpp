@@ -68,8 +68,8 @@ class SerialMaster::Core final : public line::Line::Events,
 
   private:
     using Pdu = std::optional<Bytes>;
-    Pdu told(std::uint8_t function, modbus::ExceptionCode code) const;
-    Pdu told(std::uint8_t function, Result<Bytes> pdu) const;
+    Pdu reply_of(std::uint8_t function, modbus::ExceptionCode code) const;
+    Pdu reply_of(std::uint8_t function, Result<Bytes> pdu) const;
     void refuse(const Ask& ask, const tcp_server::Refuse& refusal);
     void forward(const Ask& ask, tcp_server::Forward forwarding);
     void broadcast(const tcp_server::Broadcast& all);
@@ -130,7 +130,7 @@ void SerialMaster::Core::act(const ForwardBroadcast& spread) {
     const auto* refusal = std::get_if<tcp_server::Refuse>(&decision);
     if (refusal == nullptr) return;
     for (const tcp_server::Target& target : refusal->asked)
-        broadcast_caller_.tell_refused(target.bus, target.station, spread.adu.pdu);
+        broadcast_caller_.count_refused(target.bus, target.station, spread.adu.pdu);
 }
 
 void SerialMaster::Core::broadcast(const tcp_server::Broadcast& all) {
@@ -146,34 +146,34 @@ void SerialMaster::Core::broadcast(const tcp_server::Broadcast& all) {
 
 void SerialMaster::Core::refuse(const Ask& ask, const tcp_server::Refuse& refusal) {
     for (const tcp_server::Target& target : refusal.asked)
-        request_caller_.tell_refused(target.bus, target.station, ask.adu.pdu);
-    conversation_.on_answer(clock_.now(), ask.ticket, told(ask.adu.pdu[0], refusal.code));
+        request_caller_.count_refused(target.bus, target.station, ask.adu.pdu);
+    conversation_.on_answer(clock_.now(), ask.ticket, reply_of(ask.adu.pdu[0], refusal.code));
 }
 
 void SerialMaster::Core::forward(const Ask& ask, tcp_server::Forward forwarding) {
-    request_caller_.transact(forwarding.target.bus, forwarding.target.station,
-                             std::move(forwarding.request),
-                             [weak = weak_from_this(), ticket = ask.ticket,
-                              function = ask.adu.pdu[0]](bus::Answer answer) {
-                                 const auto self = weak.lock();
-                                 if (!self || self->stopped_) return;
-                                 self->drive_.tell([&](TimePoint now) {
-                                     self->conversation_.on_answer(
-                                         now, ticket, self->told(function, std::move(answer.pdu)));
-                                 });
-                             });
+    request_caller_.transact(
+        forwarding.target.bus, forwarding.target.station, std::move(forwarding.request),
+        [weak = weak_from_this(), ticket = ask.ticket,
+         function = ask.adu.pdu[0]](bus::Answer answer) {
+            const auto self = weak.lock();
+            if (!self || self->stopped_) return;
+            self->drive_.tell([&](TimePoint now) {
+                self->conversation_.on_answer(now, ticket,
+                                              self->reply_of(function, std::move(answer.pdu)));
+            });
+        });
 }
 
-auto SerialMaster::Core::told(std::uint8_t function, modbus::ExceptionCode code) const -> Pdu {
+auto SerialMaster::Core::reply_of(std::uint8_t function, modbus::ExceptionCode code) const -> Pdu {
     if (settings_.on_failure == OnFailure::silence && is_failure(code)) return std::nullopt;
     return modbus::encode_exception(function, code);
 }
 
 /// Passes a panel's reply unchanged, including its exceptions.
-auto SerialMaster::Core::told(std::uint8_t function, Result<Bytes> pdu) const -> Pdu {
-    if (!pdu) return told(function, modbus::to_exception(pdu.error()));
+auto SerialMaster::Core::reply_of(std::uint8_t function, Result<Bytes> pdu) const -> Pdu {
+    if (!pdu) return reply_of(function, modbus::to_exception(pdu.error()));
     if (pdu->empty() || pdu->size() > modbus::kMaxPdu)
-        return told(function, modbus::to_exception(Fault::malformed));
+        return reply_of(function, modbus::to_exception(Fault::malformed));
     return std::move(*pdu);
 }
 

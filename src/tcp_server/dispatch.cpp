@@ -79,9 +79,9 @@ void Caller::transact(bus::RequestPort* bus, std::uint8_t station, modbus::Reque
         std::move(handler));
 }
 
-void Caller::tell_refused(bus::RequestPort* bus, std::uint8_t station, ByteView pdu) {
+void Caller::count_refused(bus::RequestPort* bus, std::uint8_t station, ByteView pdu) {
     use(bus);
-    bus->tell_refused(station, pdu, client_);
+    bus->count_refused(station, pdu, client_);
 }
 
 /// Names the client on the bus before its first request.
@@ -112,9 +112,8 @@ std::vector<Target> targets_of(std::uint8_t unit, const UnitMap& units) {
 
 /// Returns the targets that refuse every write; one refusal denies the whole broadcast.
 std::vector<Target> refusing(std::vector<Target> targets) {
-    std::erase_if(targets, [](const Target& target) {
-        return !target.bus->refusal_of_write(target.station);
-    });
+    std::erase_if(targets,
+                  [](const Target& target) { return !target.bus->write_refusal(target.station); });
     return targets;
 }
 

@@ -97,7 +97,7 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
     void admit(tcp::socket socket, const tcp::endpoint& peer);
     bool make_room(const tcp::endpoint& peer);
     void evict(std::size_t index, bool idle, const tcp::endpoint& peer);
-    void tell_refused(const tcp::endpoint& peer, const Place& place);
+    void count_refused(const tcp::endpoint& peer, const Place& place);
     void on_closed(const std::shared_ptr<Session>& session);
     void notify_when_empty();
 
@@ -162,7 +162,7 @@ bool Listener::Core::make_room(const tcp::endpoint& peer) {
     const Place place = find_place(guests, bus::host_of(peer.address().to_string()), limits);
     if (!place.found) {
         ++shared_->counters.refused;
-        tell_refused(peer, place);
+        count_refused(peer, place);
     } else if (place.taken_from) {
         evict(*place.taken_from, guests[*place.taken_from].idle, peer);
     }
@@ -183,7 +183,7 @@ void Listener::Core::evict(std::size_t index, bool idle, const tcp::endpoint& pe
 }
 
 /// Logs once until a connection closes.
-void Listener::Core::tell_refused(const tcp::endpoint& peer, const Place& place) {
+void Listener::Core::count_refused(const tcp::endpoint& peer, const Place& place) {
     if (std::exchange(full_, true)) return;
     const std::string key = place.share_used ? "max_connections_per_address" : "max_connections";
     shared_->log(rt::LogLevel::warn, "connections refused",

@@ -206,7 +206,7 @@ void Pipeline::serve(const modbus::Adu& adu) {
     std::visit(Overloaded{
                    [&](const Refuse& refusal) {
                        for (const Target& target : refusal.asked)
-                           caller_.tell_refused(target.bus, target.station, adu.pdu);
+                           caller_.count_refused(target.bus, target.station, adu.pdu);
                        answer(adu, [function = adu.pdu[0], code = refusal.code] {
                            return modbus::encode_exception(function, code);
                        });

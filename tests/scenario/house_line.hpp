@@ -26,7 +26,7 @@ class HouseLine final : public line::Line {
     void poll_input() override {
         if (!deaf) read();
     }
-    void hold_input(bool hold) override {
+    void defer_input(bool hold) override {
         held_ = hold;
         if (!hold && !device_.empty()) wake();
     }

@@ -38,7 +38,7 @@ class FakeBus : public bus::BusClient {
         }
     }
 
-    void tell_refused(std::uint8_t, ByteView, bus::ClientId) override { ++told_refused; }
+    void count_refused(std::uint8_t, ByteView, bus::ClientId) override { ++told_refused; }
 
     void cancel(bus::ClientId client) override {
         cancelled.push_back(client);
@@ -64,7 +64,7 @@ class FakeBus : public bus::BusClient {
         const auto found = stations.find(station);
         return found == stations.end() ? bus::StationStatus{} : found->second;
     }
-    std::optional<bus::Refusal> refusal_of_write(std::uint8_t station) const override {
+    std::optional<bus::Refusal> write_refusal(std::uint8_t station) const override {
         return rights.judge_write(station);
     }
     bus::TracePart trace(std::size_t most) const override {

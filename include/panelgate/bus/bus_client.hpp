@@ -172,13 +172,13 @@ class RequestPort {
     virtual void transact(Request request, AnswerHandler handler) = 0;
     /// Returns why transact() would refuse every write to this station (0: every broadcast), if so.
     /// For callers that must know before the write is complete, or before they ask other lines.
-    virtual std::optional<Refusal> refusal_of_write(std::uint8_t station) const {
+    virtual std::optional<Refusal> write_refusal(std::uint8_t station) const {
         static_cast<void>(station);
         return std::nullopt;
     }
     /// Counts (and logs, if it is a write) a request that the caller refused before submitting it:
     /// a PDU that contradicts its function, or a write on a read-only listener.
-    virtual void tell_refused(std::uint8_t station, ByteView pdu, ClientId client) {
+    virtual void count_refused(std::uint8_t station, ByteView pdu, ClientId client) {
         static_cast<void>(station);
         static_cast<void>(pdu);
         static_cast<void>(client);

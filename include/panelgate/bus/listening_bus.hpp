@@ -32,11 +32,11 @@ class ListeningBus final : public LineBus {
                std::shared_ptr<void> far_end) override;
 
     void transact(Request request, AnswerHandler handler) override;
-    void tell_refused(std::uint8_t station, ByteView pdu, ClientId client) override;
+    void count_refused(std::uint8_t station, ByteView pdu, ClientId client) override;
     void cancel(ClientId client) override;
     LineStatus status() const override;
     StationStatus station_status(std::uint8_t station) const override;
-    std::optional<Refusal> refusal_of_write(std::uint8_t station) const override;
+    std::optional<Refusal> write_refusal(std::uint8_t station) const override;
     TracePart trace(std::size_t last) const override;
     TracePart trace_since(std::uint64_t sequence, std::size_t most) const override;
     std::vector<IncidentHead> incidents() const override;

@@ -35,9 +35,9 @@ class Line {
     virtual void stop() = 0;
     /// Passes all bytes received so far to on_bytes(), now.
     virtual void poll_input() = 0;
-    /// Defers input until poll_input() or hold_input(false): it causes no wake-up. A line that
+    /// Defers input until poll_input() or defer_input(false): it causes no wake-up. A line that
     /// cannot defer its input delivers it as usual.
-    virtual void hold_input(bool hold) { static_cast<void>(hold); }
+    virtual void defer_input(bool hold) { static_cast<void>(hold); }
     /// Sends in one piece, without blocking. On failure the line goes down (on_down).
     virtual void write(ByteView bytes) = 0;
     virtual const Counters& counters() = 0;
@@ -98,7 +98,7 @@ class Drive {
     }
     /// Cancels the alarm, until the next call.
     void rest() {
-        line_->hold_input(false);
+        line_->defer_input(false);
         silence();
     }
 
@@ -128,7 +128,7 @@ class Drive {
                 next = busy;
                 sharp = false;
             }
-            line_->hold_input(hold);
+            line_->defer_input(hold);
         }
         if (next == armed_) return;
         if (!next) return silence();

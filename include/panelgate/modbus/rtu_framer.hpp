@@ -136,7 +136,7 @@ class ReplyFramer {
 };
 
 /// Classifies one frame whose end is known; `good` if it is valid.
-Unused told_part(ByteView bytes, std::uint8_t own_station, bool good);
+Unused classify_frame(ByteView bytes, std::uint8_t own_station, bool good);
 
 /// Splits bytes into valid frames (any station) and the rest, for counters: linear time.
 std::vector<Unused> classify_heard(ByteView bytes, std::uint8_t own_station,

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "panelgate/base/time.hpp"
-#include "panelgate/mqtt/publisher.hpp"
 #include "panelgate/mqtt/counters.hpp"
+#include "panelgate/mqtt/publisher.hpp"
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/rt/clock.hpp"
 
@@ -18,15 +18,15 @@ class Connection;
 /// Closes a connection gracefully: sends what is queued, then keeps the socket until the broker has
 /// closed it. Closing a socket the broker still writes to would reset the connection and lose what
 /// the broker has not read yet, including the farewell.
-class Leaving {
+class GracefulClose {
   public:
     /// Owns the socket; closes it after `within` at the latest. The clock must outlive this.
-    Leaving(boost::asio::any_io_executor executor, int socket, rt::Clock& clock,
-            std::shared_ptr<Connection> connection, Duration within);
+    GracefulClose(boost::asio::any_io_executor executor, int socket, rt::Clock& clock,
+                  std::shared_ptr<Connection> connection, Duration within);
     /// Closes it.
-    ~Leaving();
-    Leaving(const Leaving&) = delete;
-    Leaving& operator=(const Leaving&) = delete;
+    ~GracefulClose();
+    GracefulClose(const GracefulClose&) = delete;
+    GracefulClose& operator=(const GracefulClose&) = delete;
 
     bool done() const;
 
@@ -52,7 +52,7 @@ class Client {
     void start();
     /// Disconnects from the broker; the returned object keeps the connection until that is done.
     /// Null if not connected.
-    std::unique_ptr<Leaving> stop();
+    std::unique_ptr<GracefulClose> stop();
     /// Must be called when the publisher has new messages.
     void wake();
 

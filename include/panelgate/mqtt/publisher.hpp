@@ -80,8 +80,8 @@ class Publisher {
     std::uint64_t results_dropped() const { return results_dropped_; }
 
     /// Returns the will for a new connection.
-    Message will() { return wording_->will(); }
-    std::vector<std::string> subscriptions() const { return wording_->subscriptions(); }
+    Message will() { return format_->will(); }
+    std::vector<std::string> subscriptions() const { return format_->subscriptions(); }
     /// The connection is up: everything is published.
     void connected();
     /// The connection is lost: unacknowledged messages are sent again.
@@ -89,7 +89,7 @@ class Publisher {
     /// A host requested a rebirth: everything is published again; if a birth is under way, after
     /// it.
     void rebirth();
-    Message farewell(WallTime now) { return wording_->farewell(now); }
+    Message farewell(WallTime now) { return format_->farewell(now); }
 
     struct Outgoing {
         Message message;
@@ -102,9 +102,9 @@ class Publisher {
 
     std::vector<Command> commands(std::string_view topic, std::string_view payload,
                                   bool retained) const {
-        return wording_->commands(topic, payload, retained);
+        return format_->commands(topic, payload, retained);
     }
-    std::string topic_of(std::size_t point) const { return wording_->topic_of(point); }
+    std::string topic_of(std::size_t point) const { return format_->topic_of(point); }
 
     const Store& store() const { return store_; }
 
@@ -114,8 +114,8 @@ class Publisher {
     void clear_stale_topics(const Publisher& before);
 
     Settings settings_;
-    std::unique_ptr<const Subjects> subjects_;  ///< referenced by wording_
-    std::unique_ptr<Wording> wording_;
+    std::unique_ptr<const Subjects> subjects_;  ///< referenced by format_
+    std::unique_ptr<MessageFormat> format_;
     States states_;
     Store store_;
     Kept results_;

@@ -152,9 +152,9 @@ struct WriteResult {
 
 /// The message format of subjects and states. Pure except for its record of births and sequence
 /// numbers. Messages must be sent in the order in which they were made.
-class Wording {
+class MessageFormat {
   public:
-    virtual ~Wording() = default;
+    virtual ~MessageFormat() = default;
 
     /// Returns the last will for a new connection.
     virtual Message will() = 0;

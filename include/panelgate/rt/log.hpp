@@ -47,7 +47,8 @@ void log_about(std::string_view subject, LogLevel level, std::string_view event,
                std::initializer_list<LogField> fields);
 /// Logs at info what should be in the log nearly every time: 30 lines of one subject at once, then
 /// one a minute; the last one always.
-void log_deed(std::string_view event, std::string_view subject, std::span<const LogField> fields);
+void log_collapsed(std::string_view event, std::string_view subject,
+                   std::span<const LogField> fields);
 /// Logs at info what must be in the log every time (LogRepeats): a line each, except that
 /// consecutive lines at `place` with the same `what` become one line with their number, first and
 /// last time.

@@ -146,7 +146,7 @@ class LogThrottle {
     Seen& new_subject(TimePoint now, std::string key, const Pace& pace, std::string_view client);
     void make_room(TimePoint now);
     bool is_within_budget(TimePoint now, std::string_view event, std::string_view client);
-    bool may_be_told(TimePoint now, const std::string& key, const Seen& seen);
+    bool may_be_logged(TimePoint now, const std::string& key, const Seen& seen);
     static Budget& budget(Budgets& budgets, TimePoint now, std::string_view event,
                           std::string_view client, const Pace& pace);
     Budget& all_clients(TimePoint now, std::string_view event);

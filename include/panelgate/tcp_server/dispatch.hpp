@@ -75,7 +75,7 @@ class Caller {
     void transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,
                   bus::AnswerHandler handler);
     /// Makes the bus count a request refused before it reached the bus.
-    void tell_refused(bus::RequestPort* bus, std::uint8_t station, ByteView pdu);
+    void count_refused(bus::RequestPort* bus, std::uint8_t station, ByteView pdu);
     /// Cancels its requests still queued on the buses (answered Fault::cancelled). Further requests
     /// are allowed.
     void withdraw();

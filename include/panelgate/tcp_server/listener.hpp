@@ -34,8 +34,8 @@ class Listener {
     /// failure.
     void start();
     /// Applies new settings from the next request on; closes connections no longer allowed.
-    /// Requires settings.is_same_door(). Throws like the constructor, and then leaves everything
-    /// unchanged.
+    /// Requires settings.is_same_listener(). Throws like the constructor, and then leaves
+    /// everything unchanged.
     void apply(Settings settings, UnitMap units);
     /// Returns the bound port; 0 before start().
     std::uint16_t port() const;

@@ -76,7 +76,7 @@ struct Settings {
 
     std::string name() const { return endpoint_text(address, port); }
     /// True if `other` differs only in what can change without reopening the listener.
-    bool is_same_door(const Settings& other) const {
+    bool is_same_listener(const Settings& other) const {
         return address == other.address && port == other.port && ipv6_only == other.ipv6_only &&
                framing == other.framing && ascii_digits == other.ascii_digits && udp == other.udp;
     }

@@ -187,7 +187,7 @@ Parsed<Wanted> wanted_of(std::string_view text) {
 std::optional<Problem> barred(const LineEntry& line, const DiscoverySource& source) {
     const bus::LineStatus status = line.bus->status();
     // A listening line's refusal of a write names the reason: another master.
-    if (const auto refusal = line.bus->refusal_of_write(0); status.listens && refusal)
+    if (const auto refusal = line.bus->write_refusal(0); status.listens && refusal)
         return problem_of(*refusal);
     if (source.report(line.name).state == DiscoveryReport::State::running)
         return problem(409, "stations are being looked for on line '" + line.name + "' already");

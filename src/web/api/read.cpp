@@ -18,10 +18,10 @@ namespace {
 
 Handling read_items(HttpRequest request, Parsed<Items> items, const Api* api) {
     if (!items) co_return to_response(items.error());
-    auto wording = wording_of(request);
-    if (!wording) co_return to_response(wording.error());
-    wording->count = items->span.count;
-    const auto view = prepare_read(*items, *wording, api->providers.settings.max_transactions);
+    auto format = format_of(request);
+    if (!format) co_return to_response(format.error());
+    format->count = items->span.count;
+    const auto view = prepare_read(*items, *format, api->providers.settings.max_transactions);
     if (!view) co_return to_response(view.error());
     const Duration deadline = api->directory->line_of(items->station).deadline;
     const Patience patience(request, deadline, api->providers.now);
@@ -68,13 +68,13 @@ Parsed<BatchRead> read_of(const json::object& entry, const Api& api) {
     const auto known = check_members(entry, kOfPoints, kOfItems);
     if (!known) return known.error();
     if (names_point(entry)) return point_read(entry, *api.directory);
-    const auto wording = wording_of(entry);
-    if (!wording) return wording.error();
+    const auto format = format_of(entry);
+    if (!format) return format.error();
     auto items = item_of(entry, *api.directory);
     if (!items) return items.error();
     BatchRead read;
     read.items = std::move(*items);
-    auto view = prepare_read(read.items, *wording, api.providers.settings.max_transactions);
+    auto view = prepare_read(read.items, *format, api.providers.settings.max_transactions);
     if (!view) return view.error();
     read.view = std::move(*view);
     return read;

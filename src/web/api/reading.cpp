@@ -108,11 +108,11 @@ Parsed<Word> word_of(const char* what, const std::string& text, const Word (&all
         400, "there is no " + std::string(what) + " '" + excerpt(text) + "'; there are " + known);
 }
 
-Parsed<points::Type> type_of(const Wording& wording, bool bits) {
-    if (!wording.type) return bits ? points::Type::boolean : points::Type::u16;
-    const auto type = word_of("type", *wording.type, points::kTypes);
+Parsed<points::Type> type_of(const ValueFormat& format, bool bits) {
+    if (!format.type) return bits ? points::Type::boolean : points::Type::u16;
+    const auto type = word_of("type", *format.type, points::kTypes);
     if (type && bits && *type != points::Type::boolean)
-        return problem(400, "the type of a bit is bool, not " + *wording.type);
+        return problem(400, "the type of a bit is bool, not " + *format.type);
     return type;
 }
 
@@ -132,65 +132,65 @@ Parsed<std::optional<std::string>> text_member(const json::object& entry, std::s
 
 }  // namespace
 
-Parsed<Wording> wording_of(const HttpRequest& request) {
-    Wording wording;
-    wording.type = query(request, "type");
-    wording.order = query(request, "order");
+Parsed<ValueFormat> format_of(const HttpRequest& request) {
+    ValueFormat format;
+    format.type = query(request, "type");
+    format.order = query(request, "order");
     if (query(request, "length")) {
         const auto length = query_number(request, "length", 1, kMaxText, 1);
         if (!length) return length.error();
-        wording.length = *length;
+        format.length = *length;
     }
     const auto raw = query_flag(request, "raw");
     if (!raw) return raw.error();
-    wording.raw = *raw;
-    return wording;
+    format.raw = *raw;
+    return format;
 }
 
-Parsed<Wording> wording_of(const json::object& entry) {
-    Wording wording;
+Parsed<ValueFormat> format_of(const json::object& entry) {
+    ValueFormat format;
     auto type = text_member(entry, "type");
     if (!type) return type.error();
-    wording.type = std::move(*type);
+    format.type = std::move(*type);
     auto order = text_member(entry, "order");
     if (!order) return order.error();
-    wording.order = std::move(*order);
+    format.order = std::move(*order);
     const auto length = count_member(entry, "length", kMaxText);
     if (!length) return length.error();
-    if (entry.contains("length")) wording.length = *length;
+    if (entry.contains("length")) format.length = *length;
     const auto count = count_member(entry, "count", modbus::kTableItems);
     if (!count) return count.error();
-    wording.count = *count;
+    format.count = *count;
     const auto raw = flag_member(entry, "raw");
     if (!raw) return raw.error();
-    wording.raw = *raw;
-    return wording;
+    format.raw = *raw;
+    return format;
 }
 
-Parsed<View> view_of(const Wording& wording, modbus::Table table) {
+Parsed<View> view_of(const ValueFormat& format, modbus::Table table) {
     View view;
     const bool bits = modbus::is_bit_table(table);
-    view.raw = wording.raw;
+    view.raw = format.raw;
     view.value.table = table;
-    const auto type = type_of(wording, bits);
+    const auto type = type_of(format, bits);
     if (!type) return type.error();
     view.value.type = *type;
-    if (wording.order) {
+    if (format.order) {
         if (bits) return problem(400, "a bit has no order");
-        const auto order = word_of("order", *wording.order, points::kOrders);
+        const auto order = word_of("order", *format.order, points::kOrders);
         if (!order) return order.error();
         view.value.word_order = *order;
     }
     const bool text = *type == points::Type::string;
-    if (wording.length && !text) return problem(400, "only a string has a length");
-    if (text && !wording.length) {
+    if (format.length && !text) return problem(400, "only a string has a length");
+    if (text && !format.length) {
         // One string over all registers.
-        view.value.length = 2 * wording.count;
-        view.items = wording.count;
+        view.value.length = 2 * format.count;
+        view.items = format.count;
         return view;
     }
-    view.value.length = wording.length.value_or(0);
-    view.items = wording.count * view.value.count();
+    view.value.length = format.length.value_or(0);
+    view.items = format.count * view.value.count();
     return view;
 }
 
@@ -253,8 +253,8 @@ boost::asio::awaitable<Parsed<Reading>> read_all(std::shared_ptr<Caller> caller,
     co_return reading;
 }
 
-Parsed<View> prepare_read(Items& items, const Wording& wording, unsigned max_transactions) {
-    auto view = view_of(wording, items.span.table);
+Parsed<View> prepare_read(Items& items, const ValueFormat& format, unsigned max_transactions) {
+    auto view = view_of(format, items.span.table);
     if (!view) return view;
     items.span.count = view->items;
     if (items.area != nullptr) {

@@ -37,7 +37,7 @@ boost::asio::awaitable<bus::Answer> ask(std::shared_ptr<Caller> caller, bus::Req
 void introduce(Caller& caller, bus::RequestPort* bus);
 
 /// How a client wants values rendered, as given: from queries, or from the members of a list entry.
-struct Wording {
+struct ValueFormat {
     std::optional<std::string> type;   ///< a point's type
     std::optional<std::string> order;  ///< ABCD…
     std::optional<unsigned> length;    ///< characters of a string
@@ -47,9 +47,9 @@ struct Wording {
 inline constexpr unsigned kMaxText = 240;  ///< characters of a string
 
 /// Reads the queries type, order, length and raw.
-Parsed<Wording> wording_of(const HttpRequest& request);
+Parsed<ValueFormat> format_of(const HttpRequest& request);
 /// Reads the members of these names, and count.
-Parsed<Wording> wording_of(const boost::json::object& entry);
+Parsed<ValueFormat> format_of(const boost::json::object& entry);
 
 /// How the items of a read are interpreted, checked against their table.
 struct View {
@@ -58,7 +58,7 @@ struct View {
     bool raw = false;     ///< show the raw items, too
 };
 /// 400 for a type or an order that is unknown or not possible for a table of bits.
-Parsed<View> view_of(const Wording& wording, modbus::Table table);
+Parsed<View> view_of(const ValueFormat& format, modbus::Table table);
 
 /// The values in these items (bits as 0 and 1); null for an item range that has no value.
 boost::json::array values_of(const View& view, std::span<const std::uint16_t> items);
@@ -82,7 +82,7 @@ boost::asio::awaitable<Parsed<Reading>> read_all(std::shared_ptr<Caller> caller,
 
 /// Completes the items of a read: their count, and a table that the panel can read. Returns how to
 /// render them; 400 or 422 for an impossible read.
-Parsed<View> prepare_read(Items& items, const Wording& wording, unsigned max_transactions);
+Parsed<View> prepare_read(Items& items, const ValueFormat& format, unsigned max_transactions);
 
 /// {"station","table","address","notation","values",["raw"],"age_ms","source",["transactions"]}
 boost::json::object describe(const Items& items, const View& view, const Reading& reading);

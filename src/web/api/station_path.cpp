@@ -188,7 +188,7 @@ Problem ruled_out(bus::Rule rule, std::string detail) {
 }
 
 Parsed<void> check_may_write(const bus::RequestPort& bus, std::uint8_t station) {
-    if (const auto refusal = bus.refusal_of_write(station)) return problem_of(*refusal);
+    if (const auto refusal = bus.write_refusal(station)) return problem_of(*refusal);
     return {};
 }
 

@@ -247,13 +247,13 @@ Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& li
 
 /// Reports a request that is invalid or refused before the bus is asked: the bus counts and logs
 /// it.
-void tell_refused(Caller& caller, bus::RequestPort& bus, const json::object& body) {
+void count_refused(Caller& caller, bus::RequestPort& bus, const json::object& body) {
     const auto station = number_member(body, "station", 0, modbus::kMaxStation);
     const auto hex = string_member(body, "pdu");
     const auto pdu = hex ? from_hex(*hex) : std::nullopt;
     if (!station || !pdu || pdu->empty() || pdu->size() > modbus::kMaxPdu) return;
     introduce(caller, &bus);
-    bus.tell_refused(static_cast<std::uint8_t>(*station), *pdu, caller.id());
+    bus.count_refused(static_cast<std::uint8_t>(*station), *pdu, caller.id());
 }
 
 /// A panel's exception reply is a normal answer here.
@@ -274,7 +274,7 @@ Handling post_raw(HttpRequest request, const Api* api) {
     if (!body) co_return to_response(body.error());
     auto planned = raw_request(*api->directory, **line, *body);
     if (!planned) {
-        tell_refused(*request.caller, *(*line)->bus, *body);
+        count_refused(*request.caller, *(*line)->bus, *body);
         co_return to_response(planned.error());
     }
     bus::Request made = std::move(*planned);

@@ -186,9 +186,9 @@ std::string place_in(const json::object& body, std::size_t index) {
 /// Encodes typed values ("f32", "i32", ...) as registers. A string takes `length` characters, or as
 /// many as it needs.
 Parsed<std::vector<std::uint16_t>> typed_cells(const json::object& body, modbus::Table table) {
-    const auto wording = wording_of(body);
-    if (!wording) return wording.error();
-    auto view = view_of(*wording, table);
+    const auto format = format_of(body);
+    if (!format) return format.error();
+    auto view = view_of(*format, table);
     if (!view) return view.error();
     const auto values = values_member(body);
     if (!values) return values.error();
@@ -198,7 +198,7 @@ Parsed<std::vector<std::uint16_t>> typed_cells(const json::object& body, modbus:
         if (!value) return value.error();
         view->value.name = place_in(body, i);
         const auto* text = std::get_if<std::string>(&*value);
-        if (text != nullptr && !wording->length)
+        if (text != nullptr && !format->length)
             view->value.length = static_cast<unsigned>(text->size() + text->size() % 2);
         const auto registers = points::encode(view->value, *value);
         if (!registers) return problem_of(registers.error(), "");

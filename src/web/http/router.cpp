@@ -209,7 +209,7 @@ void record_login(const HttpRequest& request, bool failed, Shared& shared) {
 }
 
 /// Logs a token with insufficient rights; unknown tokens are logged as failed logins.
-void tell_refused(const HttpRequest& request, const Problem& why) {
+void count_refused(const HttpRequest& request, const Problem& why) {
     if (why.status != 403) return;
     std::string path;
     for (const std::string& segment : request.path) path += '/' + segment;
@@ -265,7 +265,7 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     if (request.caller->has_left()) co_return HttpResponse();
     if (request.caller) request.caller->uses_token(token_name(request, site->settings));
     if (refused) {
-        tell_refused(request, *refused);
+        count_refused(request, *refused);
         co_return to_response(*refused);
     }
     // Probes are answered with any query.

@@ -75,8 +75,7 @@ TEST_F(ArbiterTest, ABroadcastIsAnsweredWhenItHasLeftAndTheLineRestsForTheTurnar
         Bytes confirmed;
     };
     const Row rows[] = {
-        {kWrite, kWrite},
-        {kToAll, kConfirmed},  // several items: address and quantity
+        {kWrite, kWrite}, {kToAll, kConfirmed},  // several items: address and quantity
     };
     for (const Row& row : rows) {
         BusScript script{settings};

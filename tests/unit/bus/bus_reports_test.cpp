@@ -58,9 +58,9 @@ TEST_F(BusReportsTest, P6TellsOfEveryWriteBeforeItsAnswer) {
 TEST_F(BusReportsTest, CountsAndLogsAWriteThatWasRefusedBeforeItWasARequest) {
     const rt::LogTap log;
     bus->name_client(1, "modbus_tcp 10.0.0.5:1");
-    bus->tell_refused(17, "06 00"_hex, 1);
-    bus->tell_refused(0, "05 00 01 FF 00"_hex, 1);
-    bus->tell_refused(17, "03 00"_hex, 1);
+    bus->count_refused(17, "06 00"_hex, 1);
+    bus->count_refused(0, "05 00 01 FF 00"_hex, 1);
+    bus->count_refused(17, "03 00"_hex, 1);
     ASSERT_EQ(log.lines().size(), 2u) << "nobody asks who has read what";
     EXPECT_EQ(log.lines()[0],
               "info write line=floor1 station=press client=\"modbus_tcp 10.0.0.5:1\" "
@@ -76,10 +76,10 @@ TEST_F(BusReportsTest, CountsAndLogsAWriteThatWasRefusedBeforeItWasARequest) {
 
 TEST_F(BusReportsTest, WhatIsNoFunctionIsNoWrite) {
     const rt::LogTap log;
-    bus->tell_refused(17, "00"_hex, 1);
-    bus->tell_refused(17, "83 02"_hex, 1);
+    bus->count_refused(17, "00"_hex, 1);
+    bus->count_refused(17, "83 02"_hex, 1);
     EXPECT_EQ(log.count("write"), 0u);
-    bus->tell_refused(17, "41 02"_hex, 1);
+    bus->count_refused(17, "41 02"_hex, 1);
     EXPECT_EQ(log.count("write"), 1u) << "nobody knows what it does";
 }
 

@@ -148,11 +148,11 @@ TEST_F(BusTest, WhatARightForbidsIsRefusedWhoeverAsks) {
 }
 
 TEST_F(BusTest, SaysEarlyWhatItWouldRefuse) {
-    EXPECT_EQ(bus->refusal_of_write(17), std::nullopt);
+    EXPECT_EQ(bus->write_refusal(17), std::nullopt);
     forbid_writes_to_press();
-    EXPECT_EQ(bus->refusal_of_write(17).value().rule, Rule::read_only);
-    EXPECT_EQ(bus->refusal_of_write(18), std::nullopt) << "its guard wants to see the write";
-    EXPECT_EQ(bus->refusal_of_write(0).value().station, "press");
+    EXPECT_EQ(bus->write_refusal(17).value().rule, Rule::read_only);
+    EXPECT_EQ(bus->write_refusal(18), std::nullopt) << "its guard wants to see the write";
+    EXPECT_EQ(bus->write_refusal(0).value().station, "press");
     EXPECT_TRUE(bus->idle());
 }
 

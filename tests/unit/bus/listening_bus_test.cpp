@@ -135,7 +135,7 @@ TEST_F(ListeningBusTest, RefusesEveryRequestAndSendsNothing) {
         EXPECT_FALSE(answer.transmitted);
         EXPECT_EQ(answer.refusal.value().rule, Rule::listening);
     }
-    EXPECT_EQ(bus->refusal_of_write(17).value().rule, Rule::listening);
+    EXPECT_EQ(bus->write_refusal(17).value().rule, Rule::listening);
     EXPECT_EQ(report_of("press").requests.at(6)[Outcome::refused], 1u);
     EXPECT_TRUE(line->written.empty());
 }

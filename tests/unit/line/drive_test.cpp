@@ -45,7 +45,7 @@ class DriveTest : public testing::Test, public Line {
             drive.hear([&](TimePoint) { event_trace += bytes; });
     }
     void write(ByteView) override {}
-    void hold_input(bool hold) override { held = hold; }
+    void defer_input(bool hold) override { held = hold; }
     const Counters& counters() override { return counters_; }
     /// An event without effect arms the alarm.
     void hear_nothing() {

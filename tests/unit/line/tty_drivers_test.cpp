@@ -253,27 +253,20 @@ TEST_F(TtyDrivers, P1OutputThatWasStoppedIsUndelivered) {
     ::close(user);
 }
 
-TEST_F(TtyDrivers, P1AQueueThatDoesNotEmptyIsUndelivered) {
-    report_queue();
-    start();
-    EXPECT_FALSE(line->undelivered());
-    const TimePoint begin = clock.now();
-    write(8);
-    queue = 8;
-    run_until([&] { return line->undelivered(); });
-    EXPECT_GE(clock.now() - begin, wire_time(settings.serial, 8));
-    EXPECT_THAT(heard.downs, IsEmpty());
-    write(8);
-    expect_reset("the device takes nothing");
-}
-
-TEST_F(TtyDrivers, P1WhatIsBeingSentIsNotUndelivered) {
+TEST_F(TtyDrivers, P1AQueueThatDoesNotEmptyIsUndeliveredWhenItsTimeIsOver) {
     report_queue();
     settings.serial.baud = 300;
     start();
-    write(256);  // it takes 8.5 s
+    EXPECT_FALSE(line->undelivered());
+    const TimePoint begin = clock.now();
+    write(256);
     queue = 256;
     EXPECT_FALSE(line->undelivered());
+    run_until([&] { return line->undelivered(); });
+    EXPECT_GE(clock.now() - begin, wire_time(settings.serial, 256));  // 8.5 s
+    EXPECT_THAT(heard.downs, IsEmpty());
+    write(8);
+    expect_reset("the device takes nothing");
 }
 
 TEST_F(TtyDrivers, P1AQueueThatEmptiesIsDelivered) {

@@ -10,6 +10,7 @@
 #include <initializer_list>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "panelgate/metrics/process.hpp"
@@ -78,18 +79,13 @@ void expect_samples(const Snapshot& snapshot, std::initializer_list<const char*>
 }
 
 TEST(Exposition, GivesTheCountersOfAStationExactly) {
-    expect_samples(filled(), {R"(requests_total{PRESS,function="3",outcome="ok"} 7)",
-                              "retries_total{PRESS} 3",
-                              "late_frames_total{PRESS} 4",
-                              "foreign_frames_total{PRESS} 5",
-                              "damaged_frames_total{PRESS} 6",
-                              "discarded_bytes_total{PRESS} 70",
-                              R"(exceptions_total{PRESS,code="129"} 9)",
-                              "station_up{PRESS} 1",
-                              "station_last_success_timestamp_seconds{PRESS} 1700000000.5",
-                              // series from the start, with 0
-                              R"(exceptions_total{OTHER,code="2"} 0)",
-                              "retries_total{OTHER} 0"});
+    expect_samples(
+        filled(), {R"(requests_total{PRESS,function="3",outcome="ok"} 7)", "retries_total{PRESS} 3",
+                   "late_frames_total{PRESS} 4", "foreign_frames_total{PRESS} 5",
+                   "damaged_frames_total{PRESS} 6", "discarded_bytes_total{PRESS} 70",
+                   R"(exceptions_total{PRESS,code="129"} 9)", "station_up{PRESS} 1",
+                   "station_last_success_timestamp_seconds{PRESS} 1700000000.5",
+                   R"(exceptions_total{OTHER,code="2"} 0)", "retries_total{OTHER} 0"});
 }
 
 TEST(Exposition, GivesTheFiguresOfLinesListenersAndTheBuild) {
@@ -123,19 +119,19 @@ TEST(Exposition, CountsHttpRepliesAndLoginFailures) {
     snapshot.http->login_failures = 3;
     expect_samples(snapshot, {R"(http_requests_total{code="200"} 17)",
                               R"(http_requests_total{code="421"} 2)", "login_failures_total 3"});
-    EXPECT_THAT(exposition(snapshot), HasSubstr("\n# TYPE panelgate_http_requests_total counter\n"));
+    EXPECT_THAT(exposition(snapshot),
+                HasSubstr("\n# TYPE panelgate_http_requests_total counter\n"));
 }
 
 TEST(Exposition, ShowsTheBrokerWhereThereIsOne) {
     Snapshot snapshot = filled();
     EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_mqtt")));
     snapshot.mqtt = {true, 5, 100, 7, 2, 3, 4, 1, 6};
-    expect_samples(snapshot,
-                   {"mqtt_connected 1", "mqtt_stored 5", "mqtt_published_total 100",
-                    "mqtt_dropped_total 7", "mqtt_results_dropped_total 6",
-                    "mqtt_reconnects_total 2", R"(mqtt_writes_total{outcome="ok"} 3)",
-                    R"(mqtt_writes_total{outcome="refused"} 4)",
-                    R"(mqtt_writes_total{outcome="failed"} 1)"});
+    expect_samples(snapshot, {"mqtt_connected 1", "mqtt_stored 5", "mqtt_published_total 100",
+                              "mqtt_dropped_total 7", "mqtt_results_dropped_total 6",
+                              "mqtt_reconnects_total 2", R"(mqtt_writes_total{outcome="ok"} 3)",
+                              R"(mqtt_writes_total{outcome="refused"} 4)",
+                              R"(mqtt_writes_total{outcome="failed"} 1)"});
 }
 
 /// Returns the station's series of requests_total.
@@ -152,7 +148,8 @@ TEST(Exposition, ShowsTheFunctionsOfAPanelWithZeroBeforeTheyAreUsed) {
     Snapshot snapshot = filled();
     auto& requests = snapshot.lines[0].stations[0].requests;
     requests.clear();
-    for (const std::uint8_t function : {1, 2, 3, 4, 5, 6, 15, 16}) requests[function];
+    constexpr std::uint8_t kAsked[] = {1, 2, 3, 4, 5, 6, 15, 16};
+    for (const std::uint8_t function : kAsked) requests[function];
     expect_samples(snapshot, {R"(requests_total{PRESS,function="16",outcome="ok"} 0)"});
     EXPECT_EQ(request_series(snapshot, "press"), 8u);
     EXPECT_EQ(request_series(snapshot, "other"), 0u) << "nobody knows what those are asked";

@@ -51,7 +51,7 @@ class ManualBus : public bus::BusClient {
     }
     bus::LineStatus status() const override { return line; }
     bus::StationStatus station_status(std::uint8_t) const override { return {}; }
-    std::optional<bus::Refusal> refusal_of_write(std::uint8_t station) const override {
+    std::optional<bus::Refusal> write_refusal(std::uint8_t station) const override {
         return rights.judge_write(station);
     }
     /// Makes this station read-only.
