@@ -31,15 +31,6 @@ serial_struct of_type(int type) {
     return info;
 }
 
-TEST(Driver, APseudoTerminalReportsNothing) {
-    ScriptedOps ops;
-    ops.give(TIOCOUTQ, 5);
-    const Driver driver = look_at_driver(kNoDevice, ops);
-    EXPECT_FALSE(driver.tells_queue);
-    EXPECT_FALSE(driver.tells_empty);
-    EXPECT_EQ(unsent_time(kNoDevice, driver, 1ms, ops), Duration::zero());
-}
-
 TEST(Driver, ARealUartReportsQueueAndShiftRegister) {
     ScriptedOps ops;
     ops.give(TIOCGSERIAL, of_type(PORT_16550A));

@@ -33,7 +33,7 @@ class TermiosSetup : public testing::Test {
             return 0;
         };
     }
-    SetUp set_up(const SerialFormat& format) { return set_up_tty(kNoDevice, format, ops); }
+    line::SetUp set_up(const SerialFormat& format) { return set_up_tty(kNoDevice, format, ops); }
     /// From now on the driver changes what it is set to.
     void change(const std::function<void()>& by) {
         ops.answers[TCSETS2] = [this, by](void* argument) {
@@ -95,7 +95,7 @@ TEST_F(TermiosSetup, ARateThatIsMoreThanTwoPercentOffIsAWarning) {
     };
     for (const auto& [asked, made, warning] : rows) {
         change([&, rate = made] { kept.c_ospeed = kept.c_ispeed = rate; });
-        const SetUp result = set_up({asked, 8, Parity::none, 1});
+        const line::SetUp result = set_up({asked, 8, Parity::none, 1});
         EXPECT_EQ(result.error, "");
         EXPECT_EQ(result.warning, warning);
     }
@@ -151,7 +151,7 @@ class Rs485SetUp : public testing::Test {
         settings.delay_before_send = 1ms;
         settings.delay_after_send = 2ms;
     }
-    SetUp set_up() { return set_up_rs485(kNoDevice, settings, ops); }
+    line::SetUp set_up() { return set_up_rs485(kNoDevice, settings, ops); }
 
     ScriptedOps ops;
     Rs485 settings;
@@ -172,7 +172,7 @@ TEST_F(Rs485SetUp, HandsTheDriverPolarityDelaysAndReceiving) {
     for (const Row& row : rows) {
         settings.rts_high_on_send = row.rts_high_on_send;
         settings.receive_during_send = row.receive_during_send;
-        const SetUp result = set_up();
+        const line::SetUp result = set_up();
         EXPECT_EQ(result.error, "");
         EXPECT_EQ(result.warning, "");
         EXPECT_EQ(kept.flags, row.flags);
@@ -199,7 +199,7 @@ TEST_F(Rs485SetUp, WhatTheDriverMadeDifferentIsAWarning) {
     ops.give(TIOCSRS485, made);
     EXPECT_EQ(set_up().warning, "the RS-485 mode cannot be read back");
     ops.give(TIOCGRS485, made);
-    const SetUp result = set_up();
+    const line::SetUp result = set_up();
     EXPECT_EQ(result.error, "");
     EXPECT_EQ(result.warning,
               "rts_on_send was not taken; receive_during_send was not taken; the driver made "

@@ -62,12 +62,9 @@ constexpr Duration kDelayedAck = 200ms;
 
 TEST(TcpDevice, IsAHostAndAPort) {
     const std::pair<const char*, const char*> hosts[] = {
-        {"moxa.local", "moxa.local"},
-        {"[::1]", "::1"},
-        {"[fe80::1%eth0]", "fe80::1%eth0"},
-        {"10.0.0.30", "10.0.0.30"},
-        {"1.plant.example", "1.plant.example"},
-        {"moxa-rack_2", "moxa-rack_2"},
+        {"moxa.local", "moxa.local"},           {"[::1]", "::1"},
+        {"[fe80::1%eth0]", "fe80::1%eth0"},     {"10.0.0.30", "10.0.0.30"},
+        {"1.plant.example", "1.plant.example"}, {"moxa-rack_2", "moxa-rack_2"},
     };
     for (const auto& [typed, host] : hosts) {
         const auto device = parse_tcp_device("tcp://" + std::string(typed) + ":4001");

@@ -3,7 +3,13 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <initializer_list>
 #include <string>
+#include <string_view>
+#include <utility>
+
+#include "hints.hpp"
 
 namespace panelgate::yaml::lint_test {
 namespace {
@@ -56,12 +62,59 @@ TEST(Lint, FindsNothingInGoodText) {
     }
 }
 
-TEST(Lint, AForgottenQuoteIsATrapWhereItOpens) {
-    EXPECT_EQ(traps("a: \"b\nc: d\n"), "1:4 ");
-    EXPECT_EQ(traps("a: \"b\nc: \"d\"\n"), "1:4 ");
-    EXPECT_EQ(traps("- {a: 1, b: 'c}\n- {a: 2, b: 'd'}\n"), "1:13 ");
-    EXPECT_EQ(traps("a:\n  b: 'c\n  d: e\nf: \"g\nh: i"), "2:6 4:4 ");
-    EXPECT_EQ(traps("a: \"b\n\n  c\""), "");
+using Row = std::pair<const char*, const char*>;  ///< a text, and where something is found
+
+/// What a parser accepts but users do not mean.
+constexpr Row kTraps[] = {
+    // a forgotten quote, where it opens
+    {"a: \"b\nc: d\n", "1:4 "},
+    {"a: \"b\nc: \"d\"\n", "1:4 "},
+    {"- {a: 1, b: 'c}\n- {a: 2, b: 'd'}\n", "1:13 "},
+    {"a:\n  b: 'c\n  d: e\nf: \"g\nh: i", "2:6 4:4 "},
+    {"a: \"b\n\n  c\"", ""},
+    // a dash of another program
+    {"a:\n  \u2013 b: 1\n    c: 2\n  \u2014 b: 2\n", "2:3 4:3 "},
+    {"a:\n  * b: 1\n    c: 2\n", "2:3 "},
+    {"a: x \u2013 y\nb: \u2013\nc: [\u2013 d]\n", ""},
+    // a quote of a word processor
+    {"a: \u201Cb\u201D\n\u2018c\u2019: 1\n", "1:4 2:1 "},
+    {"a: \u2019s b\nc: d \u201Ce\u201D\n", ""},
+    // a wrong blank, only where a blank is significant
+    {"\u00A0a: 1\n", "1:1 "},
+    {"a:\u00A01\n", "1:3 "},
+    {"a: 5\u00A0\u00B0C\nb: x:\u00A0y\n", ""},
+};
+
+/// Why a parser fails.
+constexpr Row kCauses[] = {
+    {"a:\n  \u2022 b: 1\n    c: 2\n", "2:3 "},
+    // a misplaced dash
+    {"a:\n   - b: 1\n    c: 2\n", "2:4 "},
+    {"a:\n - b: 1\n    c: 2\n    d: 3\n", "2:2 "},
+    {"a:\n  -  b: 1\n    c: 2\nd: 3\n", "2:3 "},
+    {"a:\n  - b: 1\n   c: 2\n    d: 3\n", "3:4 "},  // the others agree with it
+    {"a:\n  - b: 1\n   c: 2\n  - b: 2\n", "3:4 "},
+    {"a:\n  - b: 1\n     c: 2\n  - b: 2\n", "3:6 "},
+    // text copied from around a file
+    {"```yaml\na: 1\n```\n", "1:1 3:1 "},
+    {"$ cat a.yaml\na:\n  - b\n", "1:1 "},
+    {"a:\n&nbsp;&nbsp;b: 1\n", "2:1 "},
+    {"a:\n  -\tb: 1\n    c: 2\n", "2:4 "},
+    {"{\n  // a\n  a: 1\n}\n", "2:3 "},
+    // one for each line
+    {"a:b\nc: %\n  \td: e\n", "1:3 2:4 3:3 "},
+    // a bracket, where it opens
+    {"a: {b: 1\nc: [2\nd: 3\n", "1:4 2:4 "},
+    {"a: [{b: 1]\n", "1:5 "},
+    {"a: [b]]\n", "1:7 "},
+    // shifted lines, once
+    {"a:\n  - b: 1\n   c: 2\n   d: 3\n  - b: 2\n    c: 3\n", "3:4 "},
+    {"a:\n  b: 1\n    c: 2\n    d: 3\n  e: 4\n", "3:5 "},
+};
+
+TEST(Lint, MistakesAreReportedAtTheirPlace) {
+    for (const auto& [text, places] : kTraps) EXPECT_EQ(traps(text), places) << text;
+    for (const auto& [text, places] : kCauses) EXPECT_EQ(causes(text), places) << text;
 }
 
 /// Other programs write every key and text in quotes.
@@ -112,54 +165,6 @@ TEST(Lint, AMissingQuoteIsReportedFirstOnItsLine) {
     }
 }
 
-TEST(Lint, ADashOfAnotherProgramIsATrap) {
-    EXPECT_EQ(traps("a:\n  \u2013 b: 1\n    c: 2\n  \u2014 b: 2\n"), "2:3 4:3 ");
-    EXPECT_EQ(traps("a:\n  * b: 1\n    c: 2\n"), "2:3 ");
-    EXPECT_EQ(causes("a:\n  \u2022 b: 1\n    c: 2\n"), "2:3 ");
-    EXPECT_EQ(traps("a: x \u2013 y\nb: \u2013\nc: [\u2013 d]\n"), "");
-}
-
-TEST(Lint, AQuoteOfAWordProcessorIsATrap) {
-    EXPECT_EQ(traps("a: \u201Cb\u201D\n\u2018c\u2019: 1\n"), "1:4 2:1 ");
-    EXPECT_EQ(traps("a: \u2019s b\nc: d \u201Ce\u201D\n"), "");
-}
-
-TEST(Lint, AMisplacedDashIsReportedAtItsPlace) {
-    EXPECT_EQ(causes("a:\n   - b: 1\n    c: 2\n"), "2:4 ");
-    EXPECT_EQ(causes("a:\n - b: 1\n    c: 2\n    d: 3\n"), "2:2 ");
-    EXPECT_EQ(causes("a:\n  -  b: 1\n    c: 2\nd: 3\n"), "2:3 ");
-    EXPECT_EQ(causes("a:\n  - b: 1\n   c: 2\n    d: 3\n"), "3:4 ") << "the others agree with it";
-    EXPECT_EQ(causes("a:\n  - b: 1\n   c: 2\n  - b: 2\n"), "3:4 ");
-    EXPECT_EQ(causes("a:\n  - b: 1\n     c: 2\n  - b: 2\n"), "3:6 ");
-}
-
-TEST(Lint, TextCopiedFromAroundAFileIsReportedAtItsPlace) {
-    EXPECT_EQ(causes("```yaml\na: 1\n```\n"), "1:1 3:1 ");
-    EXPECT_EQ(causes("$ cat a.yaml\na:\n  - b\n"), "1:1 ");
-    EXPECT_EQ(causes("a:\n&nbsp;&nbsp;b: 1\n"), "2:1 ");
-    EXPECT_EQ(causes("a:\n  -\tb: 1\n    c: 2\n"), "2:4 ");
-    EXPECT_EQ(causes("{\n  // a\n  a: 1\n}\n"), "2:3 ");
-}
-
-TEST(Lint, AWrongBlankIsATrapOnlyWhereABlankIsSignificant) {
-    EXPECT_EQ(traps("\u00A0a: 1\n"), "1:1 ");
-    EXPECT_EQ(traps("a:\u00A01\n"), "1:3 ");
-    EXPECT_EQ(traps("a: 5\u00A0\u00B0C\nb: x:\u00A0y\n"), "");
-}
-
-TEST(Lint, OneCauseForEachLine) { EXPECT_EQ(causes("a:b\nc: %\n  \td: e\n"), "1:3 2:4 3:3 "); }
-
-TEST(Lint, ABracketIsReportedWhereItOpens) {
-    EXPECT_EQ(causes("a: {b: 1\nc: [2\nd: 3\n"), "1:4 2:4 ");
-    EXPECT_EQ(causes("a: [{b: 1]\n"), "1:5 ");
-    EXPECT_EQ(causes("a: [b]]\n"), "1:7 ");
-}
-
-TEST(Lint, ShiftedLinesAreReportedOnce) {
-    EXPECT_EQ(causes("a:\n  - b: 1\n   c: 2\n   d: 3\n  - b: 2\n    c: 3\n"), "3:4 ");
-    EXPECT_EQ(causes("a:\n  b: 1\n    c: 2\n    d: 3\n  e: 4\n"), "3:5 ");
-}
-
 TEST(Lint, LongLinesTakeNoLongerThanManyLines) {
     std::string quotes = "{";
     std::string unclosed = "{";
@@ -182,6 +187,51 @@ TEST(Lint, EndsOnAnyText) {
         causes(text);
         traps(text);
     }
+}
+
+using HintOf = std::string (*)(std::string_view text);
+
+/// Each row: what is typed, and what the hint says to write.
+void expect_hints(HintOf hint, std::initializer_list<std::string_view> rows) {
+    for (const std::string_view row : rows) {
+        const std::size_t arrow = row.find(" -> ");
+        EXPECT_EQ(hint(row.substr(0, arrow)), "; write " + std::string(row.substr(arrow + 4)));
+    }
+}
+
+void expect_none(HintOf hint, std::initializer_list<std::string_view> texts) {
+    for (const std::string_view text : texts) EXPECT_EQ(hint(text), "") << text;
+}
+
+TEST(Hints, WriteADurationAsItIsRead) {
+    expect_hints(duration_hint,
+                 {"0.5s -> 500ms", "1,5 s -> 1500ms", "500 ms -> 500ms", "500MS -> 500ms",
+                  "1m -> 1min", "1h -> 60min", "1m30s -> 90s", "20 \u00B5s -> 20us"});
+    EXPECT_EQ(duration_hint("500"), " (add a unit: us, ms, s, min)");
+    expect_none(duration_hint,
+                {"", "soon", "5 parsecs", "-5ms", "1e9s", "99999999999999999d", "5ms5"});
+}
+
+TEST(Hints, WriteANumberAsItIsRead) {
+    const HintOf fraction = [](std::string_view text) { return number_hint(text, false); };
+    const HintOf whole = [](std::string_view text) { return number_hint(text, true); };
+    expect_hints(fraction, {"0,1 -> 0.1", "+5 -> 5", "400 C -> 400", "10% -> 0.1", "1/10 -> 0.1",
+                            "/10 -> 0.1", "x0.1 -> 0.1", "*0.1 -> 0.1", "10^-1 -> 0.1"});
+    expect_none(fraction, {"", "ten", "-", ".", "/", "1/0", "x", "^2"});
+    expect_hints(whole,
+                 {"0x1F -> 31", "38.400 -> 38400", "1.0 -> 1", "9600 baud -> 9600", "9.6e3 -> 9600",
+                  "9,600 -> 9600", "9.6k -> 9600", "38k4 -> 38400", "\u22125 -> -5"});
+    expect_none(whole, {"1.5", "1.5.600", "k", "ten", "1/0"});
+}
+
+TEST(Hints, WriteAVariableAndABlankAsTheyAreRead) {
+    EXPECT_EQ(variable_hint("$BAUD"), "; write ${BAUD} for a variable of the environment");
+    EXPECT_EQ(variable_hint("%BAUD%"), "; write ${BAUD} for a variable of the environment");
+    EXPECT_EQ(variable_hint("5%"), "");
+    EXPECT_EQ(blank_hint("baud:9600"), "; a blank is missing after 'baud:'");
+    EXPECT_EQ(blank_hint("baud=9600"), "; write baud: 9600");
+    EXPECT_EQ(blank_hint("tcp://x:1"), "");
+    EXPECT_EQ(blank_hint("two words:1"), "");
 }
 
 }  // namespace

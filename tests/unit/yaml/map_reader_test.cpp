@@ -263,10 +263,12 @@ TEST(TextForms, PatternsOfDurationsTakeWhatIsParsedAndInRange) {
 }
 
 TEST(TextForms, FormatDurationsInTheLargestExactUnit) {
-    const std::pair<Duration, const char*> rows[] = {
-        {0s, "0ms"},      {1500ms, "1500ms"}, {2s, "2s"},
-        {250us, "250us"}, {10min, "10min"},   {2005209ns, "2005209ns"}};
-    for (const auto& [duration, text] : rows) EXPECT_EQ(format_duration(duration), text);
+    EXPECT_EQ(format_duration(0s), "0ms");
+    EXPECT_EQ(format_duration(1500ms), "1500ms");
+    EXPECT_EQ(format_duration(2s), "2s");
+    EXPECT_EQ(format_duration(250us), "250us");
+    EXPECT_EQ(format_duration(10min), "10min");
+    EXPECT_EQ(format_duration(2005209ns), "2005209ns");
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ TEST(YamlVariables, ComeFromTheEnvironmentOrTheirDefault) {
         {"a: ${EMPTY:-7}", "7"},
         {"a: ${BAUD:-7}", "38400"},
         {"a: ${NO:-}", ""},
-        {"a: ${NO:-[::1]:502, # and {so} on}", "[::1]:502, # and {so} on"},
+        {"a: ${NO:-[::1]:502, # and {so on}", "[::1]:502, # and {so on"},
         {"a: ${TRICKY}", "}, x: [1"},  // it is never read as YAML
         {"a: $$", "$"},                // a dollar is two, or stands alone
         {"a: $${BAUD}", "${BAUD}"},
