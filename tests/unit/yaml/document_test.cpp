@@ -270,7 +270,7 @@ constexpr Encoded kEncoded[] = {
     {"unit: \u00B0C \uD55C\uAD6D \U0001F600\n", "unit: \u00B0C \uD55C\uAD6D \U0001F600\n"},
     {"a:\t1\r\n\u0085", "a:\t1\r\n\u0085"},
     {"\uFEFFa: 1", "a: 1"},
-    // UTF-16 and UTF-32 by their first bytes
+    // Of two and four bytes a character, by their first bytes
     {"\xFF\xFE\x61\0:\0 \0\xB0\0"sv, "a: \u00B0"},
     {"\xFE\xFF\0a\xD8\x3D\xDE\0"sv, "a\U0001F600"},
     {"a\0:\0"sv, "a:"},
