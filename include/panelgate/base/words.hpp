@@ -53,7 +53,7 @@ std::string_view label(FrameDirection direction);
 
 /// Health of a station.
 enum class Health : std::uint8_t {
-    unknown,  ///< no request sent yet
+    unknown,  ///< no request sent yet, or the line is down
     online,
     suspect,  ///< its last transaction failed, but it is not offline
     heard,    ///< replies to the line's master, which is not the gateway
