@@ -51,10 +51,12 @@ class UnitRoutes {
     UnitRoutes(const Places& places, const UnitAccess& access);
 
     const Places& places() const { return *places_; }
-    /// The units for which the configuration names a station.
+    /// The units for which the configuration names a station, and 0, which may reach all.
     std::set<std::uint8_t> named() const;
     /// Returns nothing for a unit whose requests reach no panel.
     std::optional<Destination> destination(std::uint8_t unit) const;
+    /// The lines that a broadcast to unit 0 reaches.
+    const std::vector<std::string>& lines() const { return access_->lines; }
 
   private:
     std::optional<Destination> route(std::uint8_t unit) const;
@@ -83,7 +85,7 @@ UnitRoutes::UnitRoutes(const Places& places, const UnitAccess& access)
 }
 
 std::set<std::uint8_t> UnitRoutes::named() const {
-    std::set<std::uint8_t> units;
+    std::set<std::uint8_t> units{0};
     for (const auto& [unit, target] : access_->units) units.insert(unit);
     for (const auto& [unit, station] : listed_) units.insert(unit);
     return units;
@@ -159,6 +161,22 @@ std::string remedy(std::uint8_t unit, const Destination& was, const Destination&
     return text + '/' + was.station->name + '}';
 }
 
+/// Adds the lines, known before, that a broadcast to unit 0 reaches only now.
+void add_wider_broadcast(const std::string& listener, const UnitRoutes& before,
+                         const UnitRoutes& after, std::vector<std::string>& all) {
+    const auto was = before.destination(0);
+    const auto is = after.destination(0);
+    if (!was || was->line != nullptr || !is || is->line != nullptr) return;
+    for (const std::string& name : after.lines()) {
+        const config::Line* line = before.places().line_named(name);
+        if (line == nullptr || std::ranges::find(before.lines(), name) != before.lines().end())
+            continue;
+        all.push_back("unit 0 of " + listener + " reaches line " + name +
+                      " as well: a broadcast is now written to its panels too; set broadcast: "
+                      "deny, or inform its clients first");
+    }
+}
+
 void add_moved_units(const std::string& listener, const UnitRoutes& before, const UnitRoutes& after,
                      std::vector<std::string>& all) {
     for (const std::uint8_t unit : before.named()) {
@@ -193,8 +211,10 @@ std::vector<std::string> moved_units(const config::Config& before, const config:
     for (const auto& [name, access] : accesses_of(after)) {
         const auto was = known.find(name);
         if (was == known.end()) continue;
-        add_moved_units(name, UnitRoutes(places_before, was->second),
-                        UnitRoutes(places_after, access), all);
+        const UnitRoutes routes_before(places_before, was->second);
+        const UnitRoutes routes_after(places_after, access);
+        add_moved_units(name, routes_before, routes_after, all);
+        add_wider_broadcast(name, routes_before, routes_after, all);
     }
     return all;
 }

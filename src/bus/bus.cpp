@@ -257,7 +257,8 @@ void Bus::State::act(arbiter::StationEvent& event) {
 /// While the line is down take_down() has told all. Addresses of a search have no health.
 void Bus::State::tell_health(std::uint8_t station) {
     const arbiter::StationHealth health = arbiter.health(station);
-    const bool is_known = settings.stations.contains(station) || health.last_heard();
+    const Stations& listed = change ? change->settings.stations : settings.stations;
+    const bool is_known = listed.contains(station) || health.last_heard();
     if (up && is_known) health_events.tell(station, health.state());
 }
 
@@ -309,16 +310,21 @@ Bus::Bus(asio::any_io_executor executor, rt::Clock& clock, Settings settings,
     : state_(std::make_unique<State>(std::move(executor), clock,
                                      with_explanations(std::move(settings)), std::move(line))) {}
 
-Bus::~Bus() { stop(); }
+Bus::~Bus() { close(); }
 
 void Bus::start() {
     state_->call([this] { state_->line->start(*state_); });
 }
 
 void Bus::stop() {
+    leave_line(*state_);
+    close();
+}
+
+/// Nothing is observed any more: the observer may be gone.
+void Bus::close() {
     state_->change.reset();
     state_->up = false;
-    state_->why_down = "it is closed";
     state_->call([this] {
         state_->line->stop();
         state_->drive.hear([this](TimePoint now) { state_->arbiter.on_line_down(now); });
@@ -432,6 +438,7 @@ LineReport Bus::report() const {
 
 void Bus::State::apply(Settings next, std::unique_ptr<line::Line> other,
                        std::shared_ptr<void> far_end) {
+    health_events.on_change(next.stations);
     if (other) {
         if (!change) change.emplace(Change{{}, nullptr, {}, false});
         change->line = std::move(other);

@@ -32,6 +32,13 @@ void HealthEvents::tell(std::uint8_t station, Health health) {
     observe(settings_, arbiter::StationEvent{event_kind_of(health), station, {}});
 }
 
+void HealthEvents::on_change(const Stations& next) {
+    for (const auto& [id, station] : settings_.stations) {
+        const auto is = next.find(id);
+        if (is == next.end() || is->second.name != station.name) tell(id, Health::unknown);
+    }
+}
+
 void HealthEvents::on_line_down() {
     for (std::size_t id = 0; id < last_.size(); ++id)
         tell(static_cast<std::uint8_t>(id), Health::unknown);

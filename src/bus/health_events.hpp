@@ -22,6 +22,9 @@ class HealthEvents {
     void tell(std::uint8_t station, Health health);
     /// The line is down: every station is unknown.
     void on_line_down();
+    /// Reports listed stations that `next` has not, or under another name, as unknown. Called
+    /// before the settings change, while observers still know their names.
+    void on_change(const Stations& next);
 
   private:
     const Settings& settings_;
@@ -41,6 +44,15 @@ void take_down(State& bus, const std::string& why, TellMachine tell_machine) {
     bus.drive.hear(std::move(tell_machine));
     bus.health_events.on_line_down();
     if (was_up) bus.book.on_line_down(bus.clock.now());
+}
+
+/// The line is closed for good, by a reload or at the end. Not a fault: nothing is logged.
+template <class State>
+void leave_line(State& bus) {
+    bus.why_down = "it is closed";
+    if (!std::exchange(bus.up, false)) return;
+    observe(bus.settings, LineEvent{false, bus.why_down});
+    bus.health_events.on_line_down();
 }
 
 }  // namespace panelgate::bus

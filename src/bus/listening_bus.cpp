@@ -357,11 +357,18 @@ ListeningBus::ListeningBus(asio::any_io_executor executor, rt::Clock& clock, Set
                            std::unique_ptr<line::Line> line)
     : state_(std::make_unique<State>(executor, clock, std::move(settings), std::move(line))) {}
 
-ListeningBus::~ListeningBus() { stop(); }
+ListeningBus::~ListeningBus() { close(); }
 
 void ListeningBus::start() { state_->line->start(*state_); }
 
 void ListeningBus::stop() {
+    leave_line(*state_);
+    close();
+}
+
+/// Nothing is observed any more: the observer may be gone.
+void ListeningBus::close() {
+    state_->up = false;
     state_->line->stop();
     state_->drive.rest();
 }
@@ -370,6 +377,7 @@ void ListeningBus::stop() {
 void ListeningBus::apply(Settings settings, std::unique_ptr<line::Line> line,
                          std::shared_ptr<void>) {
     State& state = *state_;
+    state.health_events.on_change(settings.stations);
     if (line) {
         state.line->stop();
         if (state.up) state.on_down("its settings have changed, and it is being opened");

@@ -272,7 +272,13 @@ void warn_of_health(Loading& loading, const Node& node, const web::Settings& htt
 }
 
 void warn_of_plain_tokens(Loading& loading, const Node& node, const web::Settings& http) {
-    if (http.tokens.empty() || is_loopback(http.address)) return;
+    const auto is_here = [&http](const Network& network) {
+        const bool is_host = network.prefix == (is_ipv6(network.address) ? 128 : 32);
+        if (is_host && network.address == http.address) return true;
+        return is_loopback(network.address) && (is_host || network.prefix >= 8);
+    };
+    const bool only_here = !http.allow.empty() && std::ranges::all_of(http.allow, is_here);
+    if (http.tokens.empty() || is_loopback(http.address) || only_here) return;
     loading.warn(mark_of(node, "tokens"),
                  "tokens are sent in plain text to " + http.name() +
                      ": anyone on the network path can read and use them; listen on 127.0.0.1:" +

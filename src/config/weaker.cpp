@@ -4,6 +4,7 @@
 #include <compare>
 #include <optional>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "panelgate/base/decimal.hpp"
@@ -64,6 +65,9 @@ void compare_rights(Lines& all, const std::string& endpoint, const tcp_server::S
         if (std::ranges::find(running.lines, line) == running.lines.end())
             all.push_back(endpoint + ": reaches line " + line);
     }
+    const bool was_one = running.units.contains(0) && !next.units.contains(0);
+    if (was_one && next.broadcast != BroadcastMode::deny)
+        all.push_back(endpoint + ": unit 0 is a broadcast to all stations");
     for (const auto& [unit, target] : next.units) {
         const auto was = running.units.find(unit);
         if (was == running.units.end() || was->second != target)
@@ -115,6 +119,15 @@ void compare_limit(Lines& all, const std::string& what, const std::optional<Deci
     all.push_back(what + ' ' + running->text() + " -> " + (next ? next->text() : "none"));
 }
 
+/// True if a value written to them reaches the same items as the same numbers.
+bool is_written_alike(const points::Point& one, const points::Point& other) {
+    const auto written = [](const points::Point& point) {
+        return std::tie(point.table, point.address, point.bit, point.type, point.word_order,
+                        point.length, point.scale, point.offset);
+    };
+    return written(one) == written(other);
+}
+
 /// Compares what may be written to points.
 void compare_points(Lines& all, const Station& running, const Station& next) {
     for (const points::Point& point : next.points) {
@@ -125,6 +138,8 @@ void compare_points(Lines& all, const Station& running, const Station& next) {
             all.push_back(what + ": is writable");
             continue;
         }
+        if (!is_written_alike(*was, point))
+            all.push_back(what + ": a value is written to another place, or as another number");
         compare_limit(all, what + ": max", was->max, point.max, std::strong_ordering::greater);
         compare_limit(all, what + ": min", was->min, point.min, std::strong_ordering::less);
     }
@@ -163,6 +178,9 @@ void compare_stations(Lines& all, const Line& running, const Line& next) {
         }
         compare_access(all, what, was.read_only, is->read_only);
         if (was.guard && !is->guard) all.push_back(what + ": guard true -> false");
+        if (was.guard && is->guard && was.profile->name != is->profile->name)
+            all.push_back(what + ": guard by profile " + was.profile->name + " -> " +
+                          is->profile->name);
         compare_points(all, was, *is);
     }
 }

@@ -84,6 +84,8 @@ class Bus final : public LineBus {
     bool idle() const;
 
   private:
+    void close();
+
     struct State;
     std::unique_ptr<State> state_;
 };

@@ -45,6 +45,8 @@ class ListeningBus final : public LineBus {
     LineReport report() const override;
 
   private:
+    void close();
+
     struct State;
     std::unique_ptr<State> state_;
 };

@@ -107,6 +107,22 @@ TEST(MovedUnits, TellsThatAWriteToAStationIsNowABroadcast) {
     EXPECT_EQ(told(one_line(kOne, ", units: {0: a/1}"), one_line(kOne, ", broadcast: deny")), "");
 }
 
+TEST(MovedUnits, TellsThatABroadcastIsNowAWriteToOneStation) {
+    EXPECT_EQ(told(one_line(kOne), one_line(kOne, ", units: {0: a/1}")),
+              "unit 0 of 127.0.0.1:1502 was a broadcast to all stations and is now 'one' of line "
+              "a: a write to it may reach another panel; inform its clients first\n");
+}
+
+TEST(MovedUnits, TellsThatABroadcastReachesAnotherLineThatWasThere) {
+    const std::string one = two_lines("", "lines: [a], units: {2: b/2}");
+    const std::string both = two_lines("", "lines: [a, b]");
+    EXPECT_EQ(told(one, both),
+              "unit 0 of 127.0.0.1:1502 reaches line b as well: a broadcast is now written to its "
+              "panels too; set broadcast: deny, or inform its clients first\n");
+    EXPECT_EQ(told(one, two_lines("", "broadcast: deny, lines: [a, b]")), "");
+    EXPECT_EQ(told(one_line(kOne), both), "") << "it is a new line";
+}
+
 TEST(MovedUnits, KnowsListenersOfOneNameByTheirOrder) {
     const std::string two =
         "lines:\n  - {name: a, device: sim, stations: [{id: 1, name: one}]}\n"

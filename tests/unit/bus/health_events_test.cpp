@@ -118,6 +118,32 @@ TEST_F(HealthEventsTest, P10ALineThatIsReplacedIsDownForAllUntilTheNewOneIsOpen)
     EXPECT_THAT(told, HasSubstr(" 18:online"));
 }
 
+TEST_F(HealthEventsTest, P10OneThatIsTakenOutOrRenamedIsUnknownWhileItsNameIsKnown) {
+    ask(17);
+    ask(18);
+    told.clear();
+    Settings next = settings;
+    next.stations.erase(17);
+    next.stations[18].name = "kiln";
+    bus->apply(next, nullptr, nullptr);
+    EXPECT_EQ(told, " 17:unknown 18:unknown");
+    bus->apply(next, nullptr, nullptr);
+    EXPECT_EQ(told, " 17:unknown 18:unknown");
+    ask(18);
+    EXPECT_THAT(told, EndsWith(" 18:online"));
+}
+
+TEST_F(HealthEventsTest, P10ALineThatIsTakenOutIsDownAndItsStationsUnknown) {
+    ask(17);
+    told.clear();
+    bus->stop();
+    EXPECT_EQ(told, " down 17:unknown");
+    bus->stop();
+    EXPECT_EQ(told, " down 17:unknown");
+    bus.reset();
+    EXPECT_EQ(told, " down 17:unknown");
+}
+
 TEST_F(HealthEventsTest, AddressesThatNobodyListedAreToldOnlyOnceTheyAreHeard) {
     ask_silent(99);
     EXPECT_EQ(told, " up");

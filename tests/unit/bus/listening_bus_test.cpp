@@ -160,6 +160,8 @@ TEST_F(ListeningBusTest, P10ALineThatIsDownTakesWhatIsKnownOfItsStationsAlong) {
     line->events()->on_up();
     EXPECT_EQ(bus->station_status(17).state, Health::heard);
     EXPECT_EQ(told, "17:heard 17:unknown 17:heard ");
+    bus->stop();
+    EXPECT_EQ(told, "17:heard 17:unknown 17:heard 17:unknown ") << "the line is driven now";
 }
 
 TEST_F(ListeningBusTest, P10WhatASilenceSaidIsWithdrawnWithTheLine) {

@@ -67,6 +67,9 @@ TEST(Weaker, AccessAndGuardOfAStation) {
     EXPECT_EQ(told(station, ", access: read_only", ""),
               "station press: access read_only -> read_write");
     EXPECT_EQ(told(station, ", guard: true", ""), "station press: guard true -> false");
+    EXPECT_EQ(one_way(station(", guard: true, profile: omron-cp2e"), station(", guard: true")),
+              "station press: guard by profile omron-cp2e -> generic")
+        << "which refuses something else";
 }
 
 TEST(Weaker, WhatMayBeWrittenToPoints) {
@@ -81,6 +84,8 @@ TEST(Weaker, WhatMayBeWrittenToPoints) {
     EXPECT_EQ(told(point, ", writable: true, min: 5, max: 50", ", writable: true"),
               "point press/set: max 50 -> none; point press/set: min 5 -> none");
     EXPECT_EQ(told(point, ", max: 50", ", max: 400"), "") << "never written";
+    EXPECT_EQ(one_way(point(", writable: true"), point(", writable: true, scale: 0.1")),
+              "point press/set: a value is written to another place, or as another number");
 }
 
 TEST(Weaker, WritesThatAreRepeated) {
@@ -184,6 +189,9 @@ TEST(Weaker, AListenerThatReachesMore) {
               "modbus_tcp 127.0.0.1:1502: reaches line b");
     EXPECT_EQ(told(two, "lines: [a]", "lines: [a], units: {9: b/2}"),
               "modbus_tcp 127.0.0.1:1502: unit 9 is station 2 of b");
+    EXPECT_EQ(one_way(two("lines: [a], units: {0: a/1}"), two("lines: [a]")),
+              "modbus_tcp 127.0.0.1:1502: unit 0 is a broadcast to all stations");
+    EXPECT_EQ(one_way(two("lines: [a], units: {0: a/1}"), two("lines: [a], broadcast: deny")), "");
 }
 
 TEST(Weaker, WritesOfABroker) {
