@@ -147,6 +147,11 @@ namespace asio = boost::asio;
 
 namespace {
 
+Settings with_explanations(Settings settings) {
+    settings.arbiter.explain = true;
+    return settings;
+}
+
 PriorityClass priority_of(const Request& request) {
     if (request.poll) return PriorityClass::poll;
     return request.request.is_read() ? PriorityClass::read : PriorityClass::write;
@@ -295,15 +300,6 @@ void Bus::State::answer(Pending entry, Answer result) {
         answers.add(std::move(delivery), calls == 0);
     }
 }
-
-namespace {
-
-Settings with_explanations(Settings settings) {
-    settings.arbiter.explain = true;
-    return settings;
-}
-
-}  // namespace
 
 Bus::Bus(asio::any_io_executor executor, rt::Clock& clock, Settings settings,
          std::unique_ptr<line::Line> line)
