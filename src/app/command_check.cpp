@@ -17,7 +17,6 @@
 #include "difference.hpp"
 #include "inventory.hpp"
 #include "load.hpp"
-#include "moved_units.hpp"
 #include "panelgate/base/text.hpp"
 #include "panelgate/config/mbusd_conf.hpp"
 #include "panelgate/config/real_files.hpp"

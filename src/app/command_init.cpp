@@ -7,7 +7,6 @@
 
 #include "commands.hpp"
 #include "panelgate/scan/report.hpp"
-#include "searched.hpp"
 #include "starter.hpp"
 
 namespace panelgate::app {

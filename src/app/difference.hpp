@@ -33,4 +33,10 @@ std::string to_string(const Change& change);
 /// {"path", "kind", "before", "after"} each; the last two unless they are empty.
 boost::json::array to_json(const std::vector<Change>& changes);
 
+/// Units of a listener or serial master by which a client would now reach another panel: the line
+/// of their station was taken away, its id or its alias has changed, stations are swapped. One
+/// sentence each. Units that reach nobody now are not listed, nor a panel that only has another
+/// name. Pure.
+std::vector<std::string> moved_units(const config::Config& before, const config::Config& after);
+
 }  // namespace panelgate::app

@@ -10,7 +10,6 @@
 #include "difference.hpp"
 #include "gateway.hpp"
 #include "load.hpp"
-#include "moved_units.hpp"
 #include "panelgate/config/weaker.hpp"
 #include "panelgate/rt/log.hpp"
 #include "servers.hpp"

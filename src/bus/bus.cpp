@@ -21,7 +21,6 @@
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/rt/log.hpp"
 #include "trace_book.hpp"
-#include "write_log.hpp"
 
 namespace panelgate::bus {
 

@@ -1,4 +1,4 @@
-#include "moved_units.hpp"
+#include "difference.hpp"
 
 #include <gtest/gtest.h>
 

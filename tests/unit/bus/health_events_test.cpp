@@ -118,6 +118,15 @@ TEST_F(HealthEventsTest, P10ALineThatIsReplacedIsDownForAllUntilTheNewOneIsOpen)
     EXPECT_THAT(told, HasSubstr(" 18:online"));
 }
 
+TEST_F(HealthEventsTest, P10OneThatHasNeverAnsweredIsNotUpInMetrics) {
+    const auto up = [&] { return bus->report().stations[1].up; };
+    ask_silent(17);
+    EXPECT_EQ(bus->station_status(17).state, Health::suspect);
+    EXPECT_EQ(up(), std::nullopt);
+    silence(17);
+    EXPECT_EQ(up(), false);
+}
+
 TEST_F(HealthEventsTest, P10OneThatIsTakenOutOrRenamedIsUnknownWhileItsNameIsKnown) {
     ask(17);
     ask(18);
