@@ -38,9 +38,6 @@ Findings run(const Scanned& text, std::span<const Find> finds) {
     return all;
 }
 
-/// Signs of a patch disturb the text around them: they are reported alone.
-constexpr std::array<Find, 1> kPatches{find_patches};
-
 }  // namespace
 
 std::string_view Scanned::rest(std::size_t token) const {
@@ -50,7 +47,6 @@ std::string_view Scanned::rest(std::size_t token) const {
 }
 
 Findings find_traps(const Scanned& text) {
-    if (Findings patches = run(text, kPatches); !patches.empty()) return patches;
     static constexpr std::array<Find, 6> kFinds{find_wrong_blanks, find_wrong_dashes,
                                                 find_open_quotes,  find_typeset_quotes,
                                                 find_directives,   find_placeholders};
@@ -58,7 +54,6 @@ Findings find_traps(const Scanned& text) {
 }
 
 Findings find_causes(const Scanned& text) {
-    if (Findings patches = run(text, kPatches); !patches.empty()) return patches;
     static constexpr std::array<Find, 10> kFinds{
         find_wrong_blanks, find_wrong_dashes, find_open_quotes, find_typeset_quotes,
         find_directives,   find_placeholders, find_quote_ends,  find_brackets,
@@ -353,12 +348,10 @@ void find_wrong(const Scanned& text, std::size_t i, Findings& findings) {
                                          std::string(clip(word, 60)) + '"'});
 }
 
-/// Reports what surrounds a file on a page or a screen: a prompt, a fence, a JSON comment.
-bool find_copied(const Token& token, std::string_view word, Findings& findings) {
+/// Reports what means something in other languages: a JSON comment, an include.
+bool find_foreign(const Token& token, std::string_view word, Findings& findings) {
     const auto begins = [word](std::string_view with) { return word.starts_with(with); };
-    if (token.kind == Kind::anchor && begins("&nbsp;")) {
-        findings.push_back({token.begin, "'&nbsp;' is a blank of a web page; type blanks"});
-    } else if (word == "?" && token.kind == Kind::plain) {
+    if (word == "?" && token.kind == Kind::plain) {
         findings.push_back({token.begin, "a '?' is no value; write what is meant"});
     } else if (!token.first) {
         return false;
@@ -368,14 +361,6 @@ bool find_copied(const Token& token, std::string_view word, Findings& findings) 
                             "what the other one holds in place of this line"});
     } else if (begins("//") || begins("/*") || begins("-- ") || begins("<!--")) {
         findings.push_back({token.begin, "a comment begins with '#'"});
-    } else if (begins("```") || begins("$ ") || begins("cat >") || begins("cat <") ||
-               begins("sudo ") || word == "EOF") {
-        findings.push_back({token.begin, "this line is no part of the file; remove it"});
-    } else if ((word == "..." || word == "\u2026") && token.kind == Kind::plain) {
-        findings.push_back(
-            {token.begin,
-             quote(word) +
-                 " means that something was left out; write what is meant, or remove the line"});
     } else {
         return false;
     }
@@ -440,7 +425,7 @@ void find_wrong_starts(const Scanned& text, Findings& findings) {
     for (std::size_t i = 0; i < text.tokens.size(); ++i) {
         const Token& token = text.tokens[i];
         const std::string_view word = text.text(token);
-        if (find_copied(token, word, findings)) continue;
+        if (find_foreign(token, word, findings)) continue;
         if (token.kind == Kind::anchor) anchors.insert(word.substr(1));
         if (token.kind == Kind::alias) {
             find_alias(token, word.substr(1), anchors, findings);

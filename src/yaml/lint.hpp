@@ -55,7 +55,6 @@ std::string alias_and_more(std::string_view alias, std::string_view more);
 std::string without_blank_tabs(const Scanned& text, std::string bytes);
 
 // Each finds one kind of mistake, in the order of the text.
-void find_patches(const Scanned& text, Findings& findings);
 void find_open_quotes(const Scanned& text, Findings& findings);
 void find_wrong_blanks(const Scanned& text, Findings& findings);
 void find_wrong_dashes(const Scanned& text, Findings& findings);

@@ -95,10 +95,8 @@ constexpr Row kCauses[] = {
     {"a:\n  - b: 1\n   c: 2\n    d: 3\n", "3:4 "},  // the others agree with it
     {"a:\n  - b: 1\n   c: 2\n  - b: 2\n", "3:4 "},
     {"a:\n  - b: 1\n     c: 2\n  - b: 2\n", "3:6 "},
-    // text copied from around a file
+    // what other languages mean by it
     {"```yaml\na: 1\n```\n", "1:1 3:1 "},
-    {"$ cat a.yaml\na:\n  - b\n", "1:1 "},
-    {"a:\n&nbsp;&nbsp;b: 1\n", "2:1 "},
     {"a:\n  -\tb: 1\n    c: 2\n", "2:4 "},
     {"{\n  // a\n  a: 1\n}\n", "2:3 "},
     // one for each line
