@@ -16,7 +16,8 @@ esac
 
 logs=$PWD/build/test-logs
 mkdir -p "$logs"
-jobs=$(nproc)
+# The tests wait more than they compute.
+jobs=$(($(nproc) + 1))
 summary=()
 failed=0
 
