@@ -63,7 +63,7 @@ class Readme(unittest.TestCase):
                     self.assertNotRegex(self.paste(moved), r'"status":[45]\d\d')
 
     def test_the_programs_commands_work(self):
-        program = "build/release/panelgate "
+        program = "build/panelgate "
         for command in commands("program"):
             with self.subTest(command=command):
                 self.assertTrue(command.startswith(program))
