@@ -238,9 +238,9 @@ void add_findings(Families& out, const Snapshot& snapshot) {
 }
 
 void add_station_state(Families& out, const Snapshot& snapshot) {
-    Family up =
-        make_gauge("panelgate_station_up",
-                   "1 while a configured station answers; absent until it has answered or is offline.");
+    Family up = make_gauge(
+        "panelgate_station_up",
+        "1 while a configured station answers; absent until it has answered or is offline.");
     Family success =
         make_gauge("panelgate_station_last_success_timestamp_seconds",
                    "When a configured station last answered; absent while it never did.");
