@@ -187,7 +187,8 @@ def judge_lengths(file, top):
         yield lines, f"{lines} lines, {MAX_LINES} at most"
     functions = python_functions(text) if file.suffix == ".py" else cpp_functions(text)
     for first, length, name in functions:
-        if length > MAX_FUNCTION[top]:
+        is_table = file.match("src/config/*tables.cpp")  # rows of keys, one below the other
+        if length > MAX_FUNCTION[top] and not is_table:
             yield first, f"{name} has {length} lines, {MAX_FUNCTION[top]} at most"
 
 

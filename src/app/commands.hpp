@@ -32,6 +32,12 @@ struct CheckOptions {
     bool allow_overload = false;
 };
 ExitCode check(const std::string& file, const CheckOptions& options);
+/// Prints the setting at a path ("lines.floor1.stations.press.retries"), or all below it; "": all.
+/// Defaults are filled in, secrets are not shown.
+ExitCode config_get(const std::string& file, const std::string& path);
+/// Prints what keys there are at and below a path ("lines.stations.points"), with values, defaults
+/// and a sentence each; "": all.
+ExitCode config_keys(const std::string& path);
 /// Prints a JSON Schema of the configuration.
 ExitCode schema();
 /// Checks whether the gateway is ready. `http`: "ADDR:PORT" of its REST API; if empty, the address

@@ -10,13 +10,15 @@
 #include <string_view>
 #include <utility>
 
+#include "panelgate/config/setting.hpp"
 #include "panelgate/modbus/function.hpp"
-#include "setting.hpp"
 
 namespace panelgate::app {
 
 namespace {
 
+using config::Distinct;
+using config::Setting;
 using Kind = Change::Kind;
 using Settings = std::map<std::string, Setting>;
 
@@ -29,7 +31,7 @@ using Differences = std::map<std::string, Difference>;
 
 Settings by_path(const config::Config& config) {
     Settings settings;
-    for (Setting& setting : all_settings(config)) {
+    for (Setting& setting : config::all_settings(config)) {
         std::string path = setting.path;
         settings.emplace(std::move(path), std::move(setting));
     }

@@ -54,6 +54,8 @@ json::object station_json(const config::Station& station,
             {"access", access(station.read_only)},
             {"guard", station.guard},
             {"translate", station.translate ? "auto" : "off"},
+            {"crc_order", label(settings.crc_order)},
+            {"retries", settings.retries},
             {"retry_writes", settings.retry_writes},
             {"max_age_ms", milliseconds(settings.max_age)},
             {"points", each(station.points, point_json)}};
@@ -221,6 +223,9 @@ std::string text_of(const config::Station& station, const arbiter::StationSettin
     std::string text = "  station " + std::to_string(station.id) + ' ' + station.name + ", " +
                        station.profile->name + ", " + rights(station.read_only);
     if (station.guard) text += ", guarded";
+    if (settings.crc_order != modbus::CrcOrder::low_first) text += ", CRC high byte first";
+    if (settings.retries != arbiter::StationSettings().retries)
+        text += ", reads are repeated up to " + std::to_string(settings.retries) + " times";
     if (settings.retry_writes) text += ", writes are repeated";
     if (settings.max_age > Duration::zero())
         text += ", answers up to " + format_duration(settings.max_age) + " old";

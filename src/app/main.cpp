@@ -86,6 +86,7 @@ class CommandLine {
         add_run();
         add_demo();
         add_check();
+        add_config();
         add_simulate();
         add_scan();
         add_address();
@@ -240,6 +241,21 @@ class CommandLine {
         });
     }
 
+    void add_config() {
+        CLI::App* command =
+            cli_.add_subcommand("config", "look up what a configuration says, defaults included");
+        command->require_subcommand(1);
+        CLI::App* get = command->add_subcommand("get", "print a setting, or all below a path");
+        add_file(get);
+        get->add_option("PATH", path_,
+                        "such as lines.floor1.stations.press.retries; all settings without");
+        get->callback([this] { code_ = config_get(file_, path_); });
+        CLI::App* keys = command->add_subcommand(
+            "keys", "print what keys there are: values, defaults, what each is for");
+        keys->add_option("PATH", path_, "such as lines.stations.points; all keys without");
+        keys->callback([this] { code_ = config_keys(path_); });
+    }
+
     void add_simulate() {
         CLI::App* command = cli_.add_subcommand("simulate", "only the simulated panels, on ptys");
         add_file(command);
@@ -358,6 +374,7 @@ class CommandLine {
     CLI::App cli_{kAbout, "panelgate"};
     ExitCode code_ = kFine;
     std::string file_ = kDefaultConfig;
+    std::string path_;  ///< of a setting
     bool simulated_ = false;
     bool watch_ = false;
     ReloadOptions reload_{.file = kDefaultConfig, .http = {}, .token_file = {}};

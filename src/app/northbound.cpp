@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kSwept = 500;  ///< subjects per turn: well below a millisecond
 constexpr Duration kSweep = 1s;
 constexpr Duration kRebirth = 1s;  ///< minimum interval: hosts may ask as often as they like
-constexpr const char* kName = "mqtt";
+constexpr const char* kMqttName = "mqtt";
 
 mqtt::Settings completed(mqtt::Settings settings) {
     std::string host = boost::asio::ip::host_name();
@@ -213,7 +213,7 @@ void BrokerSession::refuse(const std::string& topic, const std::string& id,
                            const web::Problem& why) {
     ++counters_.writes_refused;
     rt::log(rt::LogLevel::warn, "mqtt write refused",
-            {{"client", kName}, {"topic", web::excerpt(topic)}, {"why", why.detail}});
+            {{"client", kMqttName}, {"topic", web::excerpt(topic)}, {"why", why.detail}});
     json::object body{{"ok", false}};
     for (const auto& [name, value] : web::json_of(why)) body[name] = value;
     publisher_.answer({topic, id, web::json_text(body)}, true);
@@ -236,7 +236,7 @@ void BrokerSession::write(const mqtt::WriteCommand& command) {
     }
     bus::Request request = order->request;
     request.client = writes_->client;
-    station.bus->name_client(writes_->client, kName);
+    station.bus->name_client(writes_->client, kMqttName);
     ++writes_->open;
     auto made = std::make_shared<const Order>(
         Order{station.name, place.point->name, topic, command.id, profile, std::move(*order)});

@@ -132,8 +132,8 @@ json::value as_json(const KeyShape& shape, std::string_view written) {
                  : json::value(std::string(written));
 }
 
-std::string description_of(const KeyShape& shape, const config::KeyText& key_text) {
-    std::string text(key_text.text);
+std::string description_of(const KeyShape& shape) {
+    std::string text(shape.text);
     if (shape.kind == Kind::duration)
         text += (text.empty() ? "" : " ") + yaml::format_duration(shape.shortest) + " to " +
                 yaml::format_duration(shape.longest) + '.';
@@ -144,7 +144,6 @@ class Schema {
   public:
     Schema() : described_(config::describe()) {
         for (const KeyShape& shape : described_.keys) shapes_.emplace(shape.path, shape);
-        for (const config::KeyText& text : config::key_texts()) texts_.emplace(text.path, text);
     }
 
     json::object whole() const {
@@ -258,18 +257,15 @@ class Schema {
         json::object made = shape.kind == Kind::map    ? map_of(shape)
                             : shape.kind == Kind::list ? list_of(shape)
                                                        : any_of(shape);
-        const auto key_text = texts_.find(shape.path);
-        if (key_text == texts_.end()) return made;
-        const std::string text = description_of(shape, key_text->second);
+        const std::string text = description_of(shape);
         if (!text.empty()) made["description"] = text;
-        const std::string_view otherwise = key_text->second.otherwise;
-        if (!otherwise.empty()) made["default"] = as_json(shape, otherwise);
+        if (!shape.initial.empty()) made["default"] = as_json(shape, shape.initial);
         return made;
     }
 
     json::object template_key() const {
         return {{"$ref", "#/$defs/text"},
-                {"description", texts_.at("lines/stations/template").text}};
+                {"description", shapes_.at("lines/stations/template").text}};
     }
 
     json::object templates() const {
@@ -281,12 +277,11 @@ class Schema {
                 {"properties", json::object{{"<<", true}}},
                 {"patternProperties", json::object{{config::name_pattern(), std::move(body)}}},
                 {"additionalProperties", false},
-                {"description", texts_.at("templates").text}};
+                {"description", shapes_.at("templates").text}};
     }
 
     config::Described described_;
     std::map<std::string, KeyShape> shapes_;
-    std::map<std::string_view, config::KeyText> texts_;
 };
 
 }  // namespace

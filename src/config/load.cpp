@@ -21,6 +21,7 @@
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/yaml/document.hpp"
 #include "panelgate/yaml/variables.hpp"
+#include "tables.hpp"
 
 namespace panelgate::config {
 
@@ -158,15 +159,13 @@ class Templates {
   private:
     /// Reports a station's keys that follow a name without a body, and takes them as that body.
     void move_bodies(Node& list) {
-        constexpr std::array<std::string_view, 11> kKeys{
-            "profile", "access",   "timing", "retries", "retry_writes", "max_age",
-            "guard",   "simulate", "poll",   "points",  "translate"};
+        const std::vector<std::string_view> keys = station_keys().names();
         std::vector<Entry> kept;
         for (Entry& entry : list.entries) {
             Entry* name = kept.empty() ? nullptr : &kept.back();
             const bool open = name != nullptr &&
                               (name->value.kind == Node::Kind::null || opened_.contains(name->key));
-            if (!open || std::ranges::find(kKeys, entry.key) == kKeys.end()) {
+            if (!open || std::ranges::find(keys, entry.key) == keys.end()) {
                 kept.push_back(std::move(entry));
                 continue;
             }
@@ -234,24 +233,13 @@ namespace {
 
 using yaml::MapReader;
 
-constexpr std::array<std::pair<std::string_view, rt::LogLevel>, 5> kLevels{
-    {{"error", rt::LogLevel::error},
-     {"warn", rt::LogLevel::warn},
-     {"info", rt::LogLevel::info},
-     {"debug", rt::LogLevel::debug},
-     {"trace", rt::LogLevel::trace}}};
-constexpr std::array<std::pair<std::string_view, rt::LogFormat>, 2> kFormats{
-    {{"text", rt::LogFormat::text}, {"json", rt::LogFormat::json}}};
-
 constexpr std::string_view kNameLetters = "abcdefghijklmnopqrstuvwxyz0123456789-";
 
 void load_log(Loading& loading, MapReader& root) {
     const yaml::Node* node = root.map("log", "{level: info}");
     if (node == nullptr) return;
     MapReader in(*node, loading.problems, "log");
-    rt::LogSettings& log = loading.config.log;
-    log.level = in.choice<rt::LogLevel>("level", kLevels).value_or(log.level);
-    log.format = in.choice<rt::LogFormat>("format", kFormats).value_or(log.format);
+    log_keys().read(in, loading.config.log);
     in.finish();
 }
 
@@ -259,10 +247,7 @@ void load_realtime(Loading& loading, MapReader& root) {
     const yaml::Node* node = root.map("realtime", "{priority: 20, lock_memory: true}");
     if (node == nullptr) return;
     MapReader in(*node, loading.problems, "realtime");
-    rt::RealtimeSettings& realtime = loading.config.realtime;
-    if (const auto priority = in.integer("priority", 0, 99))
-        realtime.priority = static_cast<int>(*priority);
-    realtime.lock_memory = in.boolean("lock_memory").value_or(false);
+    realtime_keys().read(in, loading.config.realtime);
     in.finish();
 }
 
@@ -357,6 +342,7 @@ void load_tree(Loading& loading, yaml::Node& tree) {
                              "[{listen: 127.0.0.1:502}]");
     root.elsewhere(kElsewhere);
     root.has("templates");  // known, though already resolved
+    root_keys().read(root, loading.config);
     root.finish();
     if (loading.problems.empty() && loading.config.lines.empty()) refuse_no_lines(loading, root);
     if (loading.problems.empty()) warn_of_listeners(loading, tree);

@@ -10,6 +10,7 @@
 #include "panelgate/base/text.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/line/settings.hpp"
+#include "tables.hpp"
 
 namespace panelgate::config {
 
@@ -134,6 +135,7 @@ web::Token load_token(Loading& loading, const Node& node) {
     if (in.required_text("role"))
         token.role = in.choice<web::Role>("role", kRoles).value_or(web::Role::viewer);
     token.secret = load_secret(loading, in, elsewhere);
+    token_keys().read(in, token);
     in.finish();
     return token;
 }

@@ -12,6 +12,7 @@
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/yaml/document.hpp"
+#include "tables.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -23,17 +24,13 @@ void load_queue(Loading& loading, MapReader& line, arbiter::QueueSettings& queue
     const Node* node = line.map("queue", "{limit: 256}");
     if (node == nullptr) return;
     MapReader in(*node, loading.problems, "queue");
-    const auto limit = in.integer("limit", 1, 4096);
-    queue.limit = static_cast<std::size_t>(limit.value_or(static_cast<std::int64_t>(queue.limit)));
-    const auto own = in.integer("per_client", 1, 4096);
-    if (own) queue.per_client = static_cast<std::size_t>(*own);
-    if (own && queue.per_client > queue.limit) {
-        in.problem("per_client", "per_client " + std::to_string(*own) + " is above the limit, " +
-                                     std::to_string(queue.limit) +
+    const Given given = queue_keys().read(in, queue);
+    if (given.has("per_client") && queue.per_client > queue.limit) {
+        in.problem("per_client", "per_client " + std::to_string(queue.per_client) +
+                                     " is above the limit, " + std::to_string(queue.limit) +
                                      "; make it smaller, or the limit larger");
     }
     queue.per_client = std::min(queue.per_client, queue.limit);
-    queue.deadline = in.duration("deadline", 10ms, 10min).value_or(queue.deadline);
     in.finish();
 }
 
@@ -41,28 +38,21 @@ void load_offline(Loading& loading, MapReader& line, arbiter::OfflineSettings& o
     const Node* node = line.map("offline", "{after: 3}");
     if (node == nullptr) return;
     MapReader in(*node, loading.problems, "offline");
-    offline.after = static_cast<int>(in.integer("after", 1, 1000).value_or(offline.after));
-    offline.probe_min = in.duration("probe_min", 10ms, 1h).value_or(offline.probe_min);
-    const auto most = in.duration("probe_max", 10ms, 24h);
-    if (most && *most < offline.probe_min) {
-        in.problem("probe_max", "probe_max " + yaml::format_duration(*most) +
+    const Given given = offline_keys().read(in, offline);
+    if (given.has("probe_max") && offline.probe_max < offline.probe_min) {
+        in.problem("probe_max", "probe_max " + yaml::format_duration(offline.probe_max) +
                                     " is below probe_min, " +
                                     yaml::format_duration(offline.probe_min) +
                                     "; make it longer, or probe_min shorter");
     }
-    offline.probe_max = std::max(most.value_or(offline.probe_max), offline.probe_min);
+    offline.probe_max = std::max(offline.probe_max, offline.probe_min);
     in.finish();
 }
 
-/// 0 to 100 ms, as the kernel accepts.
-Duration load_rs485_delay(MapReader& in, std::string_view key, line::Rs485::Mode mode) {
-    const Duration delay = in.duration(key, 0ms, 100ms).value_or(Duration::zero());
-    if (mode == line::Rs485::Mode::kernel && delay % 1ms != Duration::zero()) {
-        in.problem(key, std::string(key) +
-                            " must be whole milliseconds in rs485 mode kernel, not " +
-                            yaml::format_duration(delay));
-    }
-    return delay;
+void check_rs485_delay(MapReader& in, std::string_view key, Duration delay) {
+    if (delay % 1ms == Duration::zero()) return;
+    in.problem(key, std::string(key) + " must be whole milliseconds in rs485 mode kernel, not " +
+                        yaml::format_duration(delay));
 }
 
 void load_rs485(Loading& loading, MapReader& in_line, const Line& line, line::Rs485& rs485) {
@@ -70,14 +60,11 @@ void load_rs485(Loading& loading, MapReader& in_line, const Line& line, line::Rs
     const Node* node = in_line.map("rs485", "{mode: off}");
     if (node == nullptr) return;
     MapReader in(*node, loading.problems, "rs485");
-    constexpr std::array<std::pair<std::string_view, Mode>, 3> kModes{
-        {{"off", Mode::off}, {"kernel", Mode::kernel}, {"rts", Mode::rts}}};
-    rs485.mode = in.choice<Mode>("mode", kModes).value_or(Mode::off);
-    constexpr std::array<std::string_view, 2> kLevels{"high", "low"};
-    rs485.rts_high_on_send = in.choice_index("rts_on_send", kLevels) != std::size_t{1};
-    rs485.delay_before_send = load_rs485_delay(in, "delay_before_send", rs485.mode);
-    rs485.delay_after_send = load_rs485_delay(in, "delay_after_send", rs485.mode);
-    rs485.receive_during_send = in.boolean("receive_during_send").value_or(false);
+    rs485_keys().read(in, rs485);
+    if (rs485.mode == Mode::kernel) {
+        check_rs485_delay(in, "delay_before_send", rs485.delay_before_send);
+        check_rs485_delay(in, "delay_after_send", rs485.delay_after_send);
+    }
     if (rs485.receive_during_send && rs485.mode == Mode::rts) {
         in.problem(
             "receive_during_send",
@@ -186,21 +173,6 @@ void load_mode(MapReader& in, Line& line) {
     }
 }
 
-EchoMode load_echo(MapReader& in) {
-    constexpr std::array<std::string_view, 3> kWords{"auto", "on", "off"};
-    constexpr std::array kModes{EchoMode::automatic, EchoMode::on, EchoMode::off};
-    return kModes[in.choice_index("echo", kWords).value_or(0)];
-}
-
-arbiter::Quarantine load_quarantine(MapReader& in) {
-    using arbiter::Quarantine;
-    constexpr std::array<std::pair<std::string_view, Quarantine>, 3> kWords{
-        {{"auto", Quarantine::automatic},
-         {"line", Quarantine::line},
-         {"station", Quarantine::station}}};
-    return in.choice<Quarantine>("quarantine", kWords).value_or(Quarantine::automatic);
-}
-
 constexpr std::string_view kLineExample = "{name: floor1, device: /dev/ttyUSB0}";
 constexpr std::string_view kLineListExample = "[{name: floor1, device: /dev/ttyUSB0}]";
 
@@ -208,38 +180,29 @@ constexpr std::string_view kAtTheTop =
     "it belongs at the top level of the file, in the column of 'lines', not inside a line";
 
 /// Keys that users write beside `device`.
-constexpr std::array<std::string_view, 3> kParities{"none", "even", "odd"};
-constexpr std::array<yaml::Elsewhere, 30> kLineKeysElsewhere{
-    {{"baud", "serial", {}},
-     {"data_bits", "serial", {}},
-     {"parity", "serial", {}, {}, kParities},
-     {"stop_bits", "serial", {}},
-     {"response_timeout", "timing", {}},
-     {"frame_gap", "timing", {}},
-     {"reply_hole", "timing", {}},
-     {"broadcast_turnaround", "timing", {}},
-     {"late_window", "timing", {}},
-     {"think_time", "timing", {}},
-     {"limit", "queue", {}},
-     {"per_client", "queue", {}},
-     {"deadline", "queue", {}},
-     {"after", "offline", {}},
-     {"probe_min", "offline", {}},
-     {"probe_max", "offline", {}},
-     {"points", {}, "a station"},
-     {"poll", {}, "a station"},
-     {"profile", {}, "a station"},
-     {"listen", {}, "modbus_tcp or http"},
-     {"relays", {}, {}, kAtTheTop},
-     {"templates", {}, {}, kAtTheTop},
-     {"modbus_tcp", {}, {}, kAtTheTop},
-     {"serial_masters", {}, {}, kAtTheTop},
-     {"http", {}, {}, kAtTheTop},
-     {"log", {}, {}, kAtTheTop},
-     {"realtime", {}, {}, kAtTheTop},
-     {"type", {}, {}, "remove it: 'device' says what the line is"},
-     {"framing", {}, {}, "a line has serial: {mode: ascii}, or is RTU without a word"},
-     {"method", {}, {}, "remove it: a line is RTU, or has serial: {mode: ascii}"}}};
+std::vector<yaml::Elsewhere> keys_elsewhere() {
+    static constexpr std::array<std::string_view, 3> kParities{"none", "even", "odd"};
+    std::vector<yaml::Elsewhere> all{
+        {"parity", "serial", {}, {}, kParities},
+        {"points", {}, "a station"},
+        {"poll", {}, "a station"},
+        {"profile", {}, "a station"},
+        {"listen", {}, "modbus_tcp or http"},
+        {"type", {}, {}, "remove it: 'device' says what the line is"},
+        {"framing", {}, {}, "a line has serial: {mode: ascii}, or is RTU without a word"},
+        {"method", {}, {}, "remove it: a line is RTU, or has serial: {mode: ascii}"}};
+    const auto add = [&all](const std::vector<std::string_view>& keys, std::string_view map) {
+        for (const std::string_view key : keys) all.push_back({key, map, {}});
+    };
+    add(serial_keys().names(), "serial");
+    add(timing_keys().names(), "timing");
+    add(line_timing_keys().names(), "timing");
+    add(queue_keys().names(), "queue");
+    add(offline_keys().names(), "offline");
+    for (const std::string_view key : root_keys().names())
+        if (key != "lines") all.push_back({key, {}, {}, kAtTheTop});
+    return all;
+}
 
 /// Warns of keys that only a master uses.
 void warn_of_unused_keys(Loading& loading, MapReader& in, const Line& line) {
@@ -252,7 +215,8 @@ void warn_of_unused_keys(Loading& loading, MapReader& in, const Line& line) {
 
 Line load_line(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a line", kLineExample);
-    in.elsewhere(kLineKeysElsewhere);
+    static const std::vector<yaml::Elsewhere> kElsewhere = keys_elsewhere();
+    in.elsewhere(kElsewhere);
     Line line;
     line.name = load_name(in, true).value_or("");
     if (!line.name.empty() && std::ranges::count(loading.config.lines, line.name, &Line::name) > 0)
@@ -265,15 +229,13 @@ Line load_line(Loading& loading, const Node& node) {
         in.problem("mode", "mode listen understands RTU only, not ASCII");
     line.arbiter.serial = line.device.serial;
     load_rs485(loading, in, line, line.device.rs485);
-    line.arbiter.echo = load_echo(in);
+    line_keys().read(in, line);
     load_queue(loading, in, line.arbiter.queue);
     load_offline(loading, in, line.arbiter.offline);
-    line.arbiter.quarantine = load_quarantine(in);
-    constexpr std::array<std::string_view, 2> kUnlisted{"pass", "refuse"};
-    line.refuse_unlisted = in.choice_index("unlisted_stations", kUnlisted) == std::size_t{1};
     if (const Node* faults = in.map("simulate", "{echo: true}")) {
         MapReader simulate(*faults, loading.problems, "simulate");
         line.simulated_echo = simulate.boolean("echo").value_or(false);
+        simulate.about("echo", "false", "It hears itself.");
         simulate.finish();
     }
     load_stations(loading, in, {line, serial_known, {}});

@@ -11,6 +11,7 @@
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/yaml/document.hpp"
+#include "tables.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -122,15 +123,15 @@ void load_tls(Loading& loading, MapReader& in, mqtt::Settings& settings) {
 void load_format(MapReader& in, mqtt::Settings& settings) {
     static constexpr std::string_view kJson = "json";
     static constexpr std::string_view kSparkplug = "sparkplug";
-    constexpr std::array<std::pair<std::string_view, mqtt::Format>, 2> kFormats{
-        {{kJson, mqtt::Format::json}, {kSparkplug, mqtt::Format::sparkplug}}};
-    settings.format = in.choice<mqtt::Format>("format", kFormats).value_or(settings.format);
+    const Given given = mqtt_keys().read(in, settings);
+    if (given.has("keep_alive") &&
+        settings.keep_alive != std::chrono::floor<std::chrono::seconds>(settings.keep_alive))
+        in.problem("keep_alive", "keep_alive must be of whole seconds, such as 60s");
     load_part(in, "topic", "+#",
               "a topic such as plant/panelgate, without + and #, without $ in front or / at an end",
               settings.topic);
     load_part(in, "group", "+#/", "one level of a topic, without +, # and /", settings.group);
     load_part(in, "node", "+#/", "one level of a topic, without +, # and /", settings.node);
-    if (const auto qos = in.integer("qos", 0, 1)) settings.qos = static_cast<int>(*qos);
     in.belongs("group", "format", std::span(&kSparkplug, 1));
     in.belongs("node", "format", std::span(&kSparkplug, 1));
     in.belongs("qos", "format", std::span(&kJson, 1), true);
@@ -151,15 +152,6 @@ void load_session(Loading& loading, MapReader& in, mqtt::Settings& settings) {
         in.problem("client_id", "client_id must have at most 128 characters");
     settings.username = in.text("username").value_or("");
     settings.password = load_password(loading, in);
-    if (const auto alive = in.duration("keep_alive", 5s, 1h)) {
-        settings.keep_alive = *alive;
-        if (*alive != std::chrono::floor<std::chrono::seconds>(*alive))
-            in.problem("keep_alive", "keep_alive must be of whole seconds, such as 60s");
-    }
-    constexpr std::int64_t kFewest = 100;
-    constexpr std::int64_t kMost = 1'000'000;
-    if (const auto store = in.integer("store", kFewest, kMost))
-        settings.store = static_cast<std::size_t>(*store);
 }
 
 void warn_of_broker(Loading& loading, MapReader& in, const mqtt::Settings& settings) {
@@ -188,9 +180,6 @@ void load_mqtt(Loading& loading, MapReader& root) {
     load_format(in, settings);
     load_session(loading, in, settings);
     load_tls(loading, in, settings);
-    constexpr std::array<std::pair<std::string_view, bool>, 2> kWrites{
-        {{"none", false}, {"points", true}}};
-    settings.write = in.choice<bool>("write", kWrites).value_or(false);
     in.finish();
     warn_of_broker(loading, in, settings);
     loading.config.mqtt = std::move(settings);

@@ -9,6 +9,7 @@
 #include "panelgate/profile/notation.hpp"
 #include "panelgate/yaml/document.hpp"
 #include "point_limits.hpp"
+#include "tables.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -57,8 +58,7 @@ void load_type(MapReader& in, Point& point) {
     if (point.type != Type::string && length)
         in.problem("length", "length is for type: string only");
     if (point.type == Type::string) point.length = static_cast<unsigned>(length.value_or(1));
-    constexpr std::array<std::string_view, 4> kWords{"ABCD", "BADC", "CDAB", "DCBA"};
-    point.word_order = points::kOrders[in.choice_index("word_order", kWords).value_or(0)];
+    point_keys().read(in, point);
     if (point.type == Type::boolean && in.has("word_order"))
         in.problem("word_order", "word_order is for values of registers, not for type bool");
 }
@@ -228,12 +228,10 @@ std::string load_unit(MapReader& in) {
 
 /// Reports `temperature: UW100` in place of a point.
 bool refuse_short_form(Loading& loading, const Node& node) {
-    constexpr std::array<std::string_view, 14> kKeys{
-        "name",   "at",  "bit", "type", "length",   "word_order", "scale",
-        "offset", "min", "max", "unit", "writable", "labels",     "every"};
     if (node.entries.size() != 1 || node.entries[0].value.kind != Node::Kind::scalar) return false;
     const auto& [name, mark, at] = node.entries[0];
-    const bool is_key = std::ranges::find(kKeys, name) != kKeys.end();
+    const std::vector<std::string_view> keys = point_keys().names();
+    const bool is_key = std::ranges::find(keys, name) != keys.end();
     if (is_key || at.scalar.find_first_of("0123456789") == at.scalar.npos) return false;
     loading.problems.add(node.mark, "a point must be a map of name and at; write {name: " +
                                         (is_point_name(name) ? name : "NAME") +
@@ -267,13 +265,11 @@ void load_point(Loading& loading, const Node& node, Station& station) {
     load_type(in, point);
     load_scale(in, point);
     point.unit = load_unit(in);
-    point.writable = in.boolean("writable").value_or(false);
     if (point.writable && station.read_only)
         in.problem("writable", "station '" + station.name + "' is read_only");
     if (point.writable && station.listens) in.problem("writable", kListens);
     load_labels(in, point);
     load_no_value(in, point);
-    point.every = in.duration("every", 1ms, points::kSlowest).value_or(1s);
     if (item) check_area(in, point, *item->area, *station.profile);
     warn_of_unused_keys(loading, in, point);
     in.finish();
@@ -285,9 +281,7 @@ void load_poll(Loading& loading, const Node& node, Station& station) {
     points::Poll poll;
     const auto item = load_notation(in, "read", *station.profile);
     poll.read = in.text("read").value_or("");
-    constexpr std::int64_t kLargest = 2040;  // the largest read of any panel: GT, ARCT1F501E 1.3.1
-    poll.count = static_cast<std::uint32_t>(in.integer("count", 1, kLargest).value_or(1));
-    poll.every = in.duration("every", 1ms, points::kSlowest).value_or(1s);
+    poll_keys().read(in, poll);
     if (item) {
         poll.table = item->area->table;
         poll.address = item->address;

@@ -14,6 +14,7 @@
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/notation.hpp"
 #include "panelgate/yaml/document.hpp"
+#include "tables.hpp"
 
 namespace panelgate::config {
 
@@ -270,10 +271,7 @@ void load_relay(Loading& loading, const Node& node, std::vector<Route>& routes) 
     const auto from = load_end(loading, in, "from");
     const auto to = load_end(loading, in, "to");
     Relay relay;
-    relay.count = static_cast<std::uint32_t>(in.integer("count", 1, 2040).value_or(1));
-    relay.every = in.duration("every", 1ms, points::kSlowest).value_or(relay.every);
-    relay.on_change = in.boolean("on_change").value_or(false);
-    relay.refresh = in.duration("refresh", 1s, points::kSlowest).value_or(relay.refresh);
+    relay_keys().read(in, relay);
     if (in.has("refresh") && !relay.on_change) {
         loading.warn(in.mark("refresh"),
                      "refresh has no effect without on_change: true: this relay writes every turn");

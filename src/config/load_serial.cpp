@@ -14,6 +14,7 @@
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "tables.hpp"
 
 namespace panelgate::config {
 
@@ -44,10 +45,10 @@ void load_serial_mode(MapReader& in, SerialFormat& format, modbus::HexDigits* di
         format.mode = SerialMode::ascii;  // accepts 7 and 8 data bits
         return;
     }
-    constexpr std::array<std::pair<std::string_view, modbus::HexDigits>, 2> kLowerCase{
-        {{"refuse", modbus::HexDigits::upper_only}, {"take", modbus::HexDigits::any_case}}};
     format.mode = in.choice<SerialMode>("mode", kSerialModeWords).value_or(format.mode);
     *digits = in.choice<modbus::HexDigits>("ascii_lower_case", kLowerCase).value_or(*digits);
+    in.about("mode", "rtu", "How the panels frame their messages.");
+    in.about("ascii_lower_case", "refuse", "Hex digits a-f, of mode ascii.");
     constexpr std::array<std::string_view, 1> kAscii{"ascii"};
     in.belongs("ascii_lower_case", "mode", kAscii);
     if (in.has("ascii_lower_case") && format.mode != SerialMode::ascii)
@@ -74,11 +75,9 @@ bool load_serial(Loading& loading, MapReader& line, SerialFormat& format,
     const Node* node = line.map("serial", example);
     if (node == nullptr) return loading.problems.list().size() == before;
     MapReader in(*node, loading.problems, "serial");
-    format.baud = static_cast<int>(in.integer("baud", 50, 4'000'000).value_or(format.baud));
     load_serial_mode(in, format, digits);
     load_data_bits(in, format);
-    format.parity = in.choice<Parity>("parity", kParityWords).value_or(format.parity);
-    format.stop_bits = static_cast<int>(in.integer("stop_bits", 1, 2).value_or(format.stop_bits));
+    serial_keys().read(in, format);
     in.finish();
     return loading.problems.list().size() == before;
 }
@@ -86,31 +85,12 @@ bool load_serial(Loading& loading, MapReader& line, SerialFormat& format,
 namespace {
 
 using modbus::Framing;
-using serial_server::OnFailure;
 using serial_server::Settings;
 using tcp_server::BroadcastMode;
 
 constexpr std::string_view kMasterExample = "{name: plc, device: /dev/ttyUSB1, lines: [floor1]}";
 constexpr std::string_view kMasterListExample =
     "[{name: plc, device: /dev/ttyUSB1, lines: [floor1]}]";
-
-void load_policies(MapReader& in, Settings& settings) {
-    constexpr std::array<std::pair<std::string_view, Framing>, 2> kFramings{
-        {{"rtu", Framing::rtu}, {"ascii", Framing::ascii}}};
-    constexpr std::array<std::pair<std::string_view, BroadcastMode>, 2> kBroadcasts{
-        {{"silent", BroadcastMode::silent}, {"deny", BroadcastMode::deny}}};
-    constexpr std::array<std::pair<std::string_view, OnFailure>, 2> kFailures{
-        {{"exception", OnFailure::exception}, {"silence", OnFailure::silence}}};
-    constexpr std::array<std::pair<std::string_view, EchoMode>, 3> kEchoes{
-        {{"auto", EchoMode::automatic}, {"on", EchoMode::on}, {"off", EchoMode::off}}};
-    settings.access.framing = in.choice<Framing>("framing", kFramings).value_or(Framing::rtu);
-    settings.access.broadcast =
-        in.choice<BroadcastMode>("broadcast", kBroadcasts).value_or(BroadcastMode::silent);
-    settings.on_failure =
-        in.choice<OnFailure>("on_failure", kFailures).value_or(settings.on_failure);
-    settings.echo = in.choice<EchoMode>("echo", kEchoes).value_or(settings.echo);
-    settings.response_timeout = in.duration("response_timeout", 1ms, 10min);
-}
 
 void check_name(Loading& loading, MapReader& in, const Settings& settings) {
     const auto same = [&](const Settings& other) { return other.name == settings.name; };
@@ -201,7 +181,7 @@ void warn_of_no_stations(Loading& loading, MapReader& in, const Settings& settin
                                 (lines.empty() ? "LINE" : lines.front()) + "/31}");
 }
 
-/// Returns the mode set by `framing`; load_policies() reports a wrong value.
+/// Returns the mode set by `framing`; its table reports a wrong value.
 SerialMode mode_of(const Node& master) {
     const auto framing = std::ranges::find(master.entries, "framing", &yaml::Entry::key);
     const bool ascii =
@@ -225,7 +205,10 @@ Settings load_master(Loading& loading, const Node& node) {
     check_device(loading, in, settings.device);
     load_access(loading, in, settings.access);
     check_units(in, settings);
-    load_policies(in, settings);
+    settings.access.framing = Framing::rtu;
+    settings.access.broadcast = BroadcastMode::silent;
+    master_keys().read(in, settings);
+    settings.response_timeout = in.duration("response_timeout", 1ms, 10min);
     refuse_empty_access(in);
     in.finish();
     if (!loading.problems.empty()) return settings;

@@ -13,6 +13,7 @@
 #include "panelgate/config/describe.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/yaml/document.hpp"
+#include "tables.hpp"
 
 namespace panelgate::config {
 
@@ -23,21 +24,12 @@ void load_framing(yaml::MapReader& in, tcp_server::Settings& settings);
 namespace {
 
 using modbus::Framing;
-using modbus::HexDigits;
 using tcp_server::BroadcastMode;
 using tcp_server::Retransmissions;
 using yaml::MapReader;
 
 constexpr std::array<std::string_view, 3> kFramingWords{"tcp", "rtu", "ascii"};
 constexpr std::array kFramings{Framing::tcp, Framing::rtu, Framing::ascii};
-constexpr std::array<std::pair<std::string_view, HexDigits>, 2> kLowerCase{
-    {{"refuse", HexDigits::upper_only}, {"take", HexDigits::any_case}}};
-constexpr std::array<std::pair<std::string_view, BroadcastMode>, 3> kBroadcasts{
-    {{"reply", BroadcastMode::reply},
-     {"silent", BroadcastMode::silent},
-     {"deny", BroadcastMode::deny}}};
-constexpr std::array<std::pair<std::string_view, Retransmissions>, 2> kRetransmissions{
-    {{"join", Retransmissions::join}, {"pass", Retransmissions::pass}}};
 
 std::string framing_hint(std::string_view typed) {
     return typed == "udp" ? "; datagrams have framing: tcp, write udp: true" : "";
@@ -66,13 +58,7 @@ void refuse_in_serial_modes(MapReader& in, const tcp_server::Settings& settings)
 void load_framing(MapReader& in, tcp_server::Settings& settings) {
     if (const auto chosen = in.choice_index("framing", kFramingWords, framing_hint))
         settings.framing = kFramings[*chosen];
-    settings.udp = in.boolean("udp").value_or(settings.udp);
-    settings.ascii_digits =
-        in.choice<HexDigits>("ascii_lower_case", kLowerCase).value_or(settings.ascii_digits);
-    settings.broadcast =
-        in.choice<BroadcastMode>("broadcast", kBroadcasts).value_or(settings.broadcast);
-    settings.retransmissions = in.choice<Retransmissions>("retransmissions", kRetransmissions)
-                                   .value_or(settings.retransmissions);
+    listener_keys().read(in, settings);
     in.belongs("ascii_lower_case", "framing", std::span(&kFramingWords[2], 1));
     if (in.has("ascii_lower_case") && settings.framing != Framing::ascii)
         in.problem("ascii_lower_case", "only a listener with framing: ascii reads hex digits");
@@ -349,10 +335,6 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     load_framing(in, settings);
     load_diagnostics(loading, in, settings);
     load_allow(loading, in, settings.allow);
-    settings.max_connections =
-        static_cast<std::size_t>(in.integer("max_connections", 1, 65535).value_or(1024));
-    settings.max_connections_per_address =
-        static_cast<std::size_t>(in.integer("max_connections_per_address", 1, 65535).value_or(64));
     refuse_tls(in);
     refuse_empty_access(in);
     refuse_empty(in, "allow", kNoNetwork);
@@ -367,6 +349,7 @@ void load_access(Loading& loading, MapReader& in, tcp_server::Settings& settings
     load_units(loading, in, settings);
     check_overlap(loading, in, settings);
     settings.read_only = load_read_only(in).value_or(false);
+    access_keys().read(in, settings);
 }
 
 void refuse_empty_access(MapReader& in) {
@@ -394,17 +377,10 @@ void load_http(Loading& loading, MapReader& root) {
     MapReader in(*node, loading.problems, "http");
     web::Settings settings;
     load_listen(in, settings);
-    constexpr std::array<std::pair<std::string_view, web::Role>, 3> kRoles{
-        {{"none", web::Role::none},
-         {"viewer", web::Role::viewer},
-         {"operator", web::Role::operator_}}};
-    settings.anonymous = in.choice<web::Role>("anonymous", kRoles).value_or(settings.anonymous);
+    http_keys().read(in, settings);
     load_hosts(loading, in, settings);
     load_allow(loading, in, settings.allow);
     load_tokens(loading, in, settings.tokens);
-    const auto share = in.integer("max_connections_per_address", 1,
-                                  static_cast<std::int64_t>(settings.max_connections));
-    if (share) settings.max_connections_per_address = static_cast<std::size_t>(*share);
     refuse_tls(in);
     refuse_empty(in, "hosts", "name at least one host, or leave it out for the machine's names");
     refuse_empty(in, "allow", kNoNetwork);

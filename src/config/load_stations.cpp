@@ -16,6 +16,7 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 #include "panelgate/yaml/document.hpp"
+#include "tables.hpp"
 
 namespace panelgate::config {
 
@@ -120,15 +121,7 @@ void load_faults(Loading& loading, MapReader& station, sim::Misbehaviour& faults
     const Node* node = station.map("simulate", "{dead: true}");
     if (node == nullptr) return;
     MapReader in(*node, loading.problems, "simulate");
-    faults.dead = in.boolean("dead").value_or(false);
-    faults.slow = in.duration("slow", 0ms, 10min).value_or(0ms);
-    faults.late_by = in.duration("late_by", 0ms, 10min).value_or(0ms);
-    faults.late = in.share("late").value_or(0);
-    faults.drop = in.share("drop").value_or(0);
-    faults.damage = in.share("damage").value_or(0);
-    faults.truncate = in.share("truncate").value_or(0);
-    faults.foreign_id = in.share("foreign_id").value_or(0);
-    faults.duplicate = in.share("duplicate").value_or(0);
+    fault_keys().read(in, faults);
     in.finish();
 }
 
@@ -172,10 +165,9 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineContext& wo
 
     StationSettings settings = load_station_timing(loading, in, work, station);
     settings.id = station.id;
-    settings.retries = static_cast<int>(in.integer("retries", 0, 10).value_or(settings.retries));
-    settings.retry_writes = in.boolean("retry_writes").value_or(false);
-    settings.crc_order = in.choice<modbus::CrcOrder>("crc_order", modbus::kCrcOrders)
-                             .value_or(station.profile->crc_order);
+    settings.crc_order = station.profile->crc_order;
+    StationBody body{station, settings};
+    station_keys().read(in, body);
     if (work.line.device.serial.mode == SerialMode::ascii) {
         settings.crc_order = modbus::CrcOrder::low_first;
         if (in.has("crc_order"))
@@ -191,10 +183,6 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineContext& wo
         read_limit(*station.profile, {kReadHoldingRegisters, kReadInputRegisters}, 125);
     settings.max_bits = read_limit(*station.profile, {kReadCoils, kReadDiscreteInputs}, 2000);
     settings.vouched = station.profile->name != "generic";  // generic only repeats the standard
-    settings.max_age = in.duration("max_age", 0ms, 24h).value_or(0ms);
-    station.guard = in.boolean("guard").value_or(false);
-    constexpr std::array<std::string_view, 2> kTranslate{"auto", "off"};
-    station.translate = in.choice_index("translate", kTranslate) != std::size_t{1};
     load_faults(loading, in, station.faults);
     load_points(loading, in, station);
     in.finish();
@@ -444,9 +432,9 @@ void load_line_timing(Loading& loading, MapReader& in, LineContext& work) {
     if (const Node* node = in.map("timing", "{response_timeout: 500ms}")) {
         MapReader timing(*node, loading.problems, "timing");
         load_common(loading, timing, work, work.timing);
+        timing_keys().read(timing, work.timing.settings);
         load_reply_hole(timing, work.line.arbiter.reply_hole);
-        Duration& turnaround = work.line.arbiter.broadcast_turnaround;
-        turnaround = timing.duration("broadcast_turnaround", 1ms, 1min).value_or(turnaround);
+        line_timing_keys().read(timing, work.line.arbiter);
         timing.finish();
         const Duration gap = work.timing.frame_gap.value_or(silent_interval(serial));
         const bool free = !work.serial_known || serial.mode == SerialMode::ascii;
@@ -465,6 +453,7 @@ StationSettings load_station_timing(Loading& loading, MapReader& in, const LineC
     if (const Node* node = in.map("timing", "{response_timeout: 500ms}")) {
         MapReader own(*node, loading.problems, "a station's timing");
         load_common(loading, own, work, timing);
+        timing_keys().read(own, timing.settings, Otherwise::owner);
         if (own.has("frame_gap")) own_gap = own.mark("frame_gap");
         const auto refuse = [&](std::string_view key, const std::string& why) {
             if (own.has(key))

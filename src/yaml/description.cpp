@@ -83,6 +83,13 @@ void MapReader::looks_like(std::string_view key, std::string_view pattern, bool 
     told->may_be_number = number;
 }
 
+void MapReader::about(std::string_view key, std::string_view initial, std::string_view text) {
+    KeyShape* told = shape(key);
+    if (told == nullptr) return;
+    told->text = text;
+    told->initial = initial;
+}
+
 void MapReader::no_longer(std::string_view key, std::size_t characters) {
     if (KeyShape* told = shape(key)) told->longest_text = characters;
 }

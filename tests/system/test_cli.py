@@ -31,7 +31,7 @@ class CommandLine(unittest.TestCase):
                          r"commit \w+, \w+ \d.*\nboost 1\.\d+\.\d+, .*yaml-cpp \d.*\n$")
         text = self.expect(0, "--help").stdout
         for command in ("run", "demo", "check", "simulate", "address", "profiles",
-                        "health", "schema", "import", "init", "scan"):
+                        "health", "schema", "import", "init", "scan", "config"):
             self.assertRegex(text, rf"(?m)^\s+{command}\b")
             self.assertIn("Usage", self.expect(0, command, "--help").stdout)
 
@@ -45,6 +45,28 @@ class CommandLine(unittest.TestCase):
                           ["address", "autonics-gplp-s", "XY12"]):
             with self.subTest(arguments=arguments):
                 self.assertNotEqual(self.expect(USAGE, *arguments).stderr.strip(), "")
+
+    def test_a_setting_is_looked_up_with_its_default(self):
+        example = str(ROOT / "config/panelgate.example.yaml")
+        get = lambda *path: self.expect(0, "config", "get", *path, "-c", example).stdout
+        self.assertEqual(get("lines.floor1.stations.press.retries"), "1\n")
+        self.assertEqual(get("lines/floor1/timing/broadcast_turnaround"), "100ms\n")
+        press = get("lines.floor1.stations.press")
+        self.assertIn("lines.floor1.stations.press.crc_order: low_first\n", press)
+        self.assertNotIn("stations.oven", press)
+        self.assertIn(press, get())
+        for path in ("lines.floor1.retires", "nothing"):
+            self.assertIn("there is no setting", self.expect(USAGE, "config", "get", path, "-c", example).stderr)
+        self.assertIn("did you mean 'lines.floor1.retries'",
+                      self.expect(USAGE, "config", "get", "lines.floor1.retires", "-c", example).stderr)
+
+    def test_the_keys_of_a_configuration_are_explained(self):
+        keys = lambda *path: self.expect(0, "config", "keys", *path).stdout
+        self.assertIn("lines.queue.limit: 1 to 4096 (default 256)\n    Of all clients together.\n",
+                      keys("lines.queue"))
+        self.assertIn("lines.timing.frame_gap: 0ms to 10s, or auto (default auto)\n", keys("lines.timing"))
+        self.assertIn("lines.stations.id: 1 to 247 (required)\n", keys())
+        self.assertIn("there is no key", self.expect(USAGE, "config", "keys", "nothing").stderr)
 
     def test_a_mistyped_command_is_told_the_nearest(self):
         for typed, near in (("chekc", "check"), ("simulat", "simulate"), ("dmeo", "demo")):

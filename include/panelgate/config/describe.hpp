@@ -22,14 +22,4 @@ std::string name_pattern();
 /// Returns the keys of which at least one must be present, neither null nor an empty list.
 std::span<const std::string_view> serving_keys();
 
-/// The description of a key.
-struct KeyText {
-    std::string_view path;       ///< as KeyShape::path
-    std::string_view otherwise;  ///< default value in the file's notation; or ""
-    std::string_view text;
-};
-/// One for each key of describe() and for the keys that describe() leaves out; required keys whose
-/// name says all have none.
-std::span<const KeyText> key_texts();
-
 }  // namespace panelgate::config

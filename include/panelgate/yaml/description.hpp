@@ -39,6 +39,8 @@ struct KeyShape {
     bool may_be_number = true;     ///< the text may look like a number to YAML
     bool holds_integers = false;   ///< a list of raw numbers
     std::string keys;              ///< pattern for the keys of a map with free keys
+    std::string text;              ///< what it is for; one sentence
+    std::string initial;           ///< what leaving it out means, in the file's notation; or ""
 };
 
 /// A dependency between two keys of a map; a merge may supply the other.

@@ -91,6 +91,8 @@ class MapReader {
     /// The text, or those in a list or map, must match this regular expression (ECMA 262);
     /// `number`: it may look like a number to YAML.
     void looks_like(std::string_view key, std::string_view pattern, bool number = false);
+    /// What the key is for, and what leaving it out means in the file's notation.
+    void about(std::string_view key, std::string_view initial, std::string_view text);
     void no_longer(std::string_view key, std::size_t characters);
     /// Pattern for the keys of a map with free keys.
     void keyed_by(std::string_view key, std::string_view pattern);

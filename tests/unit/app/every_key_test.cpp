@@ -200,12 +200,12 @@ std::optional<config::Config> load_with(const char* base, const std::string& pat
 }
 
 TEST(EveryKey, MeansItsDefaultWhereItIsLeftOut) {
-    for (const config::KeyText& text : config::key_texts()) {
-        if (text.otherwise.empty()) continue;
-        const std::string path(text.path);
-        auto with = load_with(kPlain, path, std::string(text.otherwise));
+    for (const yaml::KeyShape& key : config::describe().keys) {
+        if (key.initial.empty()) continue;
+        const std::string& path = key.path;
+        auto with = load_with(kPlain, path, key.initial);
         const char* base = with ? kPlain : kFurther;  // some keys are for ASCII only
-        if (!with) with = load_with(base, path, std::string(text.otherwise));
+        if (!with) with = load_with(base, path, key.initial);
         const auto without = load_with(base, path, "");
         ASSERT_TRUE(without && with) << path;
         EXPECT_TRUE(differences(*without, *with).empty())

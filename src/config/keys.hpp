@@ -1,0 +1,168 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "panelgate/base/text.hpp"
+#include "panelgate/yaml/map_reader.hpp"
+#include "setting_writer.hpp"
+
+namespace panelgate::config {
+
+/// The words of a key and what they mean; static.
+template <class T, std::size_t N>
+using Words = std::array<std::pair<std::string_view, T>, N>;
+
+/// One key of a map: a row of its table. S is what the key is read into, V what it is shown of.
+template <class S, class V = S>
+struct Row {
+    using Shown = std::function<std::string(const V&)>;
+
+    std::string_view key;
+    std::string_view text;  ///< one sentence for the schema, the example file and the documentation
+    /// What leaving it out means, in the file's notation; "" if that depends, or is nothing.
+    std::string initial;
+    /// Returns true if the key is present and valid. Empty: it is read by code of its own.
+    std::function<bool(yaml::MapReader&, S&)> read;
+    /// Returns the value in the file's notation. Empty: what it means is shown elsewhere.
+    Shown shown;
+};
+
+/// The keys that a map has set.
+struct Given {
+    std::vector<std::string_view> keys;
+    bool has(std::string_view key) const { return std::ranges::find(keys, key) != keys.end(); }
+};
+
+/// Where the values of keys that are left out come from.
+enum class Otherwise : std::uint8_t { initial, owner };
+
+/// The table of a map: whatever concerns all keys alike is a member here.
+template <class S, class V = S>
+class Keys {
+  public:
+    using Shown = typename Row<S, V>::Shown;
+
+    template <class Field>
+    Keys duration(std::string_view key, Field field, Duration min, Duration max,
+                  std::string_view text) && {
+        return std::move(*this).add(
+            key, text,
+            [=](yaml::MapReader& in, S& into) {
+                return store(in.duration(key, min, max), std::invoke(field, into));
+            },
+            [=](const V& of) { return yaml::format_duration(std::invoke(field, of)); });
+    }
+    template <class Field>
+    Keys integer(std::string_view key, Field field, std::int64_t min, std::int64_t max,
+                 std::string_view text) && {
+        return std::move(*this).add(
+            key, text,
+            [=](yaml::MapReader& in, S& into) {
+                return store(in.integer(key, min, max), std::invoke(field, into));
+            },
+            [=](const V& of) { return std::to_string(std::invoke(field, of)); });
+    }
+    template <class Field>
+    Keys boolean(std::string_view key, Field field, std::string_view text) && {
+        return std::move(*this).add(
+            key, text,
+            [=](yaml::MapReader& in, S& into) {
+                return store(in.boolean(key), std::invoke(field, into));
+            },
+            [=](const V& of) { return std::string(std::invoke(field, of) ? "true" : "false"); });
+    }
+    /// A number from 0 to 1.
+    template <class Field>
+    Keys share(std::string_view key, Field field, std::string_view text) && {
+        return std::move(*this).add(
+            key, text,
+            [=](yaml::MapReader& in, S& into) {
+                return store(in.share(key), std::invoke(field, into));
+            },
+            [=](const V& of) { return number_text(std::invoke(field, of)); });
+    }
+    /// A value that has none of the words is shown as "".
+    template <class Field, class T, std::size_t N>
+    Keys word(std::string_view key, Field field, const Words<T, N>& words,
+              std::string_view text) && {
+        return std::move(*this).add(
+            key, text,
+            [=, &words](yaml::MapReader& in, S& into) {
+                return store(in.template choice<T>(key, words), std::invoke(field, into));
+            },
+            [=, &words](const V& of) {
+                const T value = std::invoke(field, of);
+                const auto found =
+                    std::ranges::find(words, value, &Words<T, N>::value_type::second);
+                return found == words.end() ? "" : std::string(found->first);
+            });
+    }
+    /// A key that code of its own reads.
+    Keys other(std::string_view key, std::string_view text, Shown shown = {}) && {
+        return std::move(*this).add(key, text, {}, std::move(shown));
+    }
+    /// Replaces how the key before this is shown.
+    Keys shown_as(Shown shown) && {
+        rows_.back().shown = std::move(shown);
+        return std::move(*this);
+    }
+    /// Replaces what leaving out the key before this means.
+    Keys initially(std::string_view initial) && {
+        rows_.back().initial = initial;
+        return std::move(*this);
+    }
+
+    /// Reads all keys that no other code reads, and describes all.
+    Given read(yaml::MapReader& in, S& into, Otherwise otherwise = Otherwise::initial) const {
+        Given given;
+        for (const Row<S, V>& row : rows_) {
+            if (row.read && row.read(in, into)) given.keys.push_back(row.key);
+            in.about(row.key, otherwise == Otherwise::initial ? row.initial : "", row.text);
+        }
+        return given;
+    }
+    std::vector<std::string_view> names() const {
+        std::vector<std::string_view> all;
+        for (const Row<S, V>& row : rows_) all.push_back(row.key);
+        return all;
+    }
+    void show(const SettingWriter& out, const V& of) const {
+        for (const Row<S, V>& row : rows_)
+            if (row.shown) out.put(row.key, row.shown(of));
+    }
+    /// The same; each is inherited from `owner`.
+    void show(const SettingWriter& out, const V& of, const SettingWriter& owner) const {
+        for (const Row<S, V>& row : rows_)
+            if (row.shown) out.put(row.key, row.shown(of), owner);
+    }
+
+  private:
+    template <class Value, class Member>
+    static bool store(const std::optional<Value>& value, Member& member) {
+        if (value) member = static_cast<Member>(*value);
+        return value.has_value();
+    }
+    Keys add(std::string_view key, std::string_view text,
+             std::function<bool(yaml::MapReader&, S&)> read, Shown shown) && {
+        std::string initial;
+        if constexpr (std::default_initializable<V>) {
+            if (read && shown) initial = shown(V{});
+        }
+        rows_.push_back({key, text, std::move(initial), std::move(read), std::move(shown)});
+        return std::move(*this);
+    }
+
+    std::vector<Row<S, V>> rows_;
+};
+
+}  // namespace panelgate::config

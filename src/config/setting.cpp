@@ -1,0 +1,109 @@
+#include "panelgate/config/setting.hpp"
+
+#include <string>
+
+#include "setting_writer.hpp"
+#include "tables.hpp"
+
+namespace panelgate::config {
+namespace {
+
+void show_port(const SettingWriter& port, const line::Settings& settings) {
+    port_keys().show(port, settings);
+    const bool is_ascii = settings.serial.mode == SerialMode::ascii;
+    port.below("serial").put("mode", is_ascii ? "ascii" : "rtu");
+    serial_keys().show(port.below("serial"), settings.serial);
+    rs485_keys().show(port.below("rs485"), settings.rs485);
+}
+
+void show_point(const SettingWriter& station, const points::Point& point) {
+    const SettingWriter section = station.item("points", point.name);
+    point_keys().show(section, point);
+    for (const auto& [raw, text] : point.labels)
+        section.below("labels").put(std::to_string(raw), text);
+}
+
+void show_station(const SettingWriter& line, const StationView& of) {
+    const SettingWriter section = line.item("stations", of.station.name);
+    station_keys().show(section, of, line);
+    timing_keys().show(section.below("timing"), of.settings, line.below("timing"));
+    section.below("timing").put("think_time", yaml::format_duration(of.station.think_time));
+    fault_keys().show(section.below("simulate"), of.station.faults);
+    for (const points::Point& point : of.station.points) show_point(section, point);
+    Distinct reads;
+    for (const points::Poll& poll : of.station.polls)
+        poll_keys().show(section.item("poll", reads.name(poll.read)), poll);
+}
+
+void show_line(const SettingWriter& top, const Line& line) {
+    const SettingWriter section = top.item("lines", line.name);
+    show_port(section, line.device);
+    line_keys().show(section, line);
+    const bool any_case = line.arbiter.ascii_digits == modbus::HexDigits::any_case;
+    section.below("serial").put("ascii_lower_case", any_case ? "take" : "refuse");
+    timing_keys().show(section.below("timing"), line.arbiter.unlisted);
+    line_timing_keys().show(section.below("timing"), line.arbiter);
+    queue_keys().show(section.below("queue"), line.arbiter.queue);
+    offline_keys().show(section.below("offline"), line.arbiter.offline);
+    section.below("simulate").put("echo", line.simulated_echo ? "true" : "false");
+    for (std::size_t i = 0; i < line.stations.size(); ++i)
+        show_station(section, {line.stations[i], line.arbiter.stations[i]});
+}
+
+void show_access(const SettingWriter& section, const tcp_server::Settings& settings) {
+    access_keys().show(section, settings);
+    for (const auto& [unit, target] : settings.units)
+        section.below("units").put(std::to_string(unit),
+                                   target.line + '/' + std::to_string(target.station));
+}
+
+void show_http(const SettingWriter& top, const web::Settings& settings) {
+    const SettingWriter section = top.item("http");
+    http_keys().show(section, settings);
+    for (const web::Token& token : settings.tokens) {
+        const SettingWriter one = section.item("tokens", token.name);
+        token_keys().show(one, token);
+        one.put_secret("secret", token.secret);
+    }
+}
+
+void show_servers(const SettingWriter& top, const Config& config) {
+    Distinct listeners;
+    for (const tcp_server::Settings& settings : config.modbus_tcp) {
+        const SettingWriter section = top.item("modbus_tcp", listeners.name(settings.name()));
+        show_access(section, settings);
+        listener_keys().show(section, settings);
+    }
+    for (const serial_server::Settings& settings : config.serial_masters) {
+        const SettingWriter section = top.item("serial_masters", settings.name);
+        show_port(section, settings.device);
+        show_access(section, settings.access);
+        master_keys().show(section, settings);
+    }
+    if (config.http) show_http(top, *config.http);
+    if (config.mqtt) {
+        mqtt_keys().show(top.item("mqtt"), *config.mqtt);
+        top.below("mqtt").put_secret("password", config.mqtt->password);
+    }
+}
+
+}  // namespace
+
+std::string Distinct::name(const std::string& known_by) {
+    const int count = ++seen_[known_by];
+    return count == 1 ? known_by : known_by + " (" + std::to_string(count) + ')';
+}
+
+std::vector<Setting> all_settings(const Config& config) {
+    std::vector<Setting> all;
+    const SettingWriter top(all, "");
+    for (const Line& line : config.lines) show_line(top, line);
+    show_servers(top, config);
+    for (const points::Relay& relay : config.relays)
+        relay_keys().show(top.item("relays", relay.name()), relay);
+    log_keys().show(top.below("log"), config.log);
+    realtime_keys().show(top.below("realtime"), config.realtime);
+    return all;
+}
+
+}  // namespace panelgate::config

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <string>
+
+#include "keys.hpp"
+#include "load_stations.hpp"
+#include "panelgate/config/config.hpp"
+
+namespace panelgate::config {
+
+/// A station is in two settings: what the gateway knows of it, and what its line's arbiter does.
+template <class Of, class Settings>
+struct StationParts {
+    Of& station;
+    Settings& settings;
+};
+using StationBody = StationParts<Station, arbiter::StationSettings>;
+using StationView = StationParts<const Station, const arbiter::StationSettings>;
+
+/// A pause inside frames and a rest, which only lines have.
+using LineTiming = arbiter::Settings;
+
+inline constexpr Words<EchoMode, 3> kEchoes{
+    {{"auto", EchoMode::automatic}, {"on", EchoMode::on}, {"off", EchoMode::off}}};
+inline constexpr Words<modbus::HexDigits, 2> kLowerCase{
+    {{"refuse", modbus::HexDigits::upper_only}, {"take", modbus::HexDigits::any_case}}};
+
+inline std::string access_text(bool read_only) { return read_only ? "read_only" : "read_write"; }
+
+/// "[a, b]"
+template <class List, class Word>
+std::string listed(const List& list, const Word& word) {
+    std::string text;
+    for (const auto& one : list) text += (text.empty() ? "" : ", ") + word(one);
+    return '[' + text + ']';
+}
+
+// The keys of the configuration: a table a map, in the order in which they are described. Keys that
+// hold a map or a list are rows, too; their own keys have a table of their own.
+
+const Keys<Config>& root_keys();
+const Keys<rt::LogSettings>& log_keys();
+const Keys<rt::RealtimeSettings>& realtime_keys();
+
+const Keys<Line>& line_keys();
+const Keys<line::Settings>& port_keys();
+const Keys<SerialFormat>& serial_keys();
+const Keys<line::Rs485>& rs485_keys();
+/// Of lines and stations.
+const Keys<arbiter::StationSettings>& timing_keys();
+const Keys<LineTiming>& line_timing_keys();
+const Keys<arbiter::QueueSettings>& queue_keys();
+const Keys<arbiter::OfflineSettings>& offline_keys();
+
+const Keys<StationBody, StationView>& station_keys();
+const Keys<sim::Misbehaviour>& fault_keys();
+const Keys<points::Poll>& poll_keys();
+const Keys<points::Point>& point_keys();
+
+/// Of listeners and serial masters.
+const Keys<tcp_server::Settings>& access_keys();
+const Keys<tcp_server::Settings>& listener_keys();
+const Keys<serial_server::Settings>& master_keys();
+const Keys<web::Settings>& http_keys();
+const Keys<web::Token>& token_keys();
+const Keys<points::Relay>& relay_keys();
+const Keys<mqtt::Settings>& mqtt_keys();
+
+}  // namespace panelgate::config
