@@ -160,8 +160,7 @@ const Keys<arbiter::StationSettings>& timing_keys() {
                    [](const Settings& settings) { return or_auto(settings.late_window); })
             .initially("auto")
             .other("think_time", "What a plan assumes of a panel.")
-            .initially("1ms")
-            .duration("example", &Settings::example, 0ms, 1s, "Shows that a key is one row.");
+            .initially("1ms");
     return kKeys;
 }
 

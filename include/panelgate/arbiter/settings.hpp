@@ -25,8 +25,7 @@ struct StationSettings {
     /// Silence before a request to this station and after its reply; empty: the standard's
     /// (silent_interval()).
     std::optional<Duration> frame_gap;
-    Duration example{};  ///< nothing reads it
-    int retries = 1;     ///< of reads; 0..10
+    int retries = 1;  ///< of reads; 0..10
     bool retry_writes = false;
     modbus::CrcOrder crc_order = modbus::CrcOrder::low_first;  ///< as it sends and expects it
     /// How long after a timeout a reply may still come; empty = auto: the response timeout at
