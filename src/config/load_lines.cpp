@@ -229,6 +229,7 @@ Line load_line(Loading& loading, const Node& node) {
         in.problem("mode", "mode listen understands RTU only, not ASCII");
     line.arbiter.serial = line.device.serial;
     load_rs485(loading, in, line, line.device.rs485);
+    line.arbiter.echo = EchoMode::automatic;  // an arbiter of its own expects none
     line_keys().read(in, line);
     load_queue(loading, in, line.arbiter.queue);
     load_offline(loading, in, line.arbiter.offline);

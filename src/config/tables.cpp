@@ -77,6 +77,7 @@ const Keys<Line>& line_keys() {
             .word(
                 "echo", [](auto& line) -> auto& { return line.arbiter.echo; }, kEchoes,
                 "The adapter hears itself; auto: found out by a read.")
+            .initially("auto")
             .other("timing", "Of all stations; a station's own timing overrides it.")
             .other("retries", "Of reads; writes are never repeated on their own.",
                    [](const Line& line) { return std::to_string(line.arbiter.unlisted.retries); })

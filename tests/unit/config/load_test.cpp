@@ -40,6 +40,7 @@ yaml::Problems problems_of(const std::string& text) {
 
 TEST(ConfigLoad, FillsInWhatALineAndAStationDoNotSay) {
     const Config config = load_valid(kSimple + "    stations: [{id: 7}]\n" + kServe);
+    EXPECT_EQ(config.lines.at(0).arbiter.echo, EchoMode::automatic);
     const Line& line = config.lines.at(0);
     EXPECT_EQ(line.kind, Line::Kind::serial);
     EXPECT_EQ(line.device.device, "/dev/ttyS0");
