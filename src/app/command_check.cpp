@@ -93,7 +93,9 @@ void print_changes(const std::string& file, const config::Config& config,
         return;
     }
     std::cout << changes.size() << " change(s)" << way << ":\n";
-    for (const Change& change : changes) std::cout << "  " << to_string(change) << '\n';
+    for (const Change& change : changes)
+        std::cout << "  " << to_string(change)
+                  << (change.needs.empty() ? "" : " (" + change.needs + ')') << '\n';
 }
 
 /// For a file with faults `lines` and the like are missing.

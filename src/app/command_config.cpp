@@ -1,7 +1,12 @@
 #include <algorithm>
+#include <array>
+#include <boost/json/array.hpp>
+#include <boost/json/object.hpp>
+#include <cstddef>
 #include <iostream>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "commands.hpp"
@@ -9,6 +14,7 @@
 #include "panelgate/base/text.hpp"
 #include "panelgate/config/describe.hpp"
 #include "panelgate/config/setting.hpp"
+#include "panelgate/web/http/json_text.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::app {
@@ -59,25 +65,55 @@ std::string values_text(const yaml::KeyShape& shape) {
     return text;
 }
 
+void print(const yaml::KeyShape& key) {
+    std::cout << shown_path(key.path);
+    if (const std::string values = values_text(key); !values.empty()) std::cout << ": " << values;
+    if (key.required) std::cout << " (required)";
+    if (!key.initial.empty()) std::cout << " (default " << key.initial << ')';
+    for (const std::string& line : {key.text, key.change.empty() ? "" : "Changed: " + key.change})
+        if (!line.empty()) std::cout << "\n    " << line;
+    std::cout << '\n';
+}
+
+boost::json::object to_json(const yaml::KeyShape& key) {
+    constexpr std::array<const char*, 8> kKinds{"text",     "integer", "number", "boolean",
+                                                "duration", "word",    "map",    "list"};
+    boost::json::object made{{"path", shown_path(key.path)},
+                             {"kind", kKinds[static_cast<std::size_t>(key.kind)]},
+                             {"required", key.required},
+                             {"order", key.order}};
+    const auto add = [&made](const char* name, const std::string& value) {
+        if (!value.empty()) made[name] = value;
+    };
+    add("values", values_text(key));
+    add("default", key.initial);
+    add("example", key.example);
+    add("text", key.text);
+    add("change", key.change);
+    return made;
+}
+
 }  // namespace
 
-ExitCode config_keys(const std::string& typed) {
+ExitCode config_keys(const std::string& typed, bool as_json) {
     const std::string path = path_typed(typed);
-    bool found = false;
-    for (const yaml::KeyShape& shape : config::describe().keys) {
-        if (!path.empty() && shape.path != path && !shape.path.starts_with(path + '/')) continue;
-        found = true;
-        std::cout << shown_path(shape.path);
-        if (const std::string values = values_text(shape); !values.empty())
-            std::cout << ": " << values;
-        if (shape.required) std::cout << " (required)";
-        if (!shape.initial.empty()) std::cout << " (default " << shape.initial << ')';
-        std::cout << (shape.text.empty() ? "" : "\n    " + shape.text) << '\n';
+    std::vector<yaml::KeyShape> keys = config::describe().keys;
+    std::erase_if(keys, [&](const yaml::KeyShape& key) {
+        return !path.empty() && key.path != path && !key.path.starts_with(path + '/');
+    });
+    if (keys.empty()) {
+        std::cerr << "panelgate: there is no key '" << typed
+                  << "'; `panelgate config keys` lists all\n";
+        return kUsage;
     }
-    if (found) return kFine;
-    std::cerr << "panelgate: there is no key '" << typed
-              << "'; `panelgate config keys` lists all\n";
-    return kUsage;
+    if (as_json) {
+        boost::json::array all;
+        for (const yaml::KeyShape& key : keys) all.push_back(to_json(key));
+        std::cout << web::json_text(boost::json::object{{"keys", std::move(all)}}) << '\n';
+        return kFine;
+    }
+    for (const yaml::KeyShape& key : keys) print(key);
+    return kFine;
 }
 
 ExitCode config_get(const std::string& file, const std::string& typed) {

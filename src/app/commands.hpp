@@ -37,7 +37,7 @@ ExitCode check(const std::string& file, const CheckOptions& options);
 ExitCode config_get(const std::string& file, const std::string& path);
 /// Prints what keys there are at and below a path ("lines.stations.points"), with values, defaults
 /// and a sentence each; "": all.
-ExitCode config_keys(const std::string& path);
+ExitCode config_keys(const std::string& path, bool as_json);
 /// Prints a JSON Schema of the configuration.
 ExitCode schema();
 /// Checks whether the gateway is ready. `http`: "ADDR:PORT" of its REST API; if empty, the address

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <utility>
 
+#include "panelgate/config/describe.hpp"
 #include "panelgate/config/setting.hpp"
 #include "panelgate/modbus/function.hpp"
 
@@ -119,9 +120,11 @@ std::vector<Change> differences(const config::Config& before, const config::Conf
     const Settings new_settings = by_path(after);
     const Differences all = compare(old_settings, new_settings);
     std::vector<Change> changes;
+    const config::Described keys = config::describe();
     for (const auto& [path, difference] : all) {
         if (is_within(all, path) || follows(all, difference)) continue;
         changes.push_back(change_of(path, difference));
+        if (!is_one_sided(difference)) changes.back().needs = keys.change_of(path);
     }
     add_profiles(before, after, changes);
     std::ranges::sort(changes, {}, &Change::path);
@@ -147,6 +150,7 @@ boost::json::array to_json(const std::vector<Change>& changes) {
         boost::json::object one{{"path", change.path}, {"kind", label(change.kind)}};
         if (!change.before.empty()) one["before"] = change.before;
         if (!change.after.empty()) one["after"] = change.after;
+        if (!change.needs.empty()) one["needs"] = change.needs;
         made.push_back(std::move(one));
     }
     return made;

@@ -20,6 +20,7 @@ struct Change {
     /// settings of their own (an added line is reported as one change).
     std::string before;
     std::string after;
+    std::string needs = {};  ///< beside a reload: "the port is opened anew"; "" nothing
 };
 std::string_view label(Change::Kind kind);
 
@@ -28,9 +29,10 @@ std::string_view label(Change::Kind kind);
 /// for a large plant.
 std::vector<Change> differences(const config::Config& before, const config::Config& after);
 
-/// "lines/floor1/stations/press/poll/UW0: every 1s -> 2s", "lines/floor2: added"
+/// "lines/floor1/stations/press/poll/UW0: every 1s -> 2s", "lines/floor2: added"; without what it
+/// needs.
 std::string to_string(const Change& change);
-/// {"path", "kind", "before", "after"} each; the last two unless they are empty.
+/// {"path", "kind", "before", "after", "needs"} each; the last three unless they are empty.
 boost::json::array to_json(const std::vector<Change>& changes);
 
 /// Units of a listener or serial master by which a client would now reach another panel: the line

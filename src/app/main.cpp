@@ -253,7 +253,9 @@ class CommandLine {
         CLI::App* keys = command->add_subcommand(
             "keys", "print what keys there are: values, defaults, what each is for");
         keys->add_option("PATH", path_, "such as lines.stations.points; all keys without");
-        keys->callback([this] { code_ = config_keys(path_); });
+        keys->add_option("--format", format_, "text or json")
+            ->check(CLI::IsMember({"text", "json"}));
+        keys->callback([this] { code_ = config_keys(path_, format_ == "json"); });
     }
 
     void add_simulate() {

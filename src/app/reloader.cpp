@@ -10,6 +10,7 @@
 #include "difference.hpp"
 #include "gateway.hpp"
 #include "load.hpp"
+#include "panelgate/config/describe.hpp"
 #include "panelgate/config/weaker.hpp"
 #include "panelgate/rt/log.hpp"
 #include "servers.hpp"
@@ -179,11 +180,14 @@ void Reloader::Job::read() try {
 
 void Reloader::Job::compare() {
     for (const Change& change :
-         differences(but_equal_lines(*running, *next), but_equal_lines(*next, *running)))
+         differences(but_equal_lines(*running, *next), but_equal_lines(*next, *running))) {
         verdict.changes.push_back(to_string(change));
+        const std::string map = change.path.substr(0, change.path.find('/'));
+        if (change.needs == config::kNextStart && !std::ranges::count(verdict.later, map))
+            verdict.later.push_back(map);
+    }
     for (std::string& moved : moved_units(*running, *next))
         verdict.warnings.push_back(std::move(moved));
-    if (next->realtime != running->realtime) verdict.later.emplace_back("realtime");
     verdict.outcome = verdict.changes.empty() ? ReloadOutcome::unchanged : ReloadOutcome::applied;
     shown = shown_text(*next);
 }

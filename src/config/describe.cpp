@@ -1,45 +1,52 @@
 #include "panelgate/config/describe.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "panelgate/config/config.hpp"
+#include "panelgate/yaml/document.hpp"
 
 namespace panelgate::config {
 
 namespace {
 
 /// Has one of each map and list. Keys are recorded whether present or not; beside a keyword (auto)
-/// nothing else is read.
+/// nothing else is read. The values are the examples of the documentation.
 constexpr std::string_view kSpecimen = R"(
 lines:
-  - name: a
-    device: sim
-    serial: {baud: 9600}
+  - name: floor1
+    device: /dev/serial/by-id/usb-adapter
+    serial: {baud: 38400, parity: none}
     rs485: {mode: off}
     timing: {reply_hole: 60ms}
     queue: {limit: 256}
     offline: {after: 3}
     simulate: {echo: false}
     stations:
-      - id: 1
-        name: b
-        timing: {frame_gap: 5ms}
+      - id: 31
+        name: press
+        profile: autonics-gplp-s
+        timing: {response_timeout: 300ms}
         simulate: {dead: false}
-        poll: [{read: "400001"}]
-        points: [{name: c, at: "400001", labels: {0: zero}, no_value: [1]}]
+        poll: [{read: UW0, count: 32}]
+        points:
+          - {name: temperature, at: UW100, type: i16, scale: 0.1, unit: celsius,
+             labels: {0: off, 1: on}, no_value: [-32768]}
 modbus_tcp:
-  - {listen: "127.0.0.1:502", lines: [a], units: {101: a/1}, diagnostics_unit: 255,
+  - {listen: "127.0.0.1:502", lines: [floor1], units: {101: floor1/31}, diagnostics_unit: 255,
      allow: [127.0.0.0/8]}
 serial_masters:
-  - {name: d, device: /dev/ttyS0, serial: {baud: 9600}, rs485: {mode: off}, lines: [a],
-     units: {101: a/1}}
-http: {listen: "127.0.0.1:80", hosts: [a], allow: [127.0.0.0/8],
-       tokens: [{name: e, role: viewer, file: /f}]}
-relays: [{from: b/400001, to: b/400002}]
-mqtt: {broker: "mqtt://a"}
+  - {name: plc, device: /dev/ttyUSB1, serial: {baud: 19200}, rs485: {mode: off}, lines: [floor1],
+     units: {101: floor1/31}}
+http: {listen: "127.0.0.1:8080", hosts: [gateway.plant.example], allow: [127.0.0.0/8],
+       tokens: [{name: ops, role: operator, file: /run/secrets/ops}]}
+relays: [{from: press/UW100, to: press/UW200, count: 8, every: 1s}]
+mqtt: {broker: "mqtt://broker.plant:1883"}
 log: {level: info}
-realtime: {priority: 0}
+realtime: {priority: 20}
 )";
 
 /// Every file holds a token.
@@ -52,6 +59,43 @@ struct Tokens final : Files {
     }
 };
 
+/// A list or a map in one line, where it has no keys of its own.
+std::string flow_text(const yaml::Node& node) {
+    std::string text;
+    for (const yaml::Node& item : node.items) text += (text.empty() ? "" : ", ") + item.scalar;
+    if (node.kind == yaml::Node::Kind::sequence) return '[' + text + ']';
+    for (const yaml::Entry& entry : node.entries)
+        text += (text.empty() ? "" : ", ") + entry.key + ": " + entry.value.scalar;
+    return '{' + text + '}';
+}
+
+void add_examples(const yaml::Node& node, const std::string& path,
+                  std::vector<yaml::KeyShape>& keys) {
+    using Kind = yaml::Node::Kind;
+    const auto shape = std::ranges::find(keys, path, &yaml::KeyShape::path);
+    const bool has_keys = std::ranges::any_of(keys, [&](const yaml::KeyShape& key) {
+        return path.empty() || key.path.starts_with(path + '/');
+    });
+    if (!has_keys && shape != keys.end())
+        shape->example = node.kind == Kind::scalar ? node.scalar : flow_text(node);
+    if (!has_keys) return;
+    for (const yaml::Node& item : node.items) add_examples(item, path, keys);
+    for (const yaml::Entry& entry : node.entries)
+        add_examples(entry.value, path.empty() ? entry.key : path + '/' + entry.key, keys);
+}
+
+/// What a change of a key needs is what one of the map above it needs.
+void inherit_changes(std::vector<yaml::KeyShape>& keys) {
+    for (yaml::KeyShape& key : keys) {
+        for (std::size_t end = key.path.rfind('/'); end != key.path.npos && key.change.empty();
+             end = end == 0 ? key.path.npos : key.path.rfind('/', end - 1)) {
+            const auto above =
+                std::ranges::find(keys, key.path.substr(0, end), &yaml::KeyShape::path);
+            if (above != keys.end()) key.change = above->change;
+        }
+    }
+}
+
 }  // namespace
 
 Described describe() {
@@ -59,7 +103,27 @@ Described describe() {
     yaml::Problems problems("specimen");
     problems.describe(&description);
     if (!load(kSpecimen, Tokens(), problems)) throw std::logic_error(problems.text());
-    return {description.keys(), description.rules()};
+    Described described{description.keys(), description.rules()};
+    add_examples(yaml::parse(kSpecimen, problems), "", described.keys);
+    inherit_changes(described.keys);
+    return described;
+}
+
+std::string_view Described::change_of(std::string_view setting) const {
+    const yaml::KeyShape* key = nullptr;
+    bool names = false;  // the next part is the name of a list's entry
+    while (!setting.empty()) {
+        const std::size_t end = std::min(setting.find('/'), setting.size());
+        const std::string part(setting.substr(0, end));
+        setting.remove_prefix(std::min(end + 1, setting.size()));
+        if (std::exchange(names, false)) continue;
+        const std::string path = key == nullptr ? part : key->path + '/' + part;
+        const auto found = std::ranges::find(keys, path, &yaml::KeyShape::path);
+        if (found == keys.end()) continue;
+        key = &*found;
+        names = key->kind == yaml::KeyShape::Kind::list;
+    }
+    return key == nullptr ? std::string_view() : key->change;
 }
 
 }  // namespace panelgate::config

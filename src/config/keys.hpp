@@ -35,6 +35,7 @@ struct Row {
     std::function<bool(yaml::MapReader&, S&)> read;
     /// Returns the value in the file's notation. Empty: what it means is shown elsewhere.
     Shown shown;
+    std::string_view change = {};  ///< what a change needs beside a reload; "" nothing
 };
 
 /// The keys that a map has set.
@@ -122,12 +123,19 @@ class Keys {
         return std::move(*this);
     }
 
+    /// What a change of the key before this needs beside a reload; a key below it needs the same.
+    Keys change_needs(std::string_view what) && {
+        rows_.back().change = what;
+        return std::move(*this);
+    }
+
     /// Reads all keys that no other code reads, and describes all.
     Given read(yaml::MapReader& in, S& into, Otherwise otherwise = Otherwise::initial) const {
         Given given;
         for (const Row<S, V>& row : rows_) {
             if (row.read && row.read(in, into)) given.keys.push_back(row.key);
-            in.about(row.key, otherwise == Otherwise::initial ? row.initial : "", row.text);
+            in.about(row.key, otherwise == Otherwise::initial ? row.initial : "", row.text,
+                     row.change);
         }
         return given;
     }
@@ -158,7 +166,7 @@ class Keys {
         if constexpr (std::default_initializable<V>) {
             if (read && shown) initial = shown(V{});
         }
-        rows_.push_back({key, text, std::move(initial), std::move(read), std::move(shown)});
+        rows_.push_back({key, text, std::move(initial), std::move(read), std::move(shown), {}});
         return std::move(*this);
     }
 

@@ -30,11 +30,12 @@ const Keys<tcp_server::Settings>& access_keys() {
     static const auto kKeys =
         Keys<Settings>()
             .other("lines",
-                   "Names of lines, for a serial master those whose listed stations it may ask; "
-                   "all without.",
+                   "Names of lines; for a serial master those whose listed stations it may ask.",
                    [](const Settings& settings) { return names_text(settings.lines); })
-            .other("units", "Further unit ids: {101: floor1/31}.")
-            .other("access", "",
+            .other("units",
+                   "Further unit ids, LINE/STATION each; where two lines have one id, they need "
+                   "them.")
+            .other("access", "read_only refuses whatever writes.",
                    [](const Settings& settings) { return access_text(settings.read_only); })
             .initially("read_write");
     return kKeys;
@@ -53,14 +54,18 @@ const Keys<tcp_server::Settings>& listener_keys() {
         Keys<Settings>()
             .other("listen", "ADDR:PORT or [ADDR]:PORT; port 0 takes a free one.")
             .initially("127.0.0.1:502")
+            .change_needs(kListensAnew)
             .other("framing", "The framing of its clients, over TCP.",
                    [](const Settings& settings) {
                        return std::string(modbus::label(settings.framing));
                    })
             .initially("tcp")
+            .change_needs(kListensAnew)
             .boolean("udp", &Settings::udp, "The same port for datagrams, too.")
+            .change_needs(kListensAnew)
             .word("ascii_lower_case", &Settings::ascii_digits, kLowerCase,
                   "Hex digits a-f, of framing ascii.")
+            .change_needs(kListensAnew)
             .word("broadcast", &Settings::broadcast, kBroadcasts,
                   "Unit 0: reply (once sent; without the key, with framing tcp), silent, deny "
                   "(exception 01).")
@@ -81,9 +86,9 @@ const Keys<tcp_server::Settings>& listener_keys() {
             .initially("255")
             .other("allow", "Networks such as 192.168.1.0/24; any address without.",
                    [](const Settings& settings) { return networks_text(settings.allow); })
-            .integer("max_connections", &Settings::max_connections, 1, 65535, "")
+            .integer("max_connections", &Settings::max_connections, 1, 65535, "Of all clients.")
             .integer("max_connections_per_address", &Settings::max_connections_per_address, 1,
-                     65535, "Then its longest idle one gives way.");
+                     65535, "Of one client; then its longest idle one gives way.");
     return kKeys;
 }
 
@@ -113,7 +118,7 @@ const Keys<serial_server::Settings>& master_keys() {
             .initially("silent")
             .word("on_failure", &Settings::on_failure, kFailures,
                   "What it gets when a panel does not answer.")
-            .word("echo", &Settings::echo, kEchoes, "The adapter hears itself.")
+            .word("echo", &Settings::echo, kEchoes, "The adapter hears itself; auto: found out.")
             .other("response_timeout", "The master's own: what would begin later is not sent.",
                    [](const Settings& settings) {
                        const auto& timeout = settings.response_timeout;
@@ -132,28 +137,32 @@ const Keys<web::Settings>& http_keys() {
             .other("listen", "ADDR:PORT or [ADDR]:PORT.",
                    [](const Settings& settings) { return settings.name(); })
             .initially("127.0.0.1:8080")
+            .change_needs(kListensAnew)
             .word("anonymous", &Settings::anonymous, kRoles,
                   "Without a token: none, viewer (read), operator (read and write).")
-            .other("hosts", "Its names in URLs; the machine's without.",
+            .other("hosts",
+                   "Its names in URLs, the machine's without; its addresses and localhost always. "
+                   "Another name is answered 421.",
                    [](const Settings& settings) {
                        return settings.hosts.empty() ? "the machine's" : names_text(settings.hosts);
                    })
             .other("allow", "Networks such as 192.168.1.0/24; any address without.",
                    [](const Settings& settings) { return networks_text(settings.allow); })
-            .other("tokens", "Authorization: Bearer TOKEN.")
-            .integer("max_connections_per_address", &Settings::max_connections_per_address, 1,
-                     static_cast<std::int64_t>(Settings().max_connections),
-                     "Then its longest idle one gives way; streams of events apart.");
+            .other("tokens", "Who may do what: Authorization: Bearer TOKEN.")
+            .integer(
+                "max_connections_per_address", &Settings::max_connections_per_address, 1,
+                static_cast<std::int64_t>(Settings().max_connections),
+                "Of one client; then its longest idle one gives way. Streams of events apart.");
     return kKeys;
 }
 
 const Keys<web::Token>& token_keys() {
     static const auto kKeys =
         Keys<web::Token>()
-            .other("name", "Unique.")
+            .other("name", "Unique; it is in the log.")
             .other("role", "viewer reads, operator writes as well.",
                    [](const web::Token& token) { return std::string(label(token.role)); })
-            .other("file", "Holds the token.");
+            .other("file", "Holds the token, and nothing else.");
     return kKeys;
 }
 
@@ -164,10 +173,11 @@ const Keys<points::Relay>& relay_keys() {
             .other("from", "STATION/NOTATION: press/UW100.")
             .other("to", "STATION/NOTATION.")
             .integer("count", &Relay::count, 1, 2040, "Registers or bits.")
-            .duration("every", &Relay::every, 1ms, points::kSlowest, "")
+            .duration("every", &Relay::every, 1ms, points::kSlowest, "How often it is read.")
             .boolean("on_change", &Relay::on_change, "Write only what has changed.")
             .duration("refresh", &Relay::refresh, 1s, points::kSlowest,
-                      "With on_change: and all again that often.");
+                      "With on_change: and all again that often. What other clients write there is "
+                      "written over within a second.");
     return kKeys;
 }
 

@@ -27,11 +27,14 @@ const Keys<Config>& root_keys() {
             .other("lines", "At least one serial line.")
             .other("modbus_tcp", "Listeners for Modbus over TCP.")
             .other("serial_masters", "Masters on serial ports of their own, as clients.")
+            .change_needs(kOpensPort)
             .other("http", "REST, pages and metrics.")
             .other("relays", "What is copied from panel to panel.")
             .other("mqtt", "Values at a broker.")
+            .change_needs(kConnectsAnew)
             .other("log", "What is logged on stderr.")
-            .other("realtime", "Frames on time beside other work, where the machine grants it.");
+            .other("realtime", "Frames on time beside other work, where the machine grants it.")
+            .change_needs(kNextStart);
     return kKeys;
 }
 
@@ -44,18 +47,22 @@ const Keys<rt::LogSettings>& log_keys() {
                                                      {"trace", rt::LogLevel::trace}}};
     static constexpr Words<rt::LogFormat, 2> kFormats{
         {{"text", rt::LogFormat::text}, {"json", rt::LogFormat::json}}};
-    static const auto kKeys = Keys<Log>()
-                                  .word("level", &Log::level, kLevels, "")
-                                  .word("format", &Log::format, kFormats, "");
+    static const auto kKeys =
+        Keys<Log>()
+            .word("level", &Log::level, kLevels, "The least that is logged.")
+            .word("format", &Log::format, kFormats, "Lines for people, or for programs.");
     return kKeys;
 }
 
 const Keys<rt::RealtimeSettings>& realtime_keys() {
     using Realtime = rt::RealtimeSettings;
-    static const auto kKeys = Keys<Realtime>()
-                                  .integer("priority", &Realtime::priority, 0, 99,
-                                           "SCHED_FIFO, 1 to 99; 0: as all programs.")
-                                  .boolean("lock_memory", &Realtime::lock_memory, "mlockall.");
+    static const auto kKeys =
+        Keys<Realtime>()
+            .integer("priority", &Realtime::priority, 0, 99,
+                     "SCHED_FIFO, 1 to 99, where the machine grants it (CAP_SYS_NICE); "
+                     "0: as all programs.")
+            .boolean("lock_memory", &Realtime::lock_memory,
+                     "Memory stays in RAM (mlockall, CAP_IPC_LOCK).");
     return kKeys;
 }
 
@@ -68,16 +75,25 @@ const Keys<Line>& line_keys() {
     static const auto kKeys =
         Keys<Line>()
             .other("name", "Unique: a-z, 0-9 and '-'.")
+            .change_needs(kOpensPort)
             .other("device", "A serial device, tcp://HOST:PORT (RTU over TCP), or sim.")
-            .other("mode", "listen: another master asks on this line, and nothing is ever sent.",
+            .change_needs(kOpensPort)
+            .other("mode",
+                   "listen: another master asks on this line, nothing is ever sent, and points "
+                   "show what "
+                   "passes by.",
                    [](const Line& line) { return line.listens ? "listen" : "master"; })
             .initially("master")
+            .change_needs(kOpensPort)
             .other("serial", "How characters look on the line.")
+            .change_needs(kOpensPort)
             .other("rs485", "How the transceiver is switched.")
+            .change_needs(kOpensPort)
             .word(
                 "echo", [](auto& line) -> auto& { return line.arbiter.echo; }, kEchoes,
                 "The adapter hears itself; auto: found out by a read.")
             .initially("auto")
+            .change_needs(kOpensPort)
             .other("timing", "Of all stations; a station's own timing overrides it.")
             .other("retries", "Of reads; writes are never repeated on their own.",
                    [](const Line& line) { return std::to_string(line.arbiter.unlisted.retries); })
@@ -90,8 +106,9 @@ const Keys<Line>& line_keys() {
                 "What is suspended after a timeout: the station, the line, or auto, the line "
                 "only where replies have been late.")
             .word("unlisted_stations", &Line::refuse_unlisted, kUnlisted,
-                  "Stations that are not in the list below.")
-            .other("simulate", "Of the simulated adapter (device sim, run --simulate).")
+                  "Stations that are not in the list below: pass, or refuse with exception 0A.")
+            .other("simulate", "The simulated adapter, of device sim and run --simulate.")
+            .change_needs(kOpensPort)
             .other("stations", "The panels on the line.");
     return kKeys;
 }
@@ -109,8 +126,8 @@ const Keys<SerialFormat>& serial_keys() {
             .integer("baud", &Format::baud, 50, 4'000'000, "Bit/s.")
             .other("data_bits", "8; in ASCII 7, or 8.",
                    [](const Format& format) { return std::to_string(format.data_bits); })
-            .word("parity", &Format::parity, kParityWords, "")
-            .integer("stop_bits", &Format::stop_bits, 1, 2, "");
+            .word("parity", &Format::parity, kParityWords, "Of each character.")
+            .integer("stop_bits", &Format::stop_bits, 1, 2, "Of each character.");
     return kKeys;
 }
 
@@ -126,7 +143,8 @@ const Keys<line::Rs485>& rs485_keys() {
             .word("mode", &Rs485::mode, kModes,
                   "off: the adapter by itself; kernel: its driver (TIOCSRS485); rts: this program, "
                   "as well as timers allow.")
-            .word("rts_on_send", &Rs485::rts_high_on_send, kLevels, "")
+            .word("rts_on_send", &Rs485::rts_high_on_send, kLevels,
+                  "The level of RTS while sending.")
             .duration("delay_before_send", &Rs485::delay_before_send, 0ms, 100ms,
                       "From RTS to the first bit.")
             .duration("delay_after_send", &Rs485::delay_after_send, 0ms, 100ms,
@@ -154,7 +172,9 @@ const Keys<arbiter::StationSettings>& timing_keys() {
             .other("adaptive_ceiling",
                    "The longest, of response_timeout: adaptive; else 500ms, or the line's.")
             .other("frame_gap",
-                   "Silence between frames: t3.5 (1.75 ms above 19200), or what the profile asks.",
+                   "Silence between frames; auto: 3.5 characters (1.75 ms above 19200 baud), or "
+                   "what the "
+                   "profile asks; 0 only on sim and tcp:// and in ASCII.",
                    [](const Settings& settings) { return or_auto(settings.frame_gap); })
             .initially("auto")
             .other("late_window", "After a timeout, how long a late reply is waited for.",
@@ -169,7 +189,9 @@ const Keys<LineTiming>& line_timing_keys() {
     static const auto kKeys =
         Keys<LineTiming>()
             .other("reply_hole",
-                   "The longest silence inside a reply: 60 ms and 32 characters, on tcp:// 700 ms.",
+                   "The longest silence inside a reply; auto: 60 ms and 32 characters, on tcp:// "
+                   "700 ms, "
+                   "in ASCII 1 s.",
                    [](const LineTiming& line) { return format_duration(line.reply_hole); })
             .initially("auto")
             .duration("broadcast_turnaround", &LineTiming::broadcast_turnaround, 1ms, 1min,
@@ -182,7 +204,7 @@ const Keys<arbiter::QueueSettings>& queue_keys() {
     static const auto kKeys =
         Keys<Queue>()
             .integer("limit", &Queue::limit, 1, 4096, "Of all clients together.")
-            .integer("per_client", &Queue::per_client, 1, 4096, "")
+            .integer("per_client", &Queue::per_client, 1, 4096, "Of one client.")
             .duration("deadline", &Queue::deadline, 10ms, 10min,
                       "From a request's arrival to its answer.");
     return kKeys;
@@ -209,7 +231,7 @@ const Keys<StationBody, StationView>& station_keys() {
             .other("profile", "`panelgate profiles` lists them.",
                    [](const StationView& of) { return of.station.profile->name; })
             .initially("generic")
-            .other("access", "",
+            .other("access", "read_only refuses whatever writes.",
                    [](const StationView& of) { return access_text(of.station.read_only); })
             .initially("read_write")
             .other("timing", "Over the line's.")
@@ -225,6 +247,7 @@ const Keys<StationBody, StationView>& station_keys() {
                 modbus::kCrcOrders,
                 "The profile's without; high_first: Autonics GP with firmware of before June "
                 "2005.")
+            .change_needs(kOpensPort)
             .duration(
                 "max_age", [](auto& of) -> auto& { return of.settings.max_age; }, 0ms, 24h,
                 "How old a value may be that answers a client; 0ms asks the panel.")
@@ -235,11 +258,14 @@ const Keys<StationBody, StationView>& station_keys() {
             .initially("false")
             .word(
                 "translate", [](auto& of) -> auto& { return of.station.translate; }, kTranslate,
-                "What the panel lacks goes out as what it has: 05 and 06 as 15 and 16; not with "
-                "a guard.")
+                "What the panel lacks goes out as what it has: 05 and 06 as 15 and 16, and 02 and "
+                "04 "
+                "as 01 and 03 where the profile says that the memory is the same; not with a "
+                "guard.")
             .initially("auto")
             .other("poll", "Blocks that are read again and again, for max_age.")
             .other("simulate", "Faults of the simulated panel.")
+            .change_needs(kOpensPort)
             .other("points", "Values by name.");
     return kKeys;
 }
@@ -265,10 +291,11 @@ const Keys<sim::Misbehaviour>& fault_keys() {
 const Keys<points::Poll>& poll_keys() {
     using points::Poll;
     constexpr std::int64_t kLargest = 2040;  // the largest read of any panel: GT, ARCT1F501E 1.3.1
-    static const auto kKeys = Keys<Poll>()
-                                  .other("read", "Where it begins, as the panel names it.")
-                                  .integer("count", &Poll::count, 1, kLargest, "Registers or bits.")
-                                  .duration("every", &Poll::every, 1ms, points::kSlowest, "");
+    static const auto kKeys =
+        Keys<Poll>()
+            .other("read", "Where it begins, as the panel names it.")
+            .integer("count", &Poll::count, 1, kLargest, "Registers or bits.")
+            .duration("every", &Poll::every, 1ms, points::kSlowest, "How often it is read.");
     return kKeys;
 }
 
@@ -288,7 +315,7 @@ const Keys<points::Point>& point_keys() {
                    [](const Point& point) {
                        return point.bit ? std::to_string(*point.bit) : std::string("none");
                    })
-            .other("type", "u16 without; of bits bool.",
+            .other("type", "How it is read; u16 without, of bits bool.",
                    [](const Point& point) { return std::string(label(point.type)); })
             .other("length", "Characters of a string, two in a register.",
                    [](const Point& point) { return std::to_string(point.length); })
@@ -296,7 +323,8 @@ const Keys<points::Point>& point_keys() {
             .other("scale", "value = raw * scale + offset.",
                    [](const Point& point) { return number_text(point.scale); })
             .initially("1")
-            .other("offset", "", [](const Point& point) { return number_text(point.offset); })
+            .other("offset", "See scale.",
+                   [](const Point& point) { return number_text(point.offset); })
             .initially("0")
             .other("unit", "As people write it.",
                    [](const Point& point) { return point.unit.empty() ? "none" : point.unit; })
@@ -304,7 +332,7 @@ const Keys<points::Point>& point_keys() {
                    [=](const Point& point) { return or_none(point.min); })
             .other("max", "The most that may be written.",
                    [=](const Point& point) { return or_none(point.max); })
-            .boolean("writable", &Point::writable, "")
+            .boolean("writable", &Point::writable, "Clients may write it.")
             .other("labels", "Names of raw numbers: {0: off, 1: on}.")
             .other("no_value", "Raw numbers that mean that there is none.",
                    [](const Point& point) {

@@ -83,11 +83,14 @@ void MapReader::looks_like(std::string_view key, std::string_view pattern, bool 
     told->may_be_number = number;
 }
 
-void MapReader::about(std::string_view key, std::string_view initial, std::string_view text) {
+void MapReader::about(std::string_view key, std::string_view initial, std::string_view text,
+                      std::string_view change) {
     KeyShape* told = shape(key);
     if (told == nullptr) return;
     told->text = text;
     told->initial = initial;
+    told->change = change;
+    told->order = ++order_;
 }
 
 void MapReader::no_longer(std::string_view key, std::size_t characters) {

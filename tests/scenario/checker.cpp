@@ -10,15 +10,6 @@
 #include "support/read_span.hpp"
 
 namespace panelgate::scenario {
-namespace {
-
-constexpr std::uint8_t kBroadcast = 0;
-
-std::uint16_t word(ByteView bytes, std::size_t at) {
-    return static_cast<std::uint16_t>(bytes[at] * 256 + bytes[at + 1]);
-}
-
-}  // namespace
 
 Checker::Checker(const Plan& plan)
     : plan_(plan),

@@ -9,11 +9,6 @@
 #include "support/read_span.hpp"
 
 namespace panelgate::scenario {
-namespace {
-
-constexpr std::uint8_t kBroadcast = 0;
-
-}  // namespace
 
 /// What goes with this frame: what it contains and may run, nothing older of its client waiting for
 /// that station, nor a broadcast. What was sent before and is not this frame waits again.

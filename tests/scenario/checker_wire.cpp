@@ -9,9 +9,9 @@
 #include "support/read_span.hpp"
 
 namespace panelgate::scenario {
+
 namespace {
 
-constexpr std::uint8_t kBroadcast = 0;
 constexpr std::size_t kLongestAdu = 256;
 
 }  // namespace

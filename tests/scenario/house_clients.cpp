@@ -5,13 +5,10 @@
 #include <utility>
 
 namespace panelgate::scenario {
+
 namespace {
 
 constexpr std::size_t kHeader = 7;  // MBAP
-
-std::uint16_t word(ByteView bytes, std::size_t at) {
-    return static_cast<std::uint16_t>(bytes[at] * 256 + bytes[at + 1]);
-}
 
 }  // namespace
 

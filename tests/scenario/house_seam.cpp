@@ -9,11 +9,8 @@
 #include "panelgate/modbus/response.hpp"
 
 namespace panelgate::scenario {
-namespace {
 
-std::uint16_t word(ByteView bytes, std::size_t at) {
-    return static_cast<std::uint16_t>(bytes[at] * 256 + bytes[at + 1]);
-}
+namespace {
 
 /// Refusals are handed out a millisecond apart.
 constexpr Duration kSlack = 2ms;

@@ -185,7 +185,7 @@ void writes_again(Plan& plan) {
     }
 }
 
-const Mutant kMutants[] = {
+const Mutant kFieldMutants[] = {
     {"ForgetsWhatIsOwedOverALineLoss", "P1: a value", Kind::loss,
      tampered<ForgetsWhatIsOwedOverALineLoss>(), one_client_of_one_slow_panel},
     {"BelievesThatNothingStalls", "P1: a value", Kind::stall,
@@ -235,7 +235,7 @@ class FieldMutation : public testing::TestWithParam<Mutant> {};
 
 TEST_P(FieldMutation, IsCaught) { EXPECT_EQ(not_caught(GetParam()), ""); }
 
-INSTANTIATE_TEST_SUITE_P(Every, FieldMutation, testing::ValuesIn(kMutants),
+INSTANTIATE_TEST_SUITE_P(Every, FieldMutation, testing::ValuesIn(kFieldMutants),
                          [](const auto& info) { return std::string(info.param.name); });
 
 }  // namespace

@@ -7,13 +7,6 @@
 #include "speech.hpp"
 
 namespace panelgate::scenario {
-namespace {
-
-std::uint16_t word(ByteView bytes, std::size_t at) {
-    return static_cast<std::uint16_t>(bytes[at] * 256 + bytes[at + 1]);
-}
-
-}  // namespace
 
 Panel::Panel(const PanelPlan& plan, const Plan& all, Agenda& agenda, Wire& wire, Random& random,
              Witness& witness)

@@ -3,15 +3,6 @@
 #include <algorithm>
 
 namespace panelgate::scenario {
-namespace {
-
-constexpr std::uint8_t kBroadcast = 0;
-
-std::uint16_t word(ByteView bytes, std::size_t at) {
-    return static_cast<std::uint16_t>(bytes[at] * 256 + bytes[at + 1]);
-}
-
-}  // namespace
 
 std::uint16_t moving_value(std::uint8_t station, std::uint8_t function, std::uint16_t address,
                            std::uint64_t served) {

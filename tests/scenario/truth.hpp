@@ -14,6 +14,12 @@
 
 namespace panelgate::scenario {
 
+inline constexpr std::uint8_t kBroadcast = 0;
+/// Big-endian, as everything in a PDU.
+inline std::uint16_t word(ByteView bytes, std::size_t at) {
+    return static_cast<std::uint16_t>(bytes[at] * 256 + bytes[at + 1]);
+}
+
 /// Registers from here on are memory that clients write; below, each holds how many requests its
 /// station has served, plus something of its own: a value tells when it was read.
 inline constexpr std::uint16_t kMemory = 1000;

@@ -9,11 +9,18 @@
 
 namespace panelgate::config {
 
+/// The change of a key that a reload cannot take over (KeyShape::change).
+inline constexpr std::string_view kNextStart = "takes effect at the next start";
+
 /// Every key that load() reads, in that order: what a configuration may have. Without what is
 /// resolved earlier: templates, a station's `template`, `x-` keys, merges, variables.
 struct Described {
     std::vector<yaml::KeyShape> keys;
     std::vector<yaml::KeyRule> rules;
+
+    /// What a change of a setting (Setting::path) needs beside a reload; "" nothing. Valid as long
+    /// as this.
+    std::string_view change_of(std::string_view setting) const;
 };
 Described describe();
 

@@ -41,6 +41,9 @@ struct KeyShape {
     std::string keys;              ///< pattern for the keys of a map with free keys
     std::string text;              ///< what it is for; one sentence
     std::string initial;           ///< what leaving it out means, in the file's notation; or ""
+    std::string example;           ///< a value in the file's notation; or ""
+    std::string change;            ///< what a change of it needs beside a reload; or ""
+    int order = 0;                 ///< among the keys of its map
 };
 
 /// A dependency between two keys of a map; a merge may supply the other.

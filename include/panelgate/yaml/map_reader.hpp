@@ -91,8 +91,10 @@ class MapReader {
     /// The text, or those in a list or map, must match this regular expression (ECMA 262);
     /// `number`: it may look like a number to YAML.
     void looks_like(std::string_view key, std::string_view pattern, bool number = false);
-    /// What the key is for, and what leaving it out means in the file's notation.
-    void about(std::string_view key, std::string_view initial, std::string_view text);
+    /// What the key is for, what leaving it out means in the file's notation, and what a change of
+    /// it needs. The keys of a map are in the order of these calls.
+    void about(std::string_view key, std::string_view initial, std::string_view text,
+               std::string_view change);
     void no_longer(std::string_view key, std::size_t characters);
     /// Pattern for the keys of a map with free keys.
     void keyed_by(std::string_view key, std::string_view pattern);
@@ -153,6 +155,7 @@ class MapReader {
     std::vector<std::string> excused_;  ///< required, absent, and probably mistyped
     std::vector<std::string> parents_;  ///< known keys with a map or a list
     std::span<const Elsewhere> elsewhere_;
+    int order_ = 0;  ///< of about()
 };
 
 /// Parse the text forms above for scalars that are not map values; nothing for other text. Units:

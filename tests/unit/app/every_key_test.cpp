@@ -6,12 +6,14 @@
 #include <iterator>
 #include <map>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "difference.hpp"
 #include "panelgate/config/describe.hpp"
+#include "running_line.hpp"
 #include "support/yaml_text.hpp"
 #include "unit/config/memory_files.hpp"
 
@@ -61,7 +63,7 @@ std::string text_of(const fs::path& path) {
     return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Has what the example has in only one way, or not at all.
+/// Has what every_key.yaml has in only one way, or not at all.
 constexpr const char* kFurther = R"(lines:
   - name: a
     device: /dev/ttyS1
@@ -133,14 +135,57 @@ void find_leaves(yaml::Node& node, const std::string& key, std::vector<Leaf>& le
     }
 }
 
+template <class T>
+const T* same_name(const std::vector<T>& all, const std::string& name) {
+    const auto found = std::ranges::find(all, name, &T::name);
+    return found == all.end() ? nullptr : &*found;
+}
+
+/// What a reload does beside taking values over, as the parts that decide it say.
+std::set<std::string> done_by_reload(const config::Config& before, const config::Config& after,
+                                     bool simulate) {
+    std::set<std::string> done;
+    for (const config::Line& line : before.lines) {
+        const config::Line* now = same_name(after.lines, line.name);
+        if (now != nullptr && !is_same_wire(line, *now, simulate))
+            done.insert("the port is opened anew");
+    }
+    for (const serial_server::Settings& master : before.serial_masters) {
+        const auto* now = same_name(after.serial_masters, master.name);
+        if (now != nullptr && !(*now == master)) done.insert("the port is opened anew");
+    }
+    for (const tcp_server::Settings& listener : before.modbus_tcp) {
+        for (const tcp_server::Settings& now : after.modbus_tcp) {
+            if (now.name() == listener.name() && !now.is_same_listener(listener))
+                done.insert("it listens anew, and its clients connect again");
+        }
+    }
+    if (before.http && after.http && !before.http->is_same_listener(*after.http))
+        done.insert("it listens anew, and its clients connect again");
+    if (before.mqtt != after.mqtt) done.insert("it connects to the broker anew");
+    if (before.realtime != after.realtime) done.insert(std::string(config::kNextStart));
+    return done;
+}
+
+/// The differences say what is done.
+void expect_needs(const config::Config& before, const config::Config& after,
+                  const std::string& key) {
+    std::set<std::string> said;
+    for (const Change& change : differences(before, after))
+        if (!change.needs.empty()) said.insert(change.needs);
+    EXPECT_EQ(said, done_by_reload(before, after, key.find("simulate") != key.npos)) << key;
+}
+
 /// Another value that the loader accepts makes a difference.
-bool makes_a_difference(const yaml::Node& tree, yaml::Node& value, const config::Config& before) {
+bool makes_a_difference(const yaml::Node& tree, const Leaf& leaf, const config::Config& before) {
+    yaml::Node& value = *leaf.value;
     const yaml::Node kept = value;
     bool differs = false;
     for (const std::string& other : others(kept)) {
         value.scalar = other;
         const auto after = load(yaml_text(tree));
         differs = after && !differences(before, *after).empty();
+        if (differs) expect_needs(before, *after, leaf.key);
         if (differs) break;
     }
     value = kept;
@@ -149,8 +194,8 @@ bool makes_a_difference(const yaml::Node& tree, yaml::Node& value, const config:
 
 TEST(EveryKey, OfAConfigurationMakesADifference) {
     std::map<std::string, bool> keys;
-    const fs::path example = fs::path(SOURCE_ROOT) / "config/panelgate.example.yaml";
-    for (const std::string& text : {std::string(kFurther), std::string(kPlain), text_of(example)}) {
+    const std::string most = text_of(fs::path(TEST_DATA) / "every_key.yaml");
+    for (const std::string& text : {std::string(kFurther), std::string(kPlain), most}) {
         yaml::Problems problems("x.yaml");
         yaml::Node tree = yaml::parse(text, problems);
         const auto before = load(text);
@@ -161,7 +206,7 @@ TEST(EveryKey, OfAConfigurationMakesADifference) {
         find_leaves(tree, "", leaves);
         for (const Leaf& leaf : leaves) {
             bool& differs = keys[leaf.key];
-            differs = differs || makes_a_difference(tree, *leaf.value, *before);
+            differs = differs || makes_a_difference(tree, leaf, *before);
         }
     }
     EXPECT_GE(keys.size(), 120U);

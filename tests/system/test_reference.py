@@ -1,0 +1,65 @@
+#!/usr/bin/env python3
+"""Documents that are made from the table of keys are those of this program, and have each key."""
+import json
+import pathlib
+import re
+import subprocess
+import tempfile
+import unittest
+
+import harness
+from harness import ROOT
+
+
+class Reference(unittest.TestCase):
+    def run_it(self, *words):
+        return subprocess.run([harness.PANELGATE, *words], check=True, capture_output=True, text=True).stdout
+
+    def keys(self):
+        return json.loads(self.run_it("config", "keys", "--format", "json"))["keys"]
+
+    def test_documents_are_those_of_this_program(self):
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([ROOT / "deploy/manual/reference.py", folder, harness.PANELGATE], check=True)
+            for path in ("docs/reference/configuration.md", "config/panelgate.example.yaml"):
+                self.assertEqual((pathlib.Path(folder) / path).read_text(), (ROOT / path).read_text(),
+                                 f"{path}: run deploy/manual/reference.py . build/release/panelgate")
+
+    def test_each_key_is_in_each_output(self):
+        """Drift is impossible where all come from one row: a key that one of them lost would be seen here."""
+        page = (ROOT / "docs/reference/configuration.md").read_text()
+        example = (ROOT / "config/panelgate.example.yaml").read_text()
+        schema = json.dumps(json.loads(self.run_it("schema")))
+        listed = self.run_it("config", "keys")
+        for key in self.keys():
+            name = key["path"].rsplit(".", 1)[-1]
+            with self.subTest(key["path"]):
+                self.assertTrue(f"| `{name}` |" in page, "page")
+                self.assertTrue(re.search(rf"(?m)^[ #-]*{re.escape(name)}:", example), "example")
+                self.assertTrue(f'"{name}":' in schema, "schema")
+                self.assertTrue(re.search(rf"(?m)^{re.escape(key['path'])}\b", listed), "config keys")
+                self.assertTrue(key.get("text"), "what it is for")
+
+    def test_the_example_says_what_is_left_out(self):
+        """A commented key has the value that it has when it is left out: typed in, nothing changes."""
+        example = (ROOT / "config/panelgate.example.yaml").read_text()
+        with tempfile.TemporaryDirectory() as folder:
+            whole = pathlib.Path(folder) / "whole.yaml"
+            changed = 0
+            for key in self.keys():
+                name, default = key["path"].rsplit(".", 1)[-1], key.get("default")
+                line = rf"(?m)^( *)#({re.escape(name)}: {re.escape(default or '')})$"
+                off = key["path"].startswith(("serial_masters", "mqtt", "realtime"))
+                if off or not default or not re.search(line, example):
+                    continue
+                whole.write_text(re.sub(line, r"\1\2", example, count=1))
+                said = subprocess.run([harness.PANELGATE, "check", "-c", whole, "--diff",
+                                       ROOT / "config/panelgate.example.yaml"], capture_output=True, text=True)
+                if said.returncode == 0:  # a few belong to another value of a neighbour
+                    self.assertIn("nothing changes", said.stdout, key["path"])
+                    changed += 1
+        self.assertGreater(changed, 30)
+
+
+if __name__ == "__main__":
+    unittest.main()
