@@ -78,6 +78,7 @@ units=OFF
 which=(-LE nightly)
 [ $mode != nightly ] || which=()
 must "build release" build release $units ON
+[ $mode != nightly ] || step "model" bash -c "deploy/install_packages.sh model && tests/model/run.sh"
 [ $mode != nightly ] || step "headers stand alone" cmake --build --preset release --target all_verify_interface_header_sets
 step "tests release" run_tests release "${which[@]}"
 step "deploy/demo.sh" /usr/bin/python3 -B tests/system/demo_script.py

@@ -51,6 +51,14 @@ void OutstandingReplies::close_before(TimePoint sent, TimePoint connected) {
                   [&](const Entry& one) { return one.sent < sent && one.sent >= connected; });
 }
 
+bool OutstandingReplies::spans_connections(ByteView reply, TimePoint connected) const {
+    const auto fits = may_be_answered_by(reply);
+    const auto first = std::ranges::find_if(entries_, fits);
+    return first != entries_.end() && first->sent < connected &&
+           std::ranges::any_of(
+               entries_, [&](const Entry& one) { return one.sent >= connected && fits(one); });
+}
+
 bool OutstandingReplies::fits_other(ByteView reply, const Bytes& pdu) const {
     const auto fits = may_be_answered_by(reply);
     return std::ranges::any_of(entries_,

@@ -82,7 +82,16 @@ void Station::remember_refusal(TimePoint now, ByteView pdu) {
     unsolicited_refusal_at_ = now;
 }
 
-Station::Heard Station::on_unsolicited_frame(TimePoint now, ByteView pdu) {
+/// True if it is unknown which of several requests over different connections this reply answers:
+/// then none of them is closed. `asked`: one is on the wire, and the reply is an exception that
+/// could be its.
+bool Station::answers_either(ByteView pdu, bool asked) const {
+    const bool may_be_of_open = asked && modbus::exception_of(pdu);
+    return outstanding_.spans_connections(pdu, connected_) ||
+           (may_be_of_open && outstanding_.oldest(pdu)->sent < connected_);
+}
+
+Station::Heard Station::on_unsolicited_frame(TimePoint now, ByteView pdu, bool asked) {
     Heard heard;
     heard.kind = judge(now, pdu);
     const bool may_repeat = now < std::exchange(again_until_, TimePoint{});
@@ -96,17 +105,17 @@ Station::Heard Station::on_unsolicited_frame(TimePoint now, ByteView pdu) {
     }
     // The oldest one whose reply could still come: an older one would overstate the lateness.
     const OutstandingReplies::Entry answered = *outstanding_.oldest(pdu, now - latest_reply());
-    const TimePoint asked = answered.sent;
-    const TimePoint due = asked + settings_.response_timeout;
+    const TimePoint sent = answered.sent;
+    const TimePoint due = sent + settings_.response_timeout;
     // After a shortened wait it shows how long the panel needs; a reply delayed beyond the whole
     // timeout does not.
-    if (now <= due) slowest_.add(now - asked);
+    if (now <= due) slowest_.add(now - sent);
     heard.lateness = std::max(now - due, Duration::zero());
     if (heard.lateness > Duration::zero()) late_.on_late(heard.lateness);
     // A repetition of the previous reply may be a duplicate, and the outstanding reply still comes.
     if (may_be_duplicate) {
         duplicates_.on_ambiguous(now, pdu);
-    } else {
+    } else if (!answers_either(pdu, asked)) {
         outstanding_.close_before(outstanding_.oldest(pdu)->sent, connected_);
         outstanding_.take(pdu);
     }
@@ -155,9 +164,12 @@ void Station::settle_outstanding(TimePoint now, const Attempt& attempt) {
         rest_is_over(now + duplicates_.take_doubt());
     } else if (const OutstandingReplies::Entry* const oldest =
                    outstanding_.oldest(attempt.reply())) {
-        // Each attempt may have been answered with it, this one too.
-        outstanding_.close_before(oldest->sent, connected_);
-        outstanding_.take(attempt.reply());
+        // Each attempt may have been answered with it, this one too; those over an earlier
+        // connection in any order.
+        if (oldest->sent >= connected_) {
+            outstanding_.close_before(oldest->sent, connected_);
+            outstanding_.take(attempt.reply());
+        }
         outstanding_.add(sent, group.request.pdu());
         rest_for_outstanding(now);
     } else if (now < again_until_ && late_.worst() > Duration::zero()) {

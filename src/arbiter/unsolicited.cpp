@@ -91,8 +91,10 @@ void UnsolicitedFrames::note(TimePoint now, const std::vector<Unused>& parts, bo
             if (what == Part::request) let_reply_pass(now, part.bytes, stations, quiet);
             continue;
         }
+        const bool asked = !idle && part.station == quiet.station();
         const Station::Heard heard =
-            stations.of(part.station).on_unsolicited_frame(heard_at, modbus::pdu_of(part.bytes));
+            stations.of(part.station)
+                .on_unsolicited_frame(heard_at, modbus::pdu_of(part.bytes), asked);
         outbox.on_unsolicited(now, part, part_of(heard.kind), quiet.station(), heard.lateness);
         if (heard.kind == Unsolicited::late) outbox.event(Kind::late, part.station, heard.lateness);
         if (heard.back) {

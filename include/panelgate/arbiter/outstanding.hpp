@@ -47,6 +47,9 @@ class OutstandingReplies {
     /// A request that left at `sent` was served, and a station serves in order: removes the earlier
     /// ones of the same connection (that left at `connected` or later).
     void close_before(TimePoint sent, TimePoint connected);
+    /// True if what this reply may answer left over different connections, the present one of which
+    /// was opened at `connected`. Their order is unknown: it may be the reply to any of them.
+    bool spans_connections(ByteView reply, TimePoint connected) const;
     /// True if this reply may answer one of them that is another request.
     bool fits_other(ByteView reply, const Bytes& pdu) const;
     /// True if a request of another function is among them.

@@ -131,7 +131,8 @@ class Station {
                                    : usual() + late_.worst();
     }
     /// Classifies an unsolicited frame and updates the state. `pdu`: without address and CRC.
-    Heard on_unsolicited_frame(TimePoint now, ByteView pdu);
+    /// `asked`: a request to it is on the wire, which this does not answer.
+    Heard on_unsolicited_frame(TimePoint now, ByteView pdu, bool asked = false);
     /// Classifies as on_unsolicited_frame(), without changes.
     Unsolicited judge(TimePoint now, ByteView pdu) const;
     /// Unsolicited bytes followed its reply.
@@ -296,6 +297,7 @@ class Station {
     void spend(TimePoint now, Duration cost, bool is_read = true) {
         (is_read ? budget_ : writes_).spend(now, cost, kBudgetMemory * timeout_cost());
     }
+    bool answers_either(ByteView pdu, bool asked) const;
     /// True if its last unanswered write was to the same address.
     bool is_ignored(const modbus::Request& write) const {
         const auto place = [](const Bytes& pdu) {

@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# tests/model/run.sh [--large]: checks book.pml with spin (Debian's package, and clang), and that each rule is
+# needed: without it spin finds a wrong value or a write that goes twice. About ten minutes; --large: an hour more,
+# two stations and a further attempt, as far as the memory of hashed states goes.
+set -euo pipefail
+cd "$(dirname "$(readlink -f "$0")")"
+command -v spin >/dev/null || { echo "install spin: apt-get install spin" >&2; exit 69; }
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+failed=0
+
+# check EXPECTED NAME SPIN_OPTIONS... [-- COMPILER_OPTIONS...]
+check() {
+    local expected=$1 name=$2 errors states
+    shift 2
+    (cd "$work" && spin -a "$@" "$OLDPWD/book.pml" >/dev/null &&
+        clang-19 -w -O2 -DSAFETY -DMEMLIM=12000 "${memory[@]}" -o pan pan.c && ./pan -m5000 ${depth[@]+"${depth[@]}"} >pan.txt 2>&1) || true
+    errors=$(sed -nE 's/.*errors: ([0-9]+).*/\1/p' "$work/pan.txt")
+    states=$(sed -nE 's/ *([0-9.e+]+) states, stored.*/\1/p' "$work/pan.txt")
+    [ "${errors:-?}" = "$expected" ] || failed=1
+    printf '%-34s %s error(s), %s expected, %s states\n' "$name" "${errors:-?}" "$expected" "${states:-?}"
+}
+
+memory=(-DCOLLAPSE)
+depth=()
+for rule in NO_FORM NO_WINDOW NO_BOOK NO_DOUBT NO_OLDEST NO_ORDER FORGET_OLD RETRY_ALL; do
+    check 1 "without: $rule" -D$rule
+done
+check 0 "3 requests, 4 attempts" -DATTEMPTS=4
+if [ "${1-}" = --large ]; then
+    memory=(-DBITSTATE)
+    depth=(-w34)
+    check 0 "2 stations, 5 attempts (hashed)" -DATTEMPTS=5 -DSTATIONS=2
+fi
+exit $failed
