@@ -16,7 +16,7 @@ std::uint32_t known_length(const Station& station, const modbus::Span& span) {
     const StationSettings& settings = station.settings();
     const std::uint32_t limit =
         modbus::is_bit_table(span.table) ? settings.max_bits : settings.max_registers;
-    return settings.vouched ? limit : std::min(limit, station.longest_read(span.table));
+    return settings.vouched ? limit : std::min(limit, station.requests().longest_read(span.table));
 }
 
 }  // namespace
@@ -47,7 +47,7 @@ bool Sharing::joins(const Group& group, const Job& job, const Station& station) 
     if (!span || !group.span->touches(*span)) return false;
     if (group.span->contains(*span)) return true;
     const modbus::Span both = join(*group.span, *span);
-    if (station.has_outstanding() && station.is_ambiguous(modbus::Request::read(both)))
+    if (station.requests().any() && station.requests().is_ambiguous(modbus::Request::read(both)))
         return false;
     // A span that contains all the others was asked for by a client itself.
     if (both != *span && both.count > known_length(station, both)) return false;
@@ -176,7 +176,7 @@ Group internal_read(std::uint8_t station, modbus::Request request) {
 /// P8: it is unknown whether this line has an echo, and this job could be confirmed by its own
 /// echo. A read of the same station decides.
 Group learning_for(const Job& job, const Station& station) {
-    modbus::Request probe = station.probe();
+    modbus::Request probe = station.requests().probe();
     if (!teaches_echo(probe))
         probe = modbus::Request::read({modbus::Table::holding_registers, 0, 1});
     Group group = internal_read(job.station, std::move(probe));
@@ -209,8 +209,10 @@ TimePoint Schedule::ready_at(const Stations& stations, const Job& job) const {
         return broadcasts_.over(job.request, stations.settings(job.station).response_timeout);
     // A write that its echo could confirm is preceded by a read, which may be any.
     const bool is_learned = echo_known_ || job.request.is_read();
-    TimePoint clear = is_learned ? station->clear_at(job.request) : station->rested();
-    if (can_prove(*station)) clear = std::min(clear, station->clear_at(station->proof()));
+    TimePoint clear =
+        is_learned ? station->requests().clear_at(job.request) : station->requests().rested();
+    if (can_prove(*station))
+        clear = std::min(clear, station->requests().clear_at(station->requests().proof()));
     return std::max({clear, broadcasts_.over(job.request, station->broadcast_window()),
                      stations.throttled_until(job.station)});
 }
@@ -218,7 +220,7 @@ TimePoint Schedule::ready_at(const Stations& stations, const Job& job) const {
 /// At once if the outstanding reply is to this very request, else after it (P1).
 TimePoint Schedule::repeat_from(const Group& group, const Stations& stations) const {
     const Station& station = *stations.find(group.station);
-    return std::max(station.clear_at(group.request, true),
+    return std::max(station.requests().clear_at(group.request, true),
                     broadcasts_.over(group.request, station.broadcast_window()));
 }
 
@@ -287,7 +289,7 @@ std::optional<Group> Schedule::next_probe(TimePoint now, Stations& stations, Qui
     if (now < quiet.quarantined_until()) return std::nullopt;
     const auto station = stations.next_to_probe(now);
     if (!station || !gap_is_over(now, *station, stations, quiet)) return std::nullopt;
-    Group group = internal_read(*station, stations.find(*station)->probe());
+    Group group = internal_read(*station, stations.find(*station)->requests().probe());
     group.probe = true;
     return group;
 }
@@ -308,16 +310,16 @@ JobQueue::Test Schedule::runnable(TimePoint now, const Stations& stations,
 std::optional<Schedule::Next> Schedule::proof_before(TimePoint now, const Job& job,
                                                      const Stations& stations) const {
     const Station* station = stations.find(job.station);
-    if (job.station == kBroadcast || station == nullptr || !station->is_ambiguous(job.request))
+    if (job.station == kBroadcast || station == nullptr ||
+        !station->requests().is_ambiguous(job.request))
         return std::nullopt;
     const bool is_in_transit = in_transit(*station);
-    if (!is_in_transit && now >= station->clear_at(job.request)) return std::nullopt;
-    if (is_in_transit && !can_prove(*station) &&
-        station->has_outstanding_since(transport_.opened()))
+    if (!is_in_transit && now >= station->requests().clear_at(job.request)) return std::nullopt;
+    if (is_in_transit && !can_prove(*station) && station->requests().any_since(transport_.opened()))
         return Next{std::nullopt, true};
-    Group proof = internal_read(job.station, station->proof());
+    Group proof = internal_read(job.station, station->requests().proof());
     proof.probe = true;
-    proof.distinct_length = proof.request != station->probe();
+    proof.distinct_length = proof.request != station->requests().probe();
     return Next{std::move(proof), false};
 }
 
@@ -384,12 +386,12 @@ std::optional<TimePoint> Schedule::next_start(const Stations& stations, const Qu
 std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& failed,
                                                     TimePoint sent, const Station& station) const {
     const StationSettings& own = station.settings();
-    const TimePoint rested = station.rested();
+    const TimePoint rested = station.requests().rested();
     if (quarantine_ == Quarantine::line && !failed.probe) {
         return own.adaptive_timeout ? std::min(rested, now + station.response_timeout()) : rested;
     }
     // A rest longer than another timeout is not worth it: a collision costs that much.
-    const Duration worst = station.worst_lateness();
+    const Duration worst = station.requests().worst_lateness();
     const bool is_late =
         failed.first_silence && worst > Duration::zero() && worst <= own.response_timeout;
     if (quarantine_ != Quarantine::automatic || !is_late) return std::nullopt;

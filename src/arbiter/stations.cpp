@@ -100,23 +100,23 @@ bool Stations::refuses(TimePoint now, const Job& job) {
     const ProbeBudget& budget = station.unheard() ? asked_unheard_ : probes();
     if (may_wake && budget.allows(now) && station.take_half_open(now, job.request.is_read()))
         return false;
-    station.on_refused(job.request);
+    station.requests().on_wanted(job.request);
     return true;
 }
 
 TimePoint Stations::clear_at(TimePoint now, bool may_stall) const {
     TimePoint clear{};
     for (const auto& [id, station] : stations_) {
-        if (!station.has_outstanding()) continue;
-        clear = std::max(clear, station.rested());
-        if (may_stall) clear = std::max(clear, now + station.latest_reply());
+        if (!station.requests().any()) continue;
+        clear = std::max(clear, station.requests().rested());
+        if (may_stall) clear = std::max(clear, now + station.requests().latest_reply());
     }
     return clear;
 }
 
 Duration Stations::latest_reply(std::uint8_t id) const {
     const Station* found = find(id);
-    return found == nullptr ? 2 * settings(id).response_timeout : found->latest_reply();
+    return found == nullptr ? 2 * settings(id).response_timeout : found->requests().latest_reply();
 }
 
 StationHealth Stations::health(std::uint8_t id) const {

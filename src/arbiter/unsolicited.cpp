@@ -25,14 +25,14 @@ bool is_request(ByteView adu) {
     return !fits_reply && modbus::request_adu_length(adu) == adu.size();
 }
 
-Part part_of(Unsolicited kind) {
+Part part_of(Claim kind) {
     switch (kind) {
-        case Unsolicited::late:
+        case Claim::late:
             return Part::late;
-        case Unsolicited::duplicate:
-        case Unsolicited::second:
+        case Claim::duplicate:
+        case Claim::second:
             return Part::duplicate;
-        case Unsolicited::unasked:
+        case Claim::unasked:
             return Part::unasked;
     }
     std::abort();
@@ -71,8 +71,9 @@ Part UnsolicitedFrames::judge(TimePoint now, const Unused& part, const Stations&
     // It must not be taken for anything else it might be.
     if (answers_other_master(now, part.bytes)) return Part::unknown;
     const Station* station = stations.find(part.station);
-    const bool explained = station != nullptr &&
-                           station->judge(now, modbus::pdu_of(part.bytes)) != Unsolicited::unasked;
+    const bool explained =
+        station != nullptr &&
+        station->requests().claim_of(now, modbus::pdu_of(part.bytes)) != Claim::unasked;
     if (!explained && answers_broadcast(part.bytes)) return Part::broadcast_reply;
     return station == nullptr ? Part::unknown : Part::unasked;
 }
@@ -95,8 +96,8 @@ void UnsolicitedFrames::note(TimePoint now, const std::vector<Unused>& parts, bo
         const Station::Heard heard =
             stations.of(part.station)
                 .on_unsolicited_frame(heard_at, modbus::pdu_of(part.bytes), asked);
-        outbox.on_unsolicited(now, part, part_of(heard.kind), quiet.station(), heard.lateness);
-        if (heard.kind == Unsolicited::late) outbox.event(Kind::late, part.station, heard.lateness);
+        outbox.on_unsolicited(now, part, part_of(heard.claim), quiet.station(), heard.lateness);
+        if (heard.claim == Claim::late) outbox.event(Kind::late, part.station, heard.lateness);
         if (heard.back) {
             stations.on_recovery();
             outbox.event(Kind::online, part.station);
@@ -133,9 +134,9 @@ bool UnsolicitedFrames::is_wrong_reply(TimePoint now, ByteView adu,
     if (station == nullptr) return false;
     // An exception for another outstanding function may be meant for this request: asking again
     // decides sooner than waiting.
-    const Unsolicited kind = station->judge(now, modbus::pdu_of(adu));
-    return kind == Unsolicited::unasked ||
-           (kind == Unsolicited::late && modbus::exception_of(modbus::pdu_of(adu)));
+    const Claim kind = station->requests().claim_of(now, modbus::pdu_of(adu));
+    return kind == Claim::unasked ||
+           (kind == Claim::late && modbus::exception_of(modbus::pdu_of(adu)));
 }
 
 }  // namespace panelgate::arbiter

@@ -185,23 +185,24 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     Attempt& attempt = *active_;
     const Group& group = attempt.group();
     const bool refusal = modbus::exception_of(attempt.reply()).has_value();
-    const bool may_be_outstanding = refusal && !group.probe &&
-                                    (attempt.refusal_was_rejected() ||
-                                     station.refuses_other(attempt.reply(), group.request.pdu()));
+    const bool may_be_outstanding =
+        refusal && !group.probe &&
+        (attempt.refusal_was_rejected() ||
+         station.requests().refuses_other(attempt.reply(), group.request.pdu()));
     const bool is_early = early && !settings_.paced && pace_.believed();
     const bool is_too_early = is_early && attempt.replied_too_early();
     if (attempt.is_contested()) {
         attempt.reject_contested();
         return false;
     }
-    if (may_be_outstanding || station.is_duplicate(now, attempt, is_too_early)) {
+    if (may_be_outstanding || station.requests().is_duplicate(now, attempt, is_too_early)) {
         attempt.reject_reply();
         return false;
     }
     const bool waits = attempt.precedes_echo() && !attempt.had_candidate();
     const bool may_be_others =
         refusal && group.may_doubt_refusal() && !attempt.had_candidate() &&
-        station.may_refuse_other(now, attempt.reply(), group.request.function());
+        station.requests().may_refuse_other(now, attempt.reply(), group.request.function());
     const bool may_be_duplicate = station.may_be_duplicate(now, attempt, is_early);
     const bool may_be_echo =
         attempt.may_be_its_echo() && !attempt.had_candidate() &&
@@ -231,7 +232,7 @@ void Arbiter::settle(TimePoint now) {
     const Duration waited = attempt.waited(now);
     const Duration think = std::max(waited - silent_interval(settings_.serial), Duration::zero());
     const Duration needed = attempt.first_sign(now);
-    const TimePoint proved = station.surely_answered(attempt.timing().started, reply);
+    const TimePoint proved = station.requests().surely_answered(attempt.timing().started, reply);
     const Station::Replied replied = station.on_reply(now, attempt, needed, think);
     stations_.on_reply(now, group.shows_pace() ? std::optional(needed) : std::nullopt);
     if (replied.back) stations_.on_recovery();
@@ -276,7 +277,7 @@ void Arbiter::ask_again(TimePoint now) {
     outbox_.report(attempt, end_of(Verdict::doubtful));
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
-    station.add_outstanding(now, group.request.pdu(), attempt.timing().sent);
+    station.requests().on_unanswered(now, group.request.pdu(), attempt.timing().sent);
     group.silent_after = group.cut_after = {};
     if (in_time(now, group) && !group.abandoned()) {
         if (!group.request.is_read()) return schedule_.retry(now, confirming(group, station), {});
@@ -289,7 +290,9 @@ void Arbiter::ask_again(TimePoint now) {
 
 /// Makes a read for the jobs of this write, whose confirmation may be its echo.
 Group Arbiter::confirming(Group& write, const Station& station) {
-    Group read{.jobs = std::move(write.jobs), .station = write.station, .request = station.probe()};
+    Group read{.jobs = std::move(write.jobs),
+               .station = write.station,
+               .request = station.requests().probe()};
     if (!teaches_echo(read.request))
         read.request = modbus::Request::read({modbus::Table::holding_registers, 0, 1});
     read.attempts = write.attempts;
@@ -307,9 +310,9 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     const TimePoint sent = attempt.timing().sent;
     const Duration cost = now - attempt.timing().started + stations_.gap(group.station);
     if (attempt.came_damaged()) {
-        station.on_damaged_reply(now, group.request, sent);
+        station.requests().on_damaged_reply(now, group.request, sent);
     } else {
-        station.add_outstanding(now, group.request.pdu(), sent);
+        station.requests().on_unanswered(now, group.request.pdu(), sent);
     }
     if (verdict == Verdict::silent && attempt.echoed()) echo_memory_.on_unanswered(group.request);
     const bool affordable = stations_.affords_retry(now, station);
@@ -353,7 +356,7 @@ void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
         for (const Job& job : backlog.remove_if(asked)) outbox_.finish(job, fault);
     }
     Station& station = stations_.of(group.station);
-    if (group.probe) station.on_probe_unanswered(group.distinct_length);
+    if (group.probe) station.requests().on_probe_unanswered(group.distinct_length);
     if (group.distinct_length) return;
     if (!station.on_given_up(now, fault, group.request.is_read())) return;
     if (!station.unheard()) outbox_.event(Kind::offline, group.station);

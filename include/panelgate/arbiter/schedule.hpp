@@ -121,8 +121,8 @@ class Schedule {
     /// True if the station's outstanding requests or replies may still be in transit, however long
     /// ago.
     bool in_transit(const Station& station) const {
-        return may_stall_ && station.has_outstanding_since(transport_.proved()) &&
-               !station.answered_since_reopen();
+        return may_stall_ && station.requests().any_since(transport_.proved()) &&
+               !station.requests().answered_since_reopen();
     }
 
     /// The last bit of a broadcast has left, or the line was lost meanwhile.

@@ -1,14 +1,13 @@
 #pragma once
 
-#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 
 #include "panelgate/arbiter/attempt.hpp"
-#include "panelgate/arbiter/outstanding.hpp"
 #include "panelgate/arbiter/reply_times.hpp"
+#include "panelgate/arbiter/requests.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/modbus/function.hpp"
@@ -16,16 +15,8 @@
 
 namespace panelgate::arbiter {
 
-/// Classification of an unsolicited good frame of a station.
-enum class Unsolicited : std::uint8_t {
-    late,       ///< an outstanding reply
-    duplicate,  ///< a duplicate of a recent reply
-    second,     ///< another frame of the last reply's shape: two panels with one address
-    unasked,    ///< anything else
-};
-
-/// State of one station: its outstanding replies, when it may be asked, how long to wait for it,
-/// and how to classify its unsolicited frames. Pure.
+/// State of one station: its book of outstanding requests, when it may be asked, how long to wait
+/// for it, and what its failures may cost. Pure.
 class Station {
   public:
     /// `frame`: duration of a usual reply on this line.
@@ -36,110 +27,50 @@ class Station {
     /// that has begun is not shortened.
     void apply(const StationSettings& settings, const OfflineSettings& offline, bool listed);
 
-    // Outstanding replies (P1)
+    /// Whose its replies are (P1).
+    const OutstandingRequests& requests() const { return requests_; }
+    OutstandingRequests& requests() { return requests_; }
 
-    /// An attempt that left at `sent` ended without its own reply: one more is outstanding, until
-    /// it has come or cannot come any more.
-    void add_outstanding(TimePoint now, const Bytes& pdu, TimePoint sent);
-    /// ... but its reply came damaged. Some panels resend it: until that would be over only the
-    /// same request may be sent, and after its answer the same rest applies.
-    void on_damaged_reply(TimePoint now, const modbus::Request& request, TimePoint sent);
-    bool has_outstanding() const { return !outstanding_.empty(); }
-    /// Time from which any request may be sent.
-    TimePoint rested() const { return std::max(not_before_, outstanding_until_); }
-    /// Time from which this request may be sent: no outstanding reply could be taken for its
-    /// answer. A request with another function, length or address is unambiguous and need not wait.
-    /// `again`: it is a retry.
-    TimePoint clear_at(const modbus::Request& request, bool again = false) const {
-        if (again && (request.pdu() == damaged_pdu_ || outstanding_.is_only(request.pdu())))
-            return {};
-        return is_ambiguous(request, again) ? rested() : not_before_;
-    }
-    /// True if an outstanding normal reply could be taken for the reply to this request. An
-    /// exception may answer any request of the same function (refuses_other()).
-    bool is_ambiguous(const modbus::Request& request, bool again = false) const {
-        return outstanding_.is_ambiguous(request, again);
-    }
+    // When it may be asked
+
     /// True if its last request was an unanswered write: a waiting read goes next.
     bool has_read_turn() const { return read_turn_; }
     /// True if it has answered reads and the last one too: failed writes do not postpone reads.
-    bool answers_reads() const { return cheapest_read_ && !read_missed_; }
+    bool answers_reads() const { return requests_.has_answered_reads() && !read_missed_; }
     /// True if so many writes in a row failed that a read must check whether it is there.
     bool wants_check() const { return wants_check_; }
-    /// True if sending proof() is quicker than waiting: the station serves in order, so its answer
-    /// shows that no earlier reply can still come. False after an unanswered proof, until the
-    /// station has answered something.
-    bool may_prove() const {
-        return has_outstanding() && outstanding_.first_sent() >= connected_ && cheapest_read_ &&
-               !proof_unanswered_ && !health_.offline() && !is_ambiguous(proof());
-    }
+    /// True if sending a proof is quicker than waiting.
+    bool may_prove() const { return !health_.offline() && requests_.may_prove(); }
     /// True if it has answered its last request.
     bool is_answering() const { return !missed_ && health_.silent_in_a_row() == 0; }
-    /// How long after a request has left its reply may still come.
-    Duration latest_reply() const { return settings_.response_timeout + late_.value(); }
     /// When its next probe may be sent: usually the probe is the outstanding request itself.
     TimePoint probe_due() const {
-        if (wants_check_) return clear_at(probe());
+        const modbus::Request probe = requests_.probe();
+        if (wants_check_) return requests_.clear_at(probe);
         return std::max(health_.next_probe(),
-                        outstanding_.is_only(probe().pdu()) ? TimePoint{} : rested());
+                        requests_.is_only(probe) ? TimePoint{} : requests_.rested());
     }
-    /// A request is sent. Clears outstanding replies whose time has passed, unless `in_transit`:
-    /// they may still come at any time.
+    /// A request is sent; `in_transit`: what is outstanding may still come at any time.
     void on_asked(TimePoint now, const Group& group, bool in_transit = false);
-    /// True if a reply is outstanding to a request that left at `since` or later.
-    bool has_outstanding_since(TimePoint since) const {
-        return has_outstanding() && outstanding_.last_sent() >= since;
-    }
-    /// True if this exception may answer another outstanding request.
-    bool refuses_other(ByteView reply, const Bytes& pdu) const {
-        return outstanding_.fits_other(reply, pdu);
-    }
-    /// ... by a panel that uses another function's number, or that repeats a recent unsolicited
-    /// exception: asking again decides.
-    bool may_refuse_other(TimePoint now, ByteView reply, std::uint8_t function) const {
-        return is_unsolicited_refusal(now, reply) ||
-               (now < outstanding_until_ && outstanding_.has_other_function(function));
-    }
-    /// True if it has answered every request since the line was reopened: then no reply is in
-    /// transit, even if outstanding ones look the same.
-    bool answered_since_reopen() const { return reconnect_.answered(); }
-    /// Time of the latest request that this reply proves to have reached the station: an attempt
-    /// started at `started`, or the first outstanding one that the reply fits.
-    TimePoint surely_answered(TimePoint started, ByteView reply) const;
     void on_line_down() { health_.on_line_down(); }
-    /// The line was reopened. Outstanding requests may be sent, and answered, only now: the station
-    /// rests for that.
-    void on_opened(TimePoint now);
-    /// The transport was proved free now by a request that left at `sent`: earlier outstanding
-    /// requests may only now have reached the station.
-    void on_proved(TimePoint now, TimePoint sent);
+    /// The line was reopened, on a transport that may stall.
+    void on_opened(TimePoint now) { requests_.on_opened(now, usual()); }
 
     // Replies and failures
 
     struct Heard {
-        Unsolicited kind = Unsolicited::unasked;
+        Claim claim = Claim::unasked;
         Duration lateness{};   ///< of a late reply, after its response timeout
         bool back = false;     ///< it was offline
         bool settled = false;  ///< no reply is outstanding any more
     };
-    /// It has answered a broadcast, which is wrong.
-    void on_broadcast_answered() { answers_broadcasts_ = true; }
-    /// How long after a broadcast it may answer it: its longest usual time; for a station that has
-    /// done so, the same window as for any reply.
-    Duration broadcast_window() const {
-        return answers_broadcasts_ ? settings_.response_timeout + late_.value()
-                                   : usual() + late_.worst();
-    }
-    /// Classifies an unsolicited frame and updates the state. `pdu`: without address and CRC.
-    /// `asked`: a request to it is on the wire, which this does not answer.
+    /// How long after a broadcast it may answer it.
+    Duration broadcast_window() const { return requests_.broadcast_window(usual()); }
+    /// A good frame came that is no answer. `pdu`: without address and CRC. `asked`: a request to
+    /// it is on the wire.
     Heard on_unsolicited_frame(TimePoint now, ByteView pdu, bool asked = false);
-    /// Classifies as on_unsolicited_frame(), without changes.
-    Unsolicited judge(TimePoint now, ByteView pdu) const;
     /// Unsolicited bytes followed its reply.
     void on_unsolicited_bytes(TimePoint now) { trail_.on_unsolicited(now); }
-
-    /// Damaged bytes were heard; `id`: the station's own address.
-    void on_damaged_bytes(TimePoint now, std::uint8_t id, ByteView bytes);
 
     struct Replied {
         bool back = false;              ///< it was offline
@@ -153,32 +84,12 @@ class Station {
     /// An attempt that occupied the line for `cost` failed.
     void on_failed(TimePoint now, Verdict verdict, Duration cost,
                    const modbus::Request* write = nullptr);
-    /// A read that no client asked for was unanswered; `distinct_length`: a proof() whose failure
-    /// says nothing about health.
-    void on_probe_unanswered(bool distinct_length) {
-        reconnect_.on_probe_unanswered(distinct_length);
-        proof_unanswered_ = proof_unanswered_ || distinct_length;
-    }
     /// The whole transaction failed. Returns true if that took the station offline.
     bool on_given_up(TimePoint now, Fault fault, bool is_read = true);
-    /// True if the answer repeats a recent reply and came `too_early`: the request may never have
-    /// arrived.
-    bool is_duplicate(TimePoint now, const Attempt& attempt, bool too_early) const {
-        const bool again = attempt.group().attempts > 1;
-        return too_early && !again && duplicates_.is_duplicate(now, attempt.reply());
-    }
-    /// True if it may be a duplicate: it repeats a reply, and duplicates come from this station, or
-    /// it has not yet shown that it gives equal answers to different requests, or it came `early`.
-    /// A doubted reply that comes again is no duplicate.
+    /// True if this answer may be a duplicate; `early`: it came before the request can have left.
     bool may_be_duplicate(TimePoint now, const Attempt& attempt, bool early) const {
-        const Group& group = attempt.group();
-        if (attempt.had_candidate() || attempt.reply() == group.doubted) return false;
-        const Bytes& pdu = group.request.pdu();
-        return is_duplicate(now, attempt, early) ||
-               duplicates_.repeats_itself(now, attempt.reply()) ||
-               duplicates_.suspicious(now, pdu, attempt.reply()) ||
-               (is_quicker_than_ever(attempt.first_sign(now)) &&
-                duplicates_.repeats_other(now, pdu, attempt.reply()));
+        const bool quicker = is_quicker_than_ever(attempt.first_sign(now));
+        return requests_.may_be_duplicate(now, attempt, early, quicker);
     }
     /// True if no recent reply began this soon after the request.
     bool is_quicker_than_ever(Duration first_sign) const {
@@ -202,7 +113,7 @@ class Station {
     /// True if it is neither listed nor was ever heard.
     bool unheard() const { return !listed_ && !health_.last_heard(); }
     bool forgettable(TimePoint now) const {
-        return unheard() && !has_outstanding() && now >= asked_ + kForgetUnheard;
+        return unheard() && !requests_.any() && now >= asked_ + kForgetUnheard;
     }
     /// True if it missed its last request, and is not offline yet.
     bool missed_last() const {
@@ -249,20 +160,9 @@ class Station {
     /// True if its last replies were as requested: no exceptions, no damage.
     bool answers_as_asked() const { return unusual_ == 0; }
     const Drift& clock_drift() const { return clock_drift_; }
-    modbus::Request probe() const;
-    /// The probe, or a read of another length, which no outstanding reply fits except an exception.
-    /// Alternates while unanswered.
-    modbus::Request proof() const;
-    /// Longest read of this table that it has answered, in items.
-    std::uint32_t longest_read(modbus::Table table) const {
-        return longest_read_[static_cast<std::size_t>(table)];
-    }
-    Duration worst_lateness() const { return late_.worst(); }
     /// Time until which the line should rest because of what follows its replies.
     TimePoint trail_until() const {
-        const bool duplicates =
-            duplicates_.known() && duplicates_.settle_time() <= trail_.longest();
-        return std::max(trail_.until(), duplicates ? duplicates_.rest_until() : TimePoint{});
+        return std::max(trail_.until(), requests_.duplicates_until(trail_.longest()));
     }
     std::optional<Duration> slowest() const { return slowest_.value(); }
     /// Enough replies have shown how long it may need.
@@ -272,11 +172,6 @@ class Station {
     TimePoint failed() const { return failed_; }
     /// A client wants this unheard station, which is not asked now.
     void on_wanted(TimePoint now) { asked_ = now; }
-    /// The request is refused because the station is offline. If it has never answered, it is
-    /// probed with what clients want: it may answer nothing else.
-    void on_refused(const modbus::Request& request) {
-        if (request.span()) last_read_ = request;
-    }
 
     static constexpr int kFailing = 2;          ///< failed transactions in a row
     static constexpr int kFlaky = 4;            ///< silent ones of the last 8 attempts
@@ -297,7 +192,6 @@ class Station {
     void spend(TimePoint now, Duration cost, bool is_read = true) {
         (is_read ? budget_ : writes_).spend(now, cost, kBudgetMemory * timeout_cost());
     }
-    bool answers_either(ByteView pdu, bool asked) const;
     /// True if its last unanswered write was to the same address.
     bool is_ignored(const modbus::Request& write) const {
         const auto place = [](const Bytes& pdu) {
@@ -305,48 +199,21 @@ class Station {
         };
         return std::ranges::equal(place(write.pdu()), place(ignored_));
     }
-    void rest_for_outstanding(TimePoint now);
-    void rest_is_over(TimePoint not_before);
-    void learn_of_duplicates(TimePoint now, const Attempt& attempt);
-    void learn_of_read(const modbus::Request& read, const modbus::Span& span);
-    void remember_refusal(TimePoint now, ByteView pdu);
-    /// True if it has sent this exception unsolicited just before.
-    bool is_unsolicited_refusal(TimePoint now, ByteView pdu) const {
-        return std::ranges::equal(pdu, unsolicited_refusal_) &&
-               now < unsolicited_refusal_at_ + DuplicateGuard::kLongest;
-    }
-    void settle_outstanding(TimePoint now, const Attempt& attempt);
     Duration short_wait(std::optional<Duration> line) const;
 
     StationSettings settings_;
     bool listed_;
+    OutstandingRequests requests_;
     StationHealth health_;
-    LateWindow late_;
     Turnaround turnaround_;
     AdaptiveTimeout adaptive_;
     DriftAlarm drift_;
-    DuplicateGuard duplicates_;
     Trail trail_;
     ProbeBudget budget_{ProbeBudget::kFailing};   ///< of reads that fail; replies do not reduce it
     ProbeBudget writes_{ProbeBudget::kFailing};   ///< of writes that fail, separate from reads
     ProbeBudget failing_{ProbeBudget::kFailing};  ///< of failures while it is failing()
-    std::uint8_t lately_ = 0;         ///< the last 8 attempts, latest lowest: 1 was silent
-    OutstandingReplies outstanding_;  ///< requests whose replies may still come
-    TimePoint again_until_{};         ///< it may resend the damaged reply until then
-    Bytes damaged_pdu_;               ///< the request whose reply has just come damaged
-    TimePoint not_before_{};          ///< duplicates may come, or the line was just opened
-    TimePoint outstanding_until_{};   ///< outstanding replies may come; {}: none are
-    TimePoint connected_{};           ///< when the line was opened, on a transport that may stall
-    Bytes unsolicited_refusal_;       ///< and when it first came
-    TimePoint unsolicited_refusal_at_{};
-    bool proof_unanswered_ = false;  ///< since it was last heard
-    bool proved_ = false;            ///< no outstanding request is in transit
-    ReconnectState reconnect_;
+    std::uint8_t lately_ = 0;  ///< the last 8 attempts, latest lowest: 1 was silent
     TimePoint asked_{};
-    std::optional<modbus::Request> cheapest_read_;  ///< that it has answered
-    std::optional<modbus::Request> largest_read_;   ///< that it has answered; so are parts of it
-    std::optional<modbus::Request> last_read_;      ///< probe before it has answered any
-    std::array<std::uint32_t, modbus::kTables.size()> longest_read_{};  ///< by table
     Slowest slowest_;    ///< from request to first sign of the reply
     Quickest quickest_;  ///< the same
     TimePoint failed_{};
@@ -360,8 +227,7 @@ class Station {
     bool wants_check_ = false;
     bool woken_by_write_ = false;  ///< its last probe was a client's write
     bool trail_reported_ = false;
-    bool answers_broadcasts_ = false;  ///< at least once
-    int probes_ = 0;                   ///< unanswered, since it was last heard
+    int probes_ = 0;  ///< unanswered, since it was last heard
 };
 
 }  // namespace panelgate::arbiter

@@ -35,11 +35,11 @@ class Stations {
     /// A station has answered a broadcast, which is wrong.
     void on_broadcast_answered(std::uint8_t id) {
         const auto found = stations_.find(id);
-        if (found != stations_.end()) found->second.on_broadcast_answered();
+        if (found != stations_.end()) found->second.requests().on_broadcast_answered();
     }
     /// Damaged bytes were heard.
     void on_damaged(TimePoint now, ByteView bytes) {
-        for (auto& [id, station] : stations_) station.on_damaged_bytes(now, id, bytes);
+        for (auto& [id, station] : stations_) station.requests().on_damaged_bytes(now, id, bytes);
     }
     void on_line_down() {
         for (auto& [id, station] : stations_) station.on_line_down();
@@ -50,7 +50,7 @@ class Stations {
     }
     /// A request that left at `sent` was answered now, on a line that may stall.
     void on_proved(TimePoint now, TimePoint sent) {
-        for (auto& [id, station] : stations_) station.on_proved(now, sent);
+        for (auto& [id, station] : stations_) station.requests().on_proved(now, sent);
     }
     /// A station is back, or the line was reopened: others may be back for the same reason and are
     /// asked at once.

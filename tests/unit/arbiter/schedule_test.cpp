@@ -149,10 +149,10 @@ TEST_F(ScheduleTest, NothingElseGoesToAStationBeforeItsRetry) {
 TEST_F(ScheduleTest, P1AStationWithAnOutstandingReplyIsPassedOver) {
     wait(1);
     wait(2);
-    stations.of(1).add_outstanding(now, read_of(9999), now - 500ms);
+    stations.of(1).requests().on_unanswered(now, read_of(9999), now - 500ms);
     EXPECT_EQ(order(), "2");
-    EXPECT_EQ(schedule.next_start(stations, quiet), stations.of(1).rested());
-    now = stations.of(1).rested();
+    EXPECT_EQ(schedule.next_start(stations, quiet), stations.of(1).requests().rested());
+    now = stations.of(1).requests().rested();
     EXPECT_EQ(order(), "1");
 }
 
@@ -200,8 +200,8 @@ TEST_F(ScheduleTest, P1OnALineThatMayStallOutstandingRepliesNeedAReopening) {
     settings.may_stall = true;
     rebuild();
     wait(1);
-    stations.of(1).add_outstanding(now, read_of(9999), now - 500ms);
-    now = stations.of(1).rested();
+    stations.of(1).requests().on_unanswered(now, read_of(9999), now - 500ms);
+    now = stations.of(1).requests().rested();
     EXPECT_TRUE(next().reopen);
     schedule.on_transport_opened(now);
     const auto proof = next();
@@ -219,12 +219,13 @@ TEST_F(ScheduleTest, P1OnALineThatMayStallOutstandingRepliesNeedAReopening) {
 TEST_F(ScheduleTest, P1TheWholeLineRestsWhereTheConfigurationSaysSo) {
     const Group group = failed(1);
     Station& station = stations.of(1);
-    station.add_outstanding(now, group.request.pdu(), now - 500ms);
+    station.requests().on_unanswered(now, group.request.pdu(), now - 500ms);
     EXPECT_FALSE(schedule.line_rests_until(now, group, now - 500ms, station))
         << "its replies have never been late";
     settings.quarantine = Quarantine::line;
     rebuild();
-    EXPECT_EQ(schedule.line_rests_until(now, group, now - 500ms, station), station.rested());
+    EXPECT_EQ(schedule.line_rests_until(now, group, now - 500ms, station),
+              station.requests().rested());
     Group probe = group;
     probe.probe = true;
     EXPECT_FALSE(schedule.line_rests_until(now, probe, now - 500ms, station))

@@ -42,11 +42,11 @@ class StationTest : public testing::Test {
         const TimePoint sent = now_;
         now_ += kTimeout;
         station_.on_failed(now_, verdict, kTimeout);
-        station_.add_outstanding(now_, request, sent);
+        station_.requests().on_unanswered(now_, request, sent);
     }
     /// This request is sent, for the first time or again.
     bool may_ask(TimePoint now, const Bytes& pdu) const {
-        return now >= station_.clear_at(test::request_of(pdu), true);
+        return now >= station_.requests().clear_at(test::request_of(pdu), true);
     }
     Duration patience(const Bytes& request) const {
         return station_.patience(group_of(kId, request), std::nullopt, false);
@@ -59,15 +59,15 @@ class StationTest : public testing::Test {
 TEST_F(StationTest, P1WithAnOutstandingReplyOnlyTheVerySameMayBeAskedUntilItHasRested) {
     EXPECT_TRUE(may_ask(now_, kOther));
     miss(kRead);
-    const TimePoint rested = station_.rested();
+    const TimePoint rested = station_.requests().rested();
     EXPECT_GE(rested, now_ + kTimeout) << "so much later it may still come";
     EXPECT_TRUE(may_ask(now_, kRead));
     EXPECT_FALSE(may_ask(rested - 1ns, kOther));
     station_.on_asked(rested - 1ns, group_of(kId, kRead));
-    EXPECT_TRUE(station_.has_outstanding());
+    EXPECT_TRUE(station_.requests().any());
     EXPECT_TRUE(may_ask(rested, kOther));
     station_.on_asked(rested, group_of(kId, kOther));
-    EXPECT_FALSE(station_.has_outstanding()) << "it has lapsed";
+    EXPECT_FALSE(station_.requests().any()) << "it has lapsed";
 }
 
 TEST_F(StationTest, P1EachAttemptHasAnOutstandingReplyAndTheLastOneThatComesEndsTheRest) {
@@ -75,14 +75,14 @@ TEST_F(StationTest, P1EachAttemptHasAnOutstandingReplyAndTheLastOneThatComesEnds
     miss(kRead);
     answer(group_of(kId, kRead, 3), kReply);  // to which of the three is unknown
     const auto first = station_.on_unsolicited_frame(now_ + 10ms, kOtherValue);
-    EXPECT_EQ(first.kind, Unsolicited::late);
+    EXPECT_EQ(first.claim, Claim::late);
     EXPECT_EQ(first.lateness, Duration(0)) << "what can no longer come makes no other look late";
     EXPECT_FALSE(first.settled);
     EXPECT_FALSE(may_ask(now_ + 10ms, kOther));
     const auto second = station_.on_unsolicited_frame(now_ + 20ms, kThirdValue);
-    EXPECT_EQ(second.kind, Unsolicited::late);
+    EXPECT_EQ(second.claim, Claim::late);
     EXPECT_TRUE(second.settled);
-    EXPECT_FALSE(station_.has_outstanding());
+    EXPECT_FALSE(station_.requests().any());
     EXPECT_TRUE(may_ask(now_ + 20ms, kOther));
 }
 
@@ -91,7 +91,7 @@ TEST_F(StationTest, P1AfterADamagedReplyTheRetrysReplyOfALateStationIsOutstandin
     const auto repeat = [&] {
         now_ += 2s;
         station_.on_asked(now_, group_of(kId, kRead));
-        station_.on_damaged_reply(now_, test::request_of(kRead), now_ - 30ms);
+        station_.requests().on_damaged_reply(now_, test::request_of(kRead), now_ - 30ms);
         now_ += 60ms;
         const auto attempt =
             test::answered(now_ - 30ms, now_, group_of(kId, kRead, 2), kOtherValue);
@@ -104,9 +104,9 @@ TEST_F(StationTest, P1AfterADamagedReplyTheRetrysReplyOfALateStationIsOutstandin
         miss(kRead);
         station_.on_unsolicited_frame(now_ + 50ms, kReply);
     }
-    EXPECT_GT(station_.worst_lateness(), Duration(0));
+    EXPECT_GT(station_.requests().worst_lateness(), Duration(0));
     repeat();
-    EXPECT_TRUE(station_.has_outstanding());
+    EXPECT_TRUE(station_.requests().any());
     EXPECT_FALSE(may_ask(now_ + kTimeout, kOther));
 }
 
@@ -114,9 +114,9 @@ TEST_F(StationTest, P1ARepetitionOfThePreviousReplyMayBeADuplicateAndTheOutstand
     miss(kRead);
     answer(group_of(kId, kRead, 2), kReply);
     const auto same = station_.on_unsolicited_frame(now_ + 20ms, kReply);
-    EXPECT_EQ(same.kind, Unsolicited::late) << "as a rule";
+    EXPECT_EQ(same.claim, Claim::late) << "as a rule";
     EXPECT_FALSE(same.settled);
-    EXPECT_TRUE(station_.has_outstanding());
+    EXPECT_TRUE(station_.requests().any());
     const auto other = station_.on_unsolicited_frame(now_ + 40ms, kOtherValue);
     EXPECT_TRUE(other.settled);
     EXPECT_TRUE(may_ask(now_ + 40ms, kOther)) << "duplicates are not its habit yet";
@@ -126,7 +126,7 @@ TEST_F(StationTest, P1ADuplicateAmidDamagedBytesShowsThatTheStationSendsTwice) {
     answer(kRead, kReply);
     const Bytes adu = modbus::encode_adu(kId, kReply);
     const Bytes heard = Writer().raw("23 03"_hex).raw(adu).u8(7).take();
-    station_.on_damaged_bytes(now_ + 20ms, kId, heard);
+    station_.requests().on_damaged_bytes(now_ + 20ms, kId, heard);
     answer(kOther, kOtherValue);
     EXPECT_FALSE(may_ask(now_ + 20ms, kOther));
     EXPECT_TRUE(may_ask(now_ + 100ms, kOther));
@@ -143,20 +143,21 @@ TEST_F(StationTest, P1ADuplicateDetectedAfterTheReplyThatItPrecededMakesTheStati
 TEST_F(StationTest, P1WhereTheLineMayStallOnlyALaterRequestThatWasAnsweredProvesThatOneHasPassed) {
     const TimePoint sent = now_;
     miss(kRead);
-    EXPECT_TRUE(station_.has_outstanding_since(TimePoint{}));
-    EXPECT_TRUE(station_.has_outstanding_since(sent));
-    EXPECT_FALSE(station_.has_outstanding_since(sent + 1ns));
-    const TimePoint rested = station_.rested();
+    EXPECT_TRUE(station_.requests().any_since(TimePoint{}));
+    EXPECT_TRUE(station_.requests().any_since(sent));
+    EXPECT_FALSE(station_.requests().any_since(sent + 1ns));
+    const TimePoint rested = station_.requests().rested();
     now_ = rested + 1h;
-    station_.on_proved(now_, sent - 1ns);
-    EXPECT_EQ(station_.rested(), rested) << "that one had left before";
-    station_.on_proved(now_, sent + 1ns);
-    EXPECT_GE(station_.rested(), now_ + kTimeout) << "it may have reached the station only now";
+    station_.requests().on_proved(now_, sent - 1ns);
+    EXPECT_EQ(station_.requests().rested(), rested) << "that one had left before";
+    station_.requests().on_proved(now_, sent + 1ns);
+    EXPECT_GE(station_.requests().rested(), now_ + kTimeout)
+        << "it may have reached the station only now";
 }
 
 TEST_F(StationTest, P5AReplyThatCameDamagedIsNotOutstandingButSomeResendIt) {
-    station_.on_damaged_reply(now_, test::request_of(kRead), now_);
-    EXPECT_FALSE(station_.has_outstanding());
+    station_.requests().on_damaged_reply(now_, test::request_of(kRead), now_);
+    EXPECT_FALSE(station_.requests().any());
     EXPECT_TRUE(may_ask(now_, kRead));
     EXPECT_FALSE(may_ask(now_, kOther));
     answer(group_of(kId, kRead, 2), kReply);
@@ -184,18 +185,18 @@ TEST_F(StationTest, P4AProbeWaitsAsLongAsMostRepliesTakeAndNowAndThenAsLongAsAny
 }
 
 TEST_F(StationTest, ClassifiesAnUnsolicitedFrameAndChangesNothingByThat) {
-    EXPECT_EQ(station_.judge(now_, kReply), Unsolicited::unasked);
+    EXPECT_EQ(station_.requests().claim_of(now_, kReply), Claim::unasked);
     answer(kRead, kReply);
     for (int i = 0; i < 3; ++i) {
-        EXPECT_EQ(station_.judge(now_ + 20ms, kReply), Unsolicited::duplicate);
-        EXPECT_EQ(station_.judge(now_ + 20ms, "03 02 00 00"_hex), Unsolicited::second);
-        EXPECT_EQ(station_.judge(now_ + 20ms, kLongReply), Unsolicited::unasked);
-        EXPECT_EQ(station_.judge(now_ + 1min, kReply), Unsolicited::unasked);
+        EXPECT_EQ(station_.requests().claim_of(now_ + 20ms, kReply), Claim::duplicate);
+        EXPECT_EQ(station_.requests().claim_of(now_ + 20ms, "03 02 00 00"_hex), Claim::second);
+        EXPECT_EQ(station_.requests().claim_of(now_ + 20ms, kLongReply), Claim::unasked);
+        EXPECT_EQ(station_.requests().claim_of(now_ + 1min, kReply), Claim::unasked);
     }
     miss(kLong);
-    EXPECT_EQ(station_.judge(now_, kLongReply), Unsolicited::late);
-    EXPECT_EQ(station_.judge(now_, kLongReply), Unsolicited::late);
-    EXPECT_TRUE(station_.has_outstanding());
+    EXPECT_EQ(station_.requests().claim_of(now_, kLongReply), Claim::late);
+    EXPECT_EQ(station_.requests().claim_of(now_, kLongReply), Claim::late);
+    EXPECT_TRUE(station_.requests().any());
 }
 
 TEST_F(StationTest, P4OneThatHasFallenSilentIsNotRetriedAndWaitedForAsLongAsItHasEverNeeded) {
@@ -279,7 +280,7 @@ TEST_F(StationTest, OnlyAnUnheardStationIsForgottenWhenNotWantedForAMinute) {
     unheard.on_wanted(now_ + 30s);
     EXPECT_FALSE(unheard.forgettable(now_ + Station::kForgetUnheard));
     EXPECT_TRUE(unheard.forgettable(now_ + 30s + Station::kForgetUnheard));
-    unheard.add_outstanding(now_, kRead, now_);
+    unheard.requests().on_unanswered(now_, kRead, now_);
     EXPECT_FALSE(unheard.forgettable(now_ + 1h)) << "a reply is outstanding";
     unheard.on_unsolicited_frame(now_ + 1s, kReply);
     EXPECT_FALSE(unheard.forgettable(now_ + 1h)) << "it was heard";

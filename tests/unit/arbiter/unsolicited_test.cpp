@@ -70,7 +70,7 @@ TEST_F(UnsolicitedFramesTest, AreClassifiedAndCounted) {
     EXPECT_EQ(heard(encode_adu(18, kRead)), "foreign request") << "another master's";
     EXPECT_EQ(counters().symptoms.requests, 1u);
     EXPECT_EQ(counters().foreign_frames, 1u);
-    stations.of(17).add_outstanding(now, kRead, now - 500ms);
+    stations.of(17).requests().on_unanswered(now, kRead, now - 500ms);
     EXPECT_EQ(heard(kAnswer), "late") << "outstanding";
     EXPECT_EQ(counters().late_frames, 1u);
     EXPECT_EQ(counters().foreign_frames, 1u);
@@ -104,7 +104,7 @@ TEST_F(UnsolicitedFramesTest, AWrongReplyIsNeitherEchoNorRequestNorOutstanding) 
     EXPECT_FALSE(is_wrong_reply(encode_adu(17, kRead))) << "echo";
     EXPECT_FALSE(is_wrong_reply(encode_adu(17, "03 00 00 00 01"_hex))) << "a request";
     EXPECT_FALSE(is_wrong_reply(encode_adu(99, kReply))) << "nobody";
-    stations.of(17).add_outstanding(now, kRead, now - 500ms);
+    stations.of(17).requests().on_unanswered(now, kRead, now - 500ms);
     EXPECT_FALSE(is_wrong_reply(kAnswer)) << "outstanding";
 }
 
