@@ -199,7 +199,8 @@ void Arbiter::on_line_down(TimePoint now) {
             rest_ = std::max(rest_, attempt.timing().sent + settings_.broadcast_turnaround);
         } else {
             stations_.of(group.station)
-                .requests().on_unanswered(now, group.request.pdu(), attempt.timing().sent);
+                .requests()
+                .on_unanswered(now, group.request.pdu(), attempt.timing().sent);
         }
         outbox_.report(attempt, TransactionEnd::line_down);
         for (const Job& job : group.jobs) outbox_.finish(job, Fault::line_lost);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <iterator>
 #include <utility>
 
 #include "panelgate/arbiter/arbiter.hpp"
@@ -179,41 +180,79 @@ void Arbiter::end_broadcast(TimePoint now) {
     }
 }
 
-/// A reply of the right form may be another sender's, or belong to an earlier request: then it is
-/// rejected or kept as a candidate until more is heard.
+/// What is done with a frame that has the form of the answer (README, the table of frames).
+enum class Arbiter::Take : std::uint8_t {
+    accept,
+    contested,     ///< another master's, perhaps: the attempt is damaged
+    reject,        ///< another request's: the attempt goes on
+    keep,          ///< a candidate: the answer if nothing else comes
+    ask_again,     ///< a candidate: the request is sent once more
+    suspect_echo,  ///< the same, and a read goes out that has no equal echo
+};
+
+/// The first row that fits decides.
+Arbiter::Take Arbiter::judge_reply(TimePoint now, const Station& station, bool early) const {
+    const Attempt& attempt = *active_;
+    const Group& group = attempt.group();
+    const Bytes& reply = attempt.reply();
+    const OutstandingRequests& book = station.requests();
+    const bool refusal = modbus::exception_of(reply).has_value();
+    const bool first = !attempt.had_candidate();
+    const bool is_early = early && !settings_.paced && pace_.believed();
+    const bool duplicate = station.may_be_duplicate(now, attempt, is_early);
+    const struct {
+        bool fits;
+        Take take;
+    } rows[] = {
+        // P1: another master's request to this station has the same answer.
+        {attempt.is_contested(), Take::contested},
+        // P1: an earlier request may have been refused; the next refusal may be that again.
+        {refusal && !group.probe &&
+             (attempt.refusal_was_rejected() || book.refuses_other(reply, group.request.pdu())),
+         Take::reject},
+        // P1: the request cannot have arrived yet.
+        {book.is_duplicate(now, attempt, is_early && attempt.replied_too_early()), Take::reject},
+        // P8: a write's confirmation that is sooner than any answer.
+        {attempt.may_be_its_echo() && first &&
+             (is_early || station.is_far_too_quick(attempt.first_sign(now), stations_.quickest())),
+         Take::suspect_echo},
+        // P1: a panel may refuse with another function's number.
+        {refusal && group.may_doubt_refusal() && first &&
+             book.may_refuse_other(now, reply, group.request.function()),
+         Take::ask_again},
+        // P1: values repeat an earlier reply: only asking again tells.
+        {duplicate && group.may_doubt(reply), Take::ask_again},
+        // P1: confirmations and refusals are not asked again. P8: an echo behind it discards it.
+        {duplicate || (attempt.precedes_echo() && first), Take::keep},
+    };
+    const auto row = std::ranges::find_if(rows, [](const auto& one) { return one.fits; });
+    return row == std::end(rows) ? Take::accept : row->take;
+}
+
+/// Returns true if it is the answer.
 bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     Attempt& attempt = *active_;
-    const Group& group = attempt.group();
-    const bool refusal = modbus::exception_of(attempt.reply()).has_value();
-    const bool may_be_outstanding =
-        refusal && !group.probe &&
-        (attempt.refusal_was_rejected() ||
-         station.requests().refuses_other(attempt.reply(), group.request.pdu()));
-    const bool is_early = early && !settings_.paced && pace_.believed();
-    const bool is_too_early = is_early && attempt.replied_too_early();
-    if (attempt.is_contested()) {
-        attempt.reject_contested();
-        return false;
+    switch (judge_reply(now, station, early)) {
+        case Take::accept:
+            return true;
+        case Take::contested:
+            attempt.reject_contested();
+            return false;
+        case Take::reject:
+            attempt.reject_reply();
+            return false;
+        case Take::keep:
+            attempt.keep_candidate(station.needed(), false);
+            return false;
+        case Take::ask_again:
+            attempt.keep_candidate(station.needed(), true);
+            return false;
+        case Take::suspect_echo:
+            attempt.keep_candidate(station.needed(), true);
+            attempt.suspect_echo();
+            return false;
     }
-    if (may_be_outstanding || station.requests().is_duplicate(now, attempt, is_too_early)) {
-        attempt.reject_reply();
-        return false;
-    }
-    const bool waits = attempt.precedes_echo() && !attempt.had_candidate();
-    const bool may_be_others =
-        refusal && group.may_doubt_refusal() && !attempt.had_candidate() &&
-        station.requests().may_refuse_other(now, attempt.reply(), group.request.function());
-    const bool may_be_duplicate = station.may_be_duplicate(now, attempt, is_early);
-    const bool may_be_echo =
-        attempt.may_be_its_echo() && !attempt.had_candidate() &&
-        (is_early || station.is_far_too_quick(attempt.first_sign(now), stations_.quickest()));
-    if (may_be_duplicate || may_be_echo || may_be_others || waits) {
-        const bool doubted =
-            may_be_echo || may_be_others || (may_be_duplicate && group.may_doubt(attempt.reply()));
-        attempt.keep_candidate(station.needed(), doubted);
-        if (may_be_echo) attempt.suspect_echo();
-    }
-    return !may_be_duplicate && !may_be_echo && !may_be_others && !waits;
+    std::abort();
 }
 
 /// The reply has come.

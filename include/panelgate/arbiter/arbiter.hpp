@@ -178,6 +178,8 @@ class Arbiter {
     void check_active(TimePoint now);
     void conclude(TimePoint now, Verdict verdict);
     void end_broadcast(TimePoint now);
+    enum class Take : std::uint8_t;
+    Take judge_reply(TimePoint now, const Station& station, bool early) const;
     bool takes_reply(TimePoint now, const Station& station, bool early);
     void settle(TimePoint now);
     void ask_again(TimePoint now);
