@@ -195,7 +195,7 @@ void Arbiter::on_line_down(TimePoint now) {
         const Attempt attempt = take_active(now);
         const Group& group = attempt.group();
         if (attempt.is_broadcast()) {
-            schedule_.on_broadcast(attempt.timing().sent, group.request.pdu());
+            stations_.on_broadcast(attempt.timing().sent, group.request.pdu());
             rest_ = std::max(rest_, attempt.timing().sent + settings_.broadcast_turnaround);
         } else {
             stations_.of(group.station)

@@ -206,14 +206,15 @@ TimePoint Schedule::ready_at(const Stations& stations, const Job& job) const {
     if (job.station == kBroadcast) return {};
     const Station* station = stations.find(job.station);
     if (station == nullptr)
-        return broadcasts_.over(job.request, stations.settings(job.station).response_timeout);
+        return stations.broadcasts().over(job.request,
+                                          stations.settings(job.station).response_timeout);
     // A write that its echo could confirm is preceded by a read, which may be any.
     const bool is_learned = echo_known_ || job.request.is_read();
     TimePoint clear =
         is_learned ? station->requests().clear_at(job.request) : station->requests().rested();
     if (can_prove(*station))
         clear = std::min(clear, station->requests().clear_at(station->requests().proof()));
-    return std::max({clear, broadcasts_.over(job.request, station->broadcast_window()),
+    return std::max({clear, stations.broadcasts().over(job.request, station->broadcast_window()),
                      stations.throttled_until(job.station)});
 }
 
@@ -221,7 +222,7 @@ TimePoint Schedule::ready_at(const Stations& stations, const Job& job) const {
 TimePoint Schedule::repeat_from(const Group& group, const Stations& stations) const {
     const Station& station = *stations.find(group.station);
     return std::max(station.requests().clear_at(group.request, true),
-                    broadcasts_.over(group.request, station.broadcast_window()));
+                    stations.broadcasts().over(group.request, station.broadcast_window()));
 }
 
 /// On a connection that may delay outstanding requests, more is sent only while the station is seen

@@ -38,6 +38,12 @@ Part part_of(Claim kind) {
     std::abort();
 }
 
+/// A reply to a recent broadcast, from a panel that should be silent.
+bool answers_broadcast(TimePoint now, ByteView adu, const Stations& stations) {
+    return stations.broadcasts().answered_by(now, modbus::pdu_of(adu),
+                                             stations.latest_reply(adu[0]));
+}
+
 }  // namespace
 
 void UnsolicitedFrames::hear(ByteView bytes) {
@@ -55,13 +61,6 @@ std::vector<Unused> UnsolicitedFrames::take_delimited(std::uint8_t asked, bool g
     return {modbus::classify_frame(bytes, asked, good && modbus::crc_ok(bytes, orders_))};
 }
 
-/// A reply to a recent broadcast, from a panel that should be silent.
-bool UnsolicitedFrames::answers_broadcast(ByteView adu) const {
-    constexpr unsigned kRecent = 4;  // requests sent since
-    return !broadcast_.empty() && sent_since_ <= kRecent &&
-           modbus::answers(modbus::pdu_of(broadcast_), modbus::pdu_of(adu));
-}
-
 Part UnsolicitedFrames::judge(TimePoint now, const Unused& part, const Stations& stations) const {
     if (std::ranges::equal(part.bytes, last_frame_)) return Part::echo;
     if (begins_with_request(part.bytes, last_frame_, orders_) &&
@@ -74,7 +73,7 @@ Part UnsolicitedFrames::judge(TimePoint now, const Unused& part, const Stations&
     const bool explained =
         station != nullptr &&
         station->requests().claim_of(now, modbus::pdu_of(part.bytes)) != Claim::unasked;
-    if (!explained && answers_broadcast(part.bytes)) return Part::broadcast_reply;
+    if (!explained && answers_broadcast(now, part.bytes, stations)) return Part::broadcast_reply;
     return station == nullptr ? Part::unknown : Part::unasked;
 }
 
@@ -127,8 +126,8 @@ void UnsolicitedFrames::let_reply_pass(TimePoint now, ByteView request, const St
 
 bool UnsolicitedFrames::is_wrong_reply(TimePoint now, ByteView adu,
                                        const Stations& stations) const {
-    if (std::ranges::equal(adu, last_frame_) || is_request(adu) || answers_broadcast(adu) ||
-        answers_other_master(now, adu))
+    if (std::ranges::equal(adu, last_frame_) || is_request(adu) ||
+        answers_broadcast(now, adu, stations) || answers_other_master(now, adu))
         return false;
     const Station* station = stations.find(adu[0]);
     if (station == nullptr) return false;

@@ -169,7 +169,7 @@ void Arbiter::conclude(TimePoint now, Verdict verdict) {
 void Arbiter::end_broadcast(TimePoint now) {
     const Attempt attempt = take_active(now);
     quiet_.rest_until(attempt.timing().sent + settings_.broadcast_turnaround + latency_);
-    schedule_.on_broadcast(attempt.timing().sent, attempt.group().request.pdu());
+    stations_.on_broadcast(attempt.timing().sent, attempt.group().request.pdu());
     outbox_.report(attempt, TransactionEnd::ok);
     for (const Job& job : attempt.group().jobs) {
         if (job.deadline <= now) {  // the deadline passed unnoticed while it was leaving

@@ -136,7 +136,14 @@ class BroadcastReplies {
 
     void on_sent(TimePoint sent, ByteView request) {
         Sent& oldest = last_[next_++ % kBroadcasts];
-        oldest = {sent, modbus::normal_write_reply(request)};
+        oldest = {sent, Bytes(request.begin(), request.end()), modbus::normal_write_reply(request)};
+    }
+    /// True if this frame may answer one of them; `window`: how long its station may take.
+    bool answered_by(TimePoint now, ByteView reply, Duration window) const {
+        return std::ranges::any_of(last_, [&](const Sent& one) {
+            return !one.request.empty() && now < one.at + window &&
+                   modbus::answers(one.request, reply);
+        });
     }
     /// Time from which no reply to a broadcast can be taken for the reply to `request`. `window`:
     /// how long after a broadcast its station may answer it.
@@ -153,6 +160,7 @@ class BroadcastReplies {
   private:
     struct Sent {
         TimePoint at{};
+        Bytes request;
         Bytes reply;
     };
     std::array<Sent, kBroadcasts> last_;

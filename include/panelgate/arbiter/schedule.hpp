@@ -125,9 +125,6 @@ class Schedule {
                !station.requests().answered_since_reopen();
     }
 
-    /// The last bit of a broadcast has left, or the line was lost meanwhile.
-    void on_broadcast(TimePoint sent, ByteView request) { broadcasts_.on_sent(sent, request); }
-
     Backlog& backlog() { return backlog_; }
     const Backlog& backlog() const { return backlog_; }
     /// Queues a retry that will wait `patience` for its reply. While only its station rests, other
@@ -156,7 +153,6 @@ class Schedule {
     TransportEpoch transport_;
     Backlog backlog_;
     Sharing sharing_;
-    BroadcastReplies broadcasts_;
     Ticket learned_for_ = 0;        ///< a read was sent for it to detect the echo (P8)
     PoolSet<std::uint8_t> others_;  ///< stations that waited when a retry was due
     std::size_t turns_ = 0;         ///< turns that the retry leaves to them, at most

@@ -32,6 +32,9 @@ class Stations {
         const auto found = stations_.find(id);
         if (found != stations_.end()) found->second.on_unsolicited_bytes(now);
     }
+    /// The last bit of a broadcast has left, or the line was lost meanwhile.
+    void on_broadcast(TimePoint sent, ByteView request) { broadcasts_.on_sent(sent, request); }
+    const BroadcastReplies& broadcasts() const { return broadcasts_; }
     /// A station has answered a broadcast, which is wrong.
     void on_broadcast_answered(std::uint8_t id) {
         const auto found = stations_.find(id);
@@ -148,6 +151,7 @@ class Stations {
     ProbeBudget newly_silent_{ProbeBudget::kFailing};
     ProbeBudget unheard_{ProbeBudget::kFailing};        ///< all attempts at unheard stations
     ProbeBudget asked_unheard_{ProbeBudget::kUnheard};  ///< except the first at each
+    BroadcastReplies broadcasts_;
     Slowest slowest_;
     Quickest quickest_;
     TimePoint heard_{};         ///< any of them

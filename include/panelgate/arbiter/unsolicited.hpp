@@ -26,10 +26,6 @@ class UnsolicitedFrames {
     void on_sent(ByteView adu) {
         last_frame_.assign(adu.begin(), adu.end());
         replied_before_ = std::exchange(replied_, std::uint8_t{0});
-        ++sent_since_;
-        if (adu[0] != 0) return;
-        broadcast_ = last_frame_;
-        sent_since_ = 0;
     }
     /// Bytes after this answer are its station's trail.
     void on_replied(std::uint8_t station) { replied_ = station; }
@@ -60,7 +56,6 @@ class UnsolicitedFrames {
 
   private:
     Outbox::Part judge(TimePoint now, const modbus::Unused& part, const Stations& stations) const;
-    bool answers_broadcast(ByteView adu) const;
     bool answers_other_master(TimePoint now, ByteView adu) const;
     void let_reply_pass(TimePoint now, ByteView request, const Stations& stations,
                         Quiet& quiet) const;
@@ -70,8 +65,6 @@ class UnsolicitedFrames {
     Bytes idle_;
     Bytes last_frame_;
     ForeignRequests foreign_requests_;
-    Bytes broadcast_;           ///< the last broadcast
-    unsigned sent_since_ = 0;   ///< frames sent after it
     std::uint8_t replied_ = 0;  ///< to the last frame; 0: none, or not yet
     std::uint8_t replied_before_ = 0;
 };
