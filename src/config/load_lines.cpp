@@ -236,7 +236,7 @@ Line load_line(Loading& loading, const Node& node) {
     if (const Node* faults = in.map("simulate", "{echo: true}")) {
         MapReader simulate(*faults, loading.problems, "simulate");
         line.simulated_echo = simulate.boolean("echo").value_or(false);
-        simulate.about("echo", "false", "It hears itself.", "");
+        simulate.about("echo", "false", "The adapter hears what it sends.", "");
         simulate.finish();
     }
     load_stations(loading, in, {line, serial_known, {}});

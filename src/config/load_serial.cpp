@@ -47,8 +47,9 @@ void load_serial_mode(MapReader& in, SerialFormat& format, modbus::HexDigits* di
     }
     format.mode = in.choice<SerialMode>("mode", kSerialModeWords).value_or(format.mode);
     *digits = in.choice<modbus::HexDigits>("ascii_lower_case", kLowerCase).value_or(*digits);
-    in.about("mode", "rtu", "How the panels frame their messages.", "");
-    in.about("ascii_lower_case", "refuse", "Hex digits a-f, of mode ascii.", "");
+    in.about("mode", "rtu", "Framing of the panels' messages.", "");
+    in.about("ascii_lower_case", "refuse",
+             "Whether hex digits a-f are taken; only with mode ascii.", "");
     constexpr std::array<std::string_view, 1> kAscii{"ascii"};
     in.belongs("ascii_lower_case", "mode", kAscii);
     if (in.has("ascii_lower_case") && format.mode != SerialMode::ascii)

@@ -30,12 +30,13 @@ const Keys<tcp_server::Settings>& access_keys() {
     static const auto kKeys =
         Keys<Settings>()
             .other("lines",
-                   "Names of lines; for a serial master those whose listed stations it may ask.",
+                   "Lines that are served; of a serial master those whose listed stations "
+                   "it may ask. Without it all.",
                    [](const Settings& settings) { return names_text(settings.lines); })
             .other("units",
-                   "Further unit ids, LINE/STATION each; where two lines have one id, they need "
-                   "them.")
-            .other("access", "read_only refuses whatever writes.",
+                   "Further unit ids, each to LINE/STATION; needed where two lines have "
+                   "the same station id.")
+            .other("access", "read_only refuses every write.",
                    [](const Settings& settings) { return access_text(settings.read_only); })
             .initially("read_write");
     return kKeys;
@@ -52,43 +53,47 @@ const Keys<tcp_server::Settings>& listener_keys() {
         {{"join", Retransmissions::join}, {"pass", Retransmissions::pass}}};
     static const auto kKeys =
         Keys<Settings>()
-            .other("listen", "ADDR:PORT or [ADDR]:PORT; port 0 takes a free one.")
+            .other("listen", "ADDR:PORT or [ADDR]:PORT; port 0: a free one.")
             .initially("127.0.0.1:502")
             .change_needs(kListensAnew)
-            .other("framing", "The framing of its clients, over TCP.",
+            .other("framing", "Framing of its clients' requests, over TCP.",
                    [](const Settings& settings) {
                        return std::string(modbus::label(settings.framing));
                    })
             .initially("tcp")
             .change_needs(kListensAnew)
-            .boolean("udp", &Settings::udp, "The same port for datagrams, too.")
+            .boolean("udp", &Settings::udp, "Takes datagrams on the same port as well.")
             .change_needs(kListensAnew)
             .word("ascii_lower_case", &Settings::ascii_digits, kLowerCase,
-                  "Hex digits a-f, of framing ascii.")
+                  "Whether hex digits a-f are taken; only with framing ascii.")
             .change_needs(kListensAnew)
             .word("broadcast", &Settings::broadcast, kBroadcasts,
-                  "Unit 0: reply (once sent; without the key, with framing tcp), silent, deny "
-                  "(exception 01).")
+                  "Answer to a write to unit 0: reply (once it is sent), silent, or deny "
+                  "(exception 01). Without it reply with framing tcp, else silent.")
             .initially("")
             .word("retransmissions", &Settings::retransmissions, kRetransmissions,
-                  "The same id, unit and bytes while the first is unanswered: join has one answer "
-                  "and one frame; without the key writes are joined.")
+                  "A request that comes again (same transaction id, unit and bytes) "
+                  "before its answer: join has one frame and one answer, pass takes it "
+                  "for another one. Without it writes are joined.")
             .initially("")
             .shown_as([](const Settings& settings) {
                 constexpr std::array<const char*, 3> kWords{"join writes", "join", "pass"};
                 return kWords[static_cast<std::size_t>(settings.retransmissions)];
             })
-            .other("diagnostics_unit", "The gateway's own registers; null: none.",
+            .other("diagnostics_unit", "Unit id of the gateway's own registers; null: none.",
                    [](const Settings& settings) {
                        const auto& unit = settings.diagnostics_unit;
                        return unit ? std::to_string(*unit) : std::string("null");
                    })
             .initially("255")
-            .other("allow", "Networks such as 192.168.1.0/24; any address without.",
+            .other("allow",
+                   "Networks whose clients may connect, such as 192.168.1.0/24. Without it any.",
                    [](const Settings& settings) { return networks_text(settings.allow); })
-            .integer("max_connections", &Settings::max_connections, 1, 65535, "Of all clients.")
+            .integer("max_connections", &Settings::max_connections, 1, 65535,
+                     "Most connections of all clients.")
             .integer("max_connections_per_address", &Settings::max_connections_per_address, 1,
-                     65535, "Of one client; then its longest idle one gives way.");
+                     65535,
+                     "Most connections of one address; then its longest idle one is closed.");
     return kKeys;
 }
 
@@ -105,21 +110,26 @@ const Keys<serial_server::Settings>& master_keys() {
     static const auto kKeys =
         Keys<Settings>()
             .other("name", "Unique: a-z, 0-9 and '-'.")
-            .other("device", "A serial device.")
-            .other("serial", "How characters look there.")
-            .other("rs485", "How the transceiver is switched.")
+            .other("device", "Serial port that the master is connected to.")
+            .other("serial", "Character format.")
+            .other("rs485", "Direction control of an RS-485 transceiver.")
             .word(
                 "framing", [](auto& master) -> auto& { return master.access.framing; }, kFramings,
-                "The framing of the master.")
+                "Framing of the master.")
             .initially("rtu")
             .word(
                 "broadcast", [](auto& master) -> auto& { return master.access.broadcast; },
-                kBroadcasts, "Unit 0: silent, or deny.")
+                kBroadcasts,
+                "Broadcasts of the master: silent sends them on, deny does not. They "
+                "have no answer in either case.")
             .initially("silent")
             .word("on_failure", &Settings::on_failure, kFailures,
-                  "What it gets when a panel does not answer.")
-            .word("echo", &Settings::echo, kEchoes, "The adapter hears itself; auto: found out.")
-            .other("response_timeout", "The master's own: what would begin later is not sent.",
+                  "What the master gets where a panel does not answer.")
+            .word("echo", &Settings::echo, kEchoes,
+                  "Whether the adapter hears what it sends; auto: found out.")
+            .other("response_timeout",
+                   "How long the master waits: what would be sent later is not sent. "
+                   "Without it no limit but the deadline.",
                    [](const Settings& settings) {
                        const auto& timeout = settings.response_timeout;
                        return timeout ? format_duration(*timeout) : "none";
@@ -139,30 +149,31 @@ const Keys<web::Settings>& http_keys() {
             .initially("127.0.0.1:8080")
             .change_needs(kListensAnew)
             .word("anonymous", &Settings::anonymous, kRoles,
-                  "Without a token: none, viewer (read), operator (read and write).")
+                  "Role without a token: none, viewer (reads), operator (reads and writes).")
             .other("hosts",
-                   "Its names in URLs, the machine's without; its addresses and localhost always. "
-                   "Another name is answered 421.",
+                   "Its names in URLs, besides its addresses and localhost; another name "
+                   "is answered 421. Without it the machine's name.",
                    [](const Settings& settings) {
                        return settings.hosts.empty() ? "the machine's" : names_text(settings.hosts);
                    })
-            .other("allow", "Networks such as 192.168.1.0/24; any address without.",
+            .other("allow",
+                   "Networks whose clients may connect, such as 192.168.1.0/24. Without it any.",
                    [](const Settings& settings) { return networks_text(settings.allow); })
-            .other("tokens", "Who may do what: Authorization: Bearer TOKEN.")
-            .integer(
-                "max_connections_per_address", &Settings::max_connections_per_address, 1,
-                static_cast<std::int64_t>(Settings().max_connections),
-                "Of one client; then its longest idle one gives way. Streams of events apart.");
+            .other("tokens", "Tokens of clients (Authorization: Bearer TOKEN).")
+            .integer("max_connections_per_address", &Settings::max_connections_per_address, 1,
+                     static_cast<std::int64_t>(Settings().max_connections),
+                     "Most connections of one address, event streams apart; then its longest "
+                     "idle one is closed.");
     return kKeys;
 }
 
 const Keys<web::Token>& token_keys() {
     static const auto kKeys =
         Keys<web::Token>()
-            .other("name", "Unique; it is in the log.")
-            .other("role", "viewer reads, operator writes as well.",
+            .other("name", "Name that is in the log; unique.")
+            .other("role", "viewer reads, operator reads and writes.",
                    [](const web::Token& token) { return std::string(label(token.role)); })
-            .other("file", "Holds the token, and nothing else.");
+            .other("file", "File that holds the token, and nothing else.");
     return kKeys;
 }
 
@@ -170,14 +181,14 @@ const Keys<points::Relay>& relay_keys() {
     using points::Relay;
     static const auto kKeys =
         Keys<Relay>()
-            .other("from", "STATION/NOTATION: press/UW100.")
-            .other("to", "STATION/NOTATION.")
-            .integer("count", &Relay::count, 1, 2040, "Registers or bits.")
-            .duration("every", &Relay::every, 1ms, points::kSlowest, "How often it is read.")
-            .boolean("on_change", &Relay::on_change, "Write only what has changed.")
+            .other("from", "Source: STATION/NOTATION, such as press/UW100.")
+            .other("to", "Target: STATION/NOTATION.")
+            .integer("count", &Relay::count, 1, 2040, "Number of registers or bits.")
+            .duration("every", &Relay::every, 1ms, points::kSlowest, "Interval between two reads.")
+            .boolean("on_change", &Relay::on_change, "Writes only what has changed.")
             .duration("refresh", &Relay::refresh, 1s, points::kSlowest,
-                      "With on_change: and all again that often. What other clients write there is "
-                      "written over within a second.");
+                      "With on_change: writes all again that often; what other clients write "
+                      "there is overwritten within a second.");
     return kKeys;
 }
 
@@ -193,29 +204,33 @@ const Keys<mqtt::Settings>& mqtt_keys() {
     };
     static const auto kKeys =
         Keys<Settings>()
-            .other("broker", "mqtt://HOST:1883, or mqtts://HOST:8883 with TLS.",
+            .other("broker", "Address: mqtt://HOST:1883, or mqtts://HOST:8883 with TLS.",
                    [](const Settings& settings) { return settings.broker(); })
             .word("format", &Settings::format, kFormats,
-                  "sparkplug has group and node in place of the topic.")
-            .other("topic", "TOPIC/STATION/POINT, of format json.", text(&Settings::topic))
+                  "json, or sparkplug (Sparkplug B), which has group and node in place of "
+                  "the topic.")
+            .other("topic", "Beginning of the topics TOPIC/STATION/POINT, of format json.",
+                   text(&Settings::topic))
             .initially("panelgate")
-            .other("group", "Of format sparkplug.", text(&Settings::group))
-            .other("node", "Of format sparkplug.", text(&Settings::node))
+            .other("group", "Group id, of format sparkplug.", text(&Settings::group))
+            .other("node", "Edge node id, of format sparkplug.", text(&Settings::node))
             .integer("qos", &Settings::qos, 0, 1,
-                     "Of format json; 0: what is on its way may be lost.")
-            .other("client_id", "panelgate- and the machine's name without.",
+                     "Quality of service, of format json; 0: what is on its way may be lost.")
+            .other("client_id", "Client id. Without it panelgate- and the machine's name.",
                    text(&Settings::client_id))
-            .other("username", "The broker's user; none without.", text(&Settings::username))
-            .other("password_file", "Holds the password.")
-            .duration("keep_alive", &Settings::keep_alive, 5s, 1h, "In whole seconds.")
+            .other("username", "User at the broker. Without it none.", text(&Settings::username))
+            .other("password_file", "File that holds the password.")
+            .duration("keep_alive", &Settings::keep_alive, 5s, 1h,
+                      "Keep-alive interval, in whole seconds.")
             .integer("store", &Settings::store, 100, 1'000'000,
                      "Changes that are kept while the broker is away.")
             .word("write", &Settings::write, kWrites,
-                  "points: clients that may publish TOPIC/+/+/set, or DCMD, write.")
-            .other("ca", "A PEM file, with mqtts://; the system's trusted CAs without.",
+                  "points: who may publish TOPIC/+/+/set, or DCMD, writes points.")
+            .other("ca", "PEM file of the CA, with mqtts://. Without it the system's trusted CAs.",
                    text(&Settings::ca))
-            .other("certificate", "The gateway's own, a PEM file.", text(&Settings::certificate))
-            .other("key", "Of the certificate, a PEM file.", text(&Settings::key));
+            .other("certificate", "PEM file of the gateway's own certificate.",
+                   text(&Settings::certificate))
+            .other("key", "PEM file of that certificate's key.", text(&Settings::key));
     return kKeys;
 }
 

@@ -21,19 +21,22 @@ const Keys<Config>& root_keys() {
     static const auto kKeys =
         Keys<Config>()
             .other("profiles_dir",
-                   "A folder; *.yaml there add to or replace the shipped panel profiles.")
+                   "Folder of further panel profiles; its *.yaml add to the shipped ones "
+                   "or replace them.")
             .other("templates",
-                   "What many stations share, by name: a station's keys but id and name.")
-            .other("lines", "At least one serial line.")
-            .other("modbus_tcp", "Listeners for Modbus over TCP.")
-            .other("serial_masters", "Masters on serial ports of their own, as clients.")
+                   "Keys that many stations share, by the template's name: all of a "
+                   "station's but id and name.")
+            .other("lines", "Serial lines, at least one.")
+            .other("modbus_tcp", "Listeners for Modbus/TCP.")
+            .other("serial_masters",
+                   "Masters that ask on serial ports of their own, such as a PLC.")
             .change_needs(kOpensPort)
-            .other("http", "REST, pages and metrics.")
-            .other("relays", "What is copied from panel to panel.")
-            .other("mqtt", "Values at a broker.")
+            .other("http", "REST API, dashboard and metrics.")
+            .other("relays", "Values that are copied from panel to panel.")
+            .other("mqtt", "Values published at an MQTT broker.")
             .change_needs(kConnectsAnew)
-            .other("log", "What is logged on stderr.")
-            .other("realtime", "Frames on time beside other work, where the machine grants it.")
+            .other("log", "Log on stderr.")
+            .other("realtime", "Priority over other programs, so that frames are on time.")
             .change_needs(kNextStart);
     return kKeys;
 }
@@ -49,8 +52,8 @@ const Keys<rt::LogSettings>& log_keys() {
         {{"text", rt::LogFormat::text}, {"json", rt::LogFormat::json}}};
     static const auto kKeys =
         Keys<Log>()
-            .word("level", &Log::level, kLevels, "The least that is logged.")
-            .word("format", &Log::format, kFormats, "Lines for people, or for programs.");
+            .word("level", &Log::level, kLevels, "Lowest severity that is logged.")
+            .word("format", &Log::format, kFormats, "text for people, json for programs.");
     return kKeys;
 }
 
@@ -59,10 +62,9 @@ const Keys<rt::RealtimeSettings>& realtime_keys() {
     static const auto kKeys =
         Keys<Realtime>()
             .integer("priority", &Realtime::priority, 0, 99,
-                     "SCHED_FIFO, 1 to 99, where the machine grants it (CAP_SYS_NICE); "
-                     "0: as all programs.")
+                     "Priority of SCHED_FIFO, which needs CAP_SYS_NICE; 0: none.")
             .boolean("lock_memory", &Realtime::lock_memory,
-                     "Memory stays in RAM (mlockall, CAP_IPC_LOCK).");
+                     "Keeps all memory in RAM (mlockall), which needs CAP_IPC_LOCK.");
     return kKeys;
 }
 
@@ -76,40 +78,41 @@ const Keys<Line>& line_keys() {
         Keys<Line>()
             .other("name", "Unique: a-z, 0-9 and '-'.")
             .change_needs(kOpensPort)
-            .other("device", "A serial device, tcp://HOST:PORT (RTU over TCP), or sim.")
+            .other("device",
+                   "Serial device, tcp://HOST:PORT (RTU over TCP), or sim (simulated panels).")
             .change_needs(kOpensPort)
             .other("mode",
-                   "listen: another master asks on this line, nothing is ever sent, and points "
-                   "show what "
-                   "passes by.",
+                   "listen: another master asks on this line, nothing is ever sent, and "
+                   "points show what passes by.",
                    [](const Line& line) { return line.listens ? "listen" : "master"; })
             .initially("master")
             .change_needs(kOpensPort)
-            .other("serial", "How characters look on the line.")
+            .other("serial", "Character format and framing.")
             .change_needs(kOpensPort)
-            .other("rs485", "How the transceiver is switched.")
+            .other("rs485", "Direction control of an RS-485 transceiver.")
             .change_needs(kOpensPort)
             .word(
                 "echo", [](auto& line) -> auto& { return line.arbiter.echo; }, kEchoes,
-                "The adapter hears itself; auto: found out by a read.")
+                "Whether the adapter hears what it sends; auto: found out by a read.")
             .initially("auto")
             .change_needs(kOpensPort)
-            .other("timing", "Of all stations; a station's own timing overrides it.")
-            .other("retries", "Of reads; writes are never repeated on their own.",
+            .other("timing", "Times of all its stations; a station's own timing overrides them.")
+            .other("retries", "Retries of a read; a write is never repeated on its own.",
                    [](const Line& line) { return std::to_string(line.arbiter.unlisted.retries); })
             .initially("1")
-            .other("queue", "Of requests that wait for the line.")
-            .other("offline", "When a silent station is set aside, and how often it is probed.")
+            .other("queue", "Limits of the requests that wait for this line.")
+            .other("offline",
+                   "When a silent station counts as offline, and how often it is probed then.")
             .word(
                 "quarantine", [](auto& line) -> auto& { return line.arbiter.quarantine; },
                 kQuarantines,
-                "What is suspended after a timeout: the station, the line, or auto, the line "
-                "only where replies have been late.")
+                "What is suspended after a timeout: the station, the line, or auto, the "
+                "line only where replies have been late.")
             .word("unlisted_stations", &Line::refuse_unlisted, kUnlisted,
                   "Stations that are not in the list below: pass, or refuse with exception 0A.")
-            .other("simulate", "The simulated adapter, of device sim and run --simulate.")
+            .other("simulate", "Of a simulated line: what its adapter does wrong.")
             .change_needs(kOpensPort)
-            .other("stations", "The panels on the line.");
+            .other("stations", "Panels on this line.");
     return kKeys;
 }
 
@@ -123,8 +126,8 @@ const Keys<SerialFormat>& serial_keys() {
     using Format = SerialFormat;
     static const auto kKeys =
         Keys<Format>()
-            .integer("baud", &Format::baud, 50, 4'000'000, "Bit/s.")
-            .other("data_bits", "8; in ASCII 7, or 8.",
+            .integer("baud", &Format::baud, 50, 4'000'000, "Bits per second.")
+            .other("data_bits", "Data bits of a character: 8; of ASCII 7, or 8.",
                    [](const Format& format) { return std::to_string(format.data_bits); })
             .word("parity", &Format::parity, kParityWords, "Of each character.")
             .integer("stop_bits", &Format::stop_bits, 1, 2, "Of each character.");
@@ -141,16 +144,15 @@ const Keys<line::Rs485>& rs485_keys() {
     static const auto kKeys =
         Keys<Rs485>()
             .word("mode", &Rs485::mode, kModes,
-                  "off: the adapter by itself; kernel: its driver (TIOCSRS485); rts: this program, "
-                  "as well as timers allow.")
-            .word("rts_on_send", &Rs485::rts_high_on_send, kLevels,
-                  "The level of RTS while sending.")
+                  "off: the adapter by itself; kernel: its driver (TIOCSRS485); rts: this "
+                  "program, as well as timers allow.")
+            .word("rts_on_send", &Rs485::rts_high_on_send, kLevels, "Level of RTS while sending.")
             .duration("delay_before_send", &Rs485::delay_before_send, 0ms, 100ms,
-                      "From RTS to the first bit.")
+                      "Delay from RTS to the first bit.")
             .duration("delay_after_send", &Rs485::delay_after_send, 0ms, 100ms,
-                      "From the last bit back.")
+                      "Delay from the last bit to the release of RTS.")
             .boolean("receive_during_send", &Rs485::receive_during_send,
-                     "The line hears itself, of mode kernel.");
+                     "The receiver stays on while sending; only with mode kernel.");
     return kKeys;
 }
 
@@ -159,7 +161,8 @@ const Keys<arbiter::StationSettings>& timing_keys() {
     static const auto kKeys =
         Keys<Settings>()
             .other("response_timeout",
-                   "From the end of the request on the wire to the first byte of the reply.",
+                   "Longest time from the end of a request on the wire to the first byte "
+                   "of its reply; adaptive: as the panel has needed it lately.",
                    [](const Settings& settings) {
                        const std::string longest = format_duration(settings.response_timeout);
                        if (!settings.adaptive_timeout) return longest;
@@ -167,20 +170,23 @@ const Keys<arbiter::StationSettings>& timing_keys() {
                               longest;
                    })
             .initially("500ms")
-            .other("adaptive_floor", "The shortest, of response_timeout: adaptive.")
+            .other("adaptive_floor", "Shortest timeout, of response_timeout: adaptive.")
             .initially("20ms")
             .other("adaptive_ceiling",
-                   "The longest, of response_timeout: adaptive; else 500ms, or the line's.")
+                   "Longest timeout, of response_timeout: adaptive. Without it the line's "
+                   "timeout, or 500ms.")
             .other("frame_gap",
-                   "Silence between frames; auto: 3.5 characters (1.75 ms above 19200 baud), or "
-                   "what the "
-                   "profile asks; 0 only on sim and tcp:// and in ASCII.",
+                   "Silence between two frames; auto: 3.5 characters (1.75 ms above 19200 "
+                   "baud), or what the profile asks. Shorter only on sim, on tcp:// and in "
+                   "ASCII.",
                    [](const Settings& settings) { return or_auto(settings.frame_gap); })
             .initially("auto")
-            .other("late_window", "After a timeout, how long a late reply is waited for.",
+            .other("late_window",
+                   "How long after a timeout a late reply may still come; auto: as has "
+                   "been seen of the station.",
                    [](const Settings& settings) { return or_auto(settings.late_window); })
             .initially("auto")
-            .other("think_time", "What a plan assumes of a panel.")
+            .other("think_time", "Think time of a panel that the plan of `check` assumes.")
             .initially("1ms");
     return kKeys;
 }
@@ -189,24 +195,24 @@ const Keys<LineTiming>& line_timing_keys() {
     static const auto kKeys =
         Keys<LineTiming>()
             .other("reply_hole",
-                   "The longest silence inside a reply; auto: 60 ms and 32 characters, on tcp:// "
-                   "700 ms, "
-                   "in ASCII 1 s.",
+                   "Longest silence inside a reply; auto: 60 ms and 32 characters, on "
+                   "tcp:// 700 ms, in ASCII 1 s.",
                    [](const LineTiming& line) { return format_duration(line.reply_hole); })
             .initially("auto")
             .duration("broadcast_turnaround", &LineTiming::broadcast_turnaround, 1ms, 1min,
-                      "Rest after a broadcast.");
+                      "Pause after a broadcast, in which the panels execute it.");
     return kKeys;
 }
 
 const Keys<arbiter::QueueSettings>& queue_keys() {
     using Queue = arbiter::QueueSettings;
-    static const auto kKeys =
-        Keys<Queue>()
-            .integer("limit", &Queue::limit, 1, 4096, "Of all clients together.")
-            .integer("per_client", &Queue::per_client, 1, 4096, "Of one client.")
-            .duration("deadline", &Queue::deadline, 10ms, 10min,
-                      "From a request's arrival to its answer.");
+    static const auto kKeys = Keys<Queue>()
+                                  .integer("limit", &Queue::limit, 1, 4096,
+                                           "Most requests that wait, of all clients together.")
+                                  .integer("per_client", &Queue::per_client, 1, 4096,
+                                           "Most requests that wait, of one client.")
+                                  .duration("deadline", &Queue::deadline, 10ms, 10min,
+                                            "Longest time from a request's arrival to its answer.");
     return kKeys;
 }
 
@@ -214,9 +220,12 @@ const Keys<arbiter::OfflineSettings>& offline_keys() {
     using Offline = arbiter::OfflineSettings;
     static const auto kKeys =
         Keys<Offline>()
-            .integer("after", &Offline::after, 1, 1000, "Silent transactions in a row.")
-            .duration("probe_min", &Offline::probe_min, 10ms, 1h, "The first pause between probes.")
-            .duration("probe_max", &Offline::probe_max, 10ms, 24h, "The pause doubles up to here.");
+            .integer("after", &Offline::after, 1, 1000,
+                     "Silent transactions in a row until a station counts as offline.")
+            .duration("probe_min", &Offline::probe_min, 10ms, 1h,
+                      "First pause between probes of an offline station.")
+            .duration("probe_max", &Offline::probe_max, 10ms, 24h,
+                      "Longest pause; it doubles from probe_min on.");
     return kKeys;
 }
 
@@ -224,47 +233,47 @@ const Keys<StationBody, StationView>& station_keys() {
     static constexpr Words<bool, 2> kTranslate{{{"auto", true}, {"off", false}}};
     static const auto kKeys =
         Keys<StationBody, StationView>()
-            .other("id", "Its address.",
+            .other("id", "Address of the panel on the line.",
                    [](const StationView& of) { return std::to_string(of.station.id); })
-            .other("name", "Unique over all lines: a-z, 0-9 and '-'; LINE-ID without.")
-            .other("template", "One of templates; the station's own keys win.")
-            .other("profile", "`panelgate profiles` lists them.",
+            .other("name", "Name of a-z, 0-9 and '-', unique over all lines. Without it LINE-ID.")
+            .other("template", "Template whose keys it takes; the station's own keys win.")
+            .other("profile", "Panel profile; `panelgate profiles` lists them.",
                    [](const StationView& of) { return of.station.profile->name; })
             .initially("generic")
-            .other("access", "read_only refuses whatever writes.",
+            .other("access", "read_only refuses every write.",
                    [](const StationView& of) { return access_text(of.station.read_only); })
             .initially("read_write")
-            .other("timing", "Over the line's.")
+            .other("timing", "Times of this station, in place of the line's.")
             .integer(
                 "retries", [](auto& of) -> auto& { return of.settings.retries; }, 0, 10,
-                "Of reads; the line's without.")
+                "Retries of a read. Without it the line's.")
             .boolean(
                 "retry_writes", [](auto& of) -> auto& { return of.settings.retry_writes; },
-                "A write that was not answered is repeated.")
+                "Sends a write again that was not answered.")
             .initially("false")
             .word(
                 "crc_order", [](auto& of) -> auto& { return of.settings.crc_order; },
                 modbus::kCrcOrders,
-                "The profile's without; high_first: Autonics GP with firmware of before June "
-                "2005.")
+                "Order of the CRC's bytes. Without it the profile's; high_first: "
+                "Autonics GP with firmware from before June 2005.")
             .change_needs(kOpensPort)
             .duration(
                 "max_age", [](auto& of) -> auto& { return of.settings.max_age; }, 0ms, 24h,
-                "How old a value may be that answers a client; 0ms asks the panel.")
+                "How old a value may be that answers a client; 0ms: the panel is asked "
+                "each time.")
             .initially("0ms")
             .boolean(
                 "guard", [](auto& of) -> auto& { return of.station.guard; },
-                "Refuse what the profile rules out before it reaches the bus.")
+                "Refuses requests that the profile rules out, before they reach the bus.")
             .initially("false")
             .word(
                 "translate", [](auto& of) -> auto& { return of.station.translate; }, kTranslate,
-                "What the panel lacks goes out as what it has: 05 and 06 as 15 and 16, and 02 and "
-                "04 "
-                "as 01 and 03 where the profile says that the memory is the same; not with a "
-                "guard.")
+                "Sends functions that the panel lacks as ones that it has: 05 and 06 as "
+                "15 and 16, and 02 and 04 as 01 and 03 where the profile says that the "
+                "memory is the same. Not with a guard.")
             .initially("auto")
-            .other("poll", "Blocks that are read again and again, for max_age.")
-            .other("simulate", "Faults of the simulated panel.")
+            .other("poll", "Blocks that are polled, to answer clients (max_age).")
+            .other("simulate", "Of a simulated panel: what it does wrong.")
             .change_needs(kOpensPort)
             .other("points", "Values by name.");
     return kKeys;
@@ -274,17 +283,18 @@ const Keys<sim::Misbehaviour>& fault_keys() {
     using Faults = sim::Misbehaviour;
     static const auto kKeys =
         Keys<Faults>()
-            .boolean("dead", &Faults::dead, "Neither executes nor answers.")
-            .duration("slow", &Faults::slow, 0ms, 10min, "More think time.")
+            .boolean("dead", &Faults::dead, "Executes nothing and answers nothing.")
+            .duration("slow", &Faults::slow, 0ms, 10min, "Additional think time.")
             .duration("late_by", &Faults::late_by, 0ms, 10min,
-                      "More think time, for the share `late`.")
-            .share("late", &Faults::late, "A share of its answers.")
-            .share("drop", &Faults::drop, "The share that it executes and does not answer.")
-            .share("damage", &Faults::damage, "The share with a wrong bit.")
-            .share("truncate", &Faults::truncate, "The share that is cut in half.")
-            .share("foreign_id", &Faults::foreign_id, "The share that carries another address.")
+                      "Additional think time of the replies of the share `late`.")
+            .share("late", &Faults::late, "Share of replies that are delayed by late_by.")
+            .share("drop", &Faults::drop, "Share of requests that it executes and does not answer.")
+            .share("damage", &Faults::damage, "Share of replies with a wrong bit.")
+            .share("truncate", &Faults::truncate, "Share of replies that are cut in half.")
+            .share("foreign_id", &Faults::foreign_id,
+                   "Share of replies that carry another address.")
             .share("duplicate", &Faults::duplicate,
-                   "The share that a second panel with this address answers, too.");
+                   "Share of requests that a second panel with this address answers, too.");
     return kKeys;
 }
 
@@ -293,9 +303,9 @@ const Keys<points::Poll>& poll_keys() {
     constexpr std::int64_t kLargest = 2040;  // the largest read of any panel: GT, ARCT1F501E 1.3.1
     static const auto kKeys =
         Keys<Poll>()
-            .other("read", "Where it begins, as the panel names it.")
-            .integer("count", &Poll::count, 1, kLargest, "Registers or bits.")
-            .duration("every", &Poll::every, 1ms, points::kSlowest, "How often it is read.");
+            .other("read", "First register or bit, in the panel's notation.")
+            .integer("count", &Poll::count, 1, kLargest, "Number of registers or bits.")
+            .duration("every", &Poll::every, 1ms, points::kSlowest, "Interval between two reads.");
     return kKeys;
 }
 
@@ -308,38 +318,39 @@ const Keys<points::Point>& point_keys() {
     const auto or_none = [](const auto& number) { return number ? number->text() : "none"; };
     static const auto kKeys =
         Keys<Point>()
-            .other("name", "Unique in the station: a-z, 0-9, '-' and '_'.")
-            .other("at", "As the panel names it: UW100, 400001.",
+            .other("name", "Name of a-z, 0-9, '-' and '_', unique in its station.")
+            .other("at", "Register or bit in the panel's notation, such as UW100 or 400001.",
                    [](const Point& point) { return point.at; })
-            .other("bit", "One bit of a register; the point is of type bool then.",
+            .other("bit", "One bit of a register; the type is bool then.",
                    [](const Point& point) {
                        return point.bit ? std::to_string(*point.bit) : std::string("none");
                    })
-            .other("type", "How it is read; u16 without, of bits bool.",
+            .other("type", "Type of the value. Without it u16; of a bit bool.",
                    [](const Point& point) { return std::string(label(point.type)); })
             .other("length", "Characters of a string, two in a register.",
                    [](const Point& point) { return std::to_string(point.length); })
-            .word("word_order", &Point::word_order, kOrders, "ABCD: high word first.")
+            .word("word_order", &Point::word_order, kOrders,
+                  "Order of the bytes of values in several registers; ABCD: high word first.")
             .other("scale", "value = raw * scale + offset.",
                    [](const Point& point) { return number_text(point.scale); })
             .initially("1")
-            .other("offset", "See scale.",
+            .other("offset", "See scale: value = raw * scale + offset.",
                    [](const Point& point) { return number_text(point.offset); })
             .initially("0")
-            .other("unit", "As people write it.",
+            .other("unit", "Unit, as people write it.",
                    [](const Point& point) { return point.unit.empty() ? "none" : point.unit; })
-            .other("min", "The least that may be written.",
+            .other("min", "Smallest value that may be written.",
                    [=](const Point& point) { return or_none(point.min); })
-            .other("max", "The most that may be written.",
+            .other("max", "Largest value that may be written.",
                    [=](const Point& point) { return or_none(point.max); })
             .boolean("writable", &Point::writable, "Clients may write it.")
-            .other("labels", "Names of raw numbers: {0: off, 1: on}.")
-            .other("no_value", "Raw numbers that mean that there is none.",
+            .other("labels", "Texts of raw numbers, such as {0: off, 1: on}.")
+            .other("no_value", "Raw numbers that mean that there is no value.",
                    [](const Point& point) {
                        return listed(point.no_value,
                                      [](std::int64_t raw) { return std::to_string(raw); });
                    })
-            .duration("every", &Point::every, 1ms, points::kSlowest, "How often it is read.");
+            .duration("every", &Point::every, 1ms, points::kSlowest, "Interval between two reads.");
     return kKeys;
 }
 

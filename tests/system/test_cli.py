@@ -62,7 +62,7 @@ class CommandLine(unittest.TestCase):
 
     def test_the_keys_of_a_configuration_are_explained(self):
         keys = lambda *path: self.expect(0, "config", "keys", *path).stdout
-        self.assertIn("lines.queue.limit: 1 to 4096 (default 256)\n    Of all clients together.\n",
+        self.assertIn("lines.queue.limit: 1 to 4096 (default 256)\n    Most requests that wait, of all clients together.\n",
                       keys("lines.queue"))
         self.assertIn("lines.timing.frame_gap: 0ms to 10s, or auto (default auto)\n", keys("lines.timing"))
         self.assertIn("lines.stations.id: 1 to 247 (required)\n", keys())
