@@ -89,9 +89,7 @@ if [ $mode != quick ]; then
     # Optimization takes longer than it saves where no test waits for the code.
     cold=-DPANELGATE_O0="panelgate;pg_app;pg_config;pg_doctor;pg_metrics;pg_mqtt;pg_plan;pg_points;pg_profile;pg_rt;pg_scan;pg_sim;pg_web_api;pg_web_http;pg_yaml"
     [ $mode = nightly ] || long=OFF
-    frames=300000
-    [ $mode != nightly ] || frames=1000000
-    must "build asan" build asan ON $long "$cold" -DPANELGATE_TEST_UBSAN=$long -DPANELGATE_SCENARIO_FRAMES=$frames
+    must "build asan" build asan ON $long "$cold" -DPANELGATE_TEST_UBSAN=$long
     step "tests asan" run_tests asan "${which[@]}"
 fi
 finish
