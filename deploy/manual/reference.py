@@ -10,8 +10,9 @@ import textwrap
 
 WIDTH = 100
 HEAD = """\
-# Every key of this version. One behind a '#' without a blank is not set: its value is what it is then,
-# or an example. `panelgate check -c FILE` reports what is wrong with a file, and where.
+# Every key of this version. One behind '#' is not set: its value is what it is then, or an example. What
+# is behind '##' belongs to a block that is taken in as a whole, with what is needed of it.
+# `panelgate check -c FILE` reports what is wrong with a file, and where.
 # Durations are 250us, 20ms, 2s, 5min.
 #
 # Anywhere: ${NAME} and ${NAME:-default} from the environment ($$ is a dollar), YAML merge keys
@@ -105,13 +106,14 @@ class Example:
                                     break_on_hyphens=False)
 
     def put(self, indent, off, text):
-        self.lines.append(indent + ("#" if off else "") + text)
+        self.lines.append(indent + off * "#" + text)
 
     def map(self, path, indent, off, item):
         for key in self.keys.below(path):
             if key["path"] == "templates":  # they are in HEAD
                 continue
-            inner = off or key["path"] in OFF
+            # A single '#' taken out of a block that is off would put its key into the map before it.
+            inner = 2 if off or key["path"] in OFF else 0
             head = indent[:-2] + "- " if item and not off else indent
             inside = bool(self.keys.below(key["path"]))
             absent = not inside and "example" not in key
@@ -122,9 +124,9 @@ class Example:
                 deeper = "    " if key["kind"] == "list" else "  "
                 self.map(key["path"], indent + deeper, inner, key["kind"] == "list")
             elif item and off:
-                self.put(indent[:-2], True, f"- {name(key)}: {self.keys.value(key)}")
+                self.put(indent[:-2], 2, f"- {name(key)}: {self.keys.value(key)}")
             else:
-                self.put(head, inner or absent, f"{name(key)}: {self.keys.value(key)}")
+                self.put(head, inner or int(absent), f"{name(key)}: {self.keys.value(key)}")
             if item:
                 # A comment before its dash would belong to the list.
                 self.lines[-1] += "    # " + remarks(key)
@@ -133,7 +135,7 @@ class Example:
                 self.lines.append("")
 
     def text(self):
-        self.map("", "", False, False)
+        self.map("", "", 0, False)
         return "\n".join(self.lines).rstrip("\n") + "\n"
 
 

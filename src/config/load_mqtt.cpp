@@ -55,6 +55,13 @@ void load_broker(MapReader& in, mqtt::Settings& settings) {
     const auto text = in.required_text("broker");
     in.looks_like("broker", "^mqtts?://.");
     if (!text || parse_broker(*text, settings)) return;
+    if (text->find('@') != text->npos) {  // it is not shown: a password may be in it
+        in.problem(
+            "broker",
+            "broker must be an address alone, such as mqtt://broker.plant:1883; the user goes "
+            "to username, the password into a file: password_file");
+        return;
+    }
     in.problem("broker",
                "broker must be mqtt://HOST:PORT, or mqtts://HOST:PORT with TLS, such as "
                "mqtt://broker.plant:1883, not " +

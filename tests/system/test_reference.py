@@ -40,6 +40,21 @@ class Reference(unittest.TestCase):
                 self.assertTrue(re.search(rf"(?m)^{re.escape(key['path'])}\b", listed), "config keys")
                 self.assertTrue(key.get("text"), "what it is for")
 
+    def test_one_sign_taken_out_of_a_block_that_is_off_changes_nothing(self):
+        """It would be a key of the map before the block: of the listener in place of the serial master."""
+        example = (ROOT / "config/panelgate.example.yaml").read_text().splitlines()
+        block = None
+        for line in example:
+            off = line.lstrip().startswith("##")
+            indent = len(line) - len(line.lstrip())
+            if block is not None and line.strip() and indent <= block and not off:
+                block = None
+            if block is None and off:
+                block = indent
+            if block is not None and line.lstrip().startswith("#"):
+                self.assertTrue(off or line.lstrip().startswith("# "), line)
+        self.assertTrue(any(line.lstrip().startswith("##framing:") for line in example))
+
     def test_the_example_says_what_is_left_out(self):
         """A commented key has the value that it has when it is left out: typed in, nothing changes."""
         example = (ROOT / "config/panelgate.example.yaml").read_text()
