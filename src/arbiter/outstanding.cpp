@@ -51,12 +51,14 @@ void OutstandingReplies::close_before(TimePoint sent, TimePoint connected) {
                   [&](const Entry& one) { return one.sent < sent && one.sent >= connected; });
 }
 
-bool OutstandingReplies::spans_connections(ByteView reply, TimePoint connected) const {
+void OutstandingReplies::close(ByteView reply, TimePoint connected, bool asked) {
     const auto fits = may_be_answered_by(reply);
     const auto first = std::ranges::find_if(entries_, fits);
-    return first != entries_.end() && first->sent < connected &&
-           std::ranges::any_of(
-               entries_, [&](const Entry& one) { return one.sent >= connected && fits(one); });
+    if (first == entries_.end()) return;
+    const auto is_present = [&](const Entry& one) { return one.sent >= connected && fits(one); };
+    if (first->sent < connected && (asked || std::ranges::any_of(entries_, is_present))) return;
+    close_before(first->sent, connected);
+    take(reply);
 }
 
 bool OutstandingReplies::fits_other(ByteView reply, const Bytes& pdu) const {

@@ -141,13 +141,9 @@ void OutstandingRequests::settle(TimePoint now, const Attempt& attempt) {
     if (attempt.reply() == group.doubted && replies_.size() <= 1) {
         replies_.clear();  // both have come
         rest_is_over(now + duplicates_.take_doubt());
-    } else if (const OutstandingReplies::Entry* const oldest = replies_.oldest(attempt.reply())) {
-        // Each attempt may have been answered with it, this one too; those over an earlier
-        // connection in any order.
-        if (oldest->sent >= connected_) {
-            replies_.close_before(oldest->sent, connected_);
-            replies_.take(attempt.reply());
-        }
+    } else if (replies_.fits(attempt.reply())) {
+        // Each attempt may have been answered with it, this one too.
+        replies_.close(attempt.reply(), connected_, true);
         replies_.add(sent, group.request.pdu());
         rest(now);
     } else if (now < again_until_ && late_.worst() > Duration::zero()) {
@@ -166,15 +162,6 @@ void OutstandingRequests::learn_of_read(const modbus::Request& read, const modbu
     longest = std::max(longest, span.count);
     if (!cheapest_read_ || span.count < cheapest_read_->span()->count) cheapest_read_ = read;
     if (!largest_read_ || span.count > largest_read_->span()->count) largest_read_ = read;
-}
-
-/// True if it is unknown which of several requests over different connections this reply answers:
-/// then none of them is closed. `asked`: one is on the wire, and the reply is an exception that
-/// could be its.
-bool OutstandingRequests::answers_either(ByteView pdu, bool asked) const {
-    const bool may_be_of_open = asked && modbus::exception_of(pdu);
-    return replies_.spans_connections(pdu, connected_) ||
-           (may_be_of_open && replies_.oldest(pdu)->sent < connected_);
 }
 
 /// Remembers an unsolicited exception and when it first came.
@@ -207,9 +194,8 @@ OutstandingRequests::Heard OutstandingRequests::on_unsolicited(TimePoint now, By
     // A repetition of the previous reply may be a duplicate, and the outstanding reply still comes.
     if (may_be_duplicate) {
         duplicates_.on_ambiguous(now, pdu);
-    } else if (!answers_either(pdu, asked)) {
-        replies_.close_before(replies_.oldest(pdu)->sent, connected_);
-        replies_.take(pdu);
+    } else {
+        replies_.close(pdu, connected_, asked && modbus::exception_of(pdu));
     }
     heard.settled = !any();
     // Later ones are still to come.

@@ -210,10 +210,9 @@ TimePoint Schedule::ready_at(const Stations& stations, const Job& job) const {
                                           stations.settings(job.station).response_timeout);
     // A write that its echo could confirm is preceded by a read, which may be any.
     const bool is_learned = echo_known_ || job.request.is_read();
-    TimePoint clear =
-        is_learned ? station->requests().clear_at(job.request) : station->requests().rested();
-    if (can_prove(*station))
-        clear = std::min(clear, station->requests().clear_at(station->requests().proof()));
+    const OutstandingRequests& book = station->requests();
+    TimePoint clear = is_learned ? book.clear_at(job.request) : book.rested();
+    if (can_prove(*station)) clear = std::min(clear, book.clear_at(book.proof()));
     return std::max({clear, stations.broadcasts().over(job.request, station->broadcast_window()),
                      stations.throttled_until(job.station)});
 }
@@ -311,16 +310,16 @@ JobQueue::Test Schedule::runnable(TimePoint now, const Stations& stations,
 std::optional<Schedule::Next> Schedule::proof_before(TimePoint now, const Job& job,
                                                      const Stations& stations) const {
     const Station* station = stations.find(job.station);
-    if (job.station == kBroadcast || station == nullptr ||
-        !station->requests().is_ambiguous(job.request))
-        return std::nullopt;
+    if (job.station == kBroadcast || station == nullptr) return std::nullopt;
+    const OutstandingRequests& book = station->requests();
+    if (!book.is_ambiguous(job.request)) return std::nullopt;
     const bool is_in_transit = in_transit(*station);
-    if (!is_in_transit && now >= station->requests().clear_at(job.request)) return std::nullopt;
-    if (is_in_transit && !can_prove(*station) && station->requests().any_since(transport_.opened()))
+    if (!is_in_transit && now >= book.clear_at(job.request)) return std::nullopt;
+    if (is_in_transit && !can_prove(*station) && book.any_since(transport_.opened()))
         return Next{std::nullopt, true};
-    Group proof = internal_read(job.station, station->requests().proof());
+    Group proof = internal_read(job.station, book.proof());
     proof.probe = true;
-    proof.distinct_length = proof.request != station->requests().probe();
+    proof.distinct_length = proof.request != book.probe();
     return Next{std::move(proof), false};
 }
 

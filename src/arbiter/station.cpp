@@ -32,11 +32,10 @@ void Station::on_asked(TimePoint now, const Group& group, bool in_transit) {
 }
 
 Station::Heard Station::on_unsolicited_frame(TimePoint now, ByteView pdu, bool asked) {
-    const OutstandingRequests::Heard found = requests_.on_unsolicited(now, pdu, asked);
-    Heard heard{found.claim, found.lateness, false, found.settled};
-    if (found.claim == Claim::duplicate) trail_.on_unsolicited(now);
-    if (found.claim != Claim::late) return heard;
-    if (found.needed) slowest_.add(*found.needed);
+    Heard heard{requests_.on_unsolicited(now, pdu, asked)};
+    if (heard.claim == Claim::duplicate) trail_.on_unsolicited(now);
+    if (heard.claim != Claim::late) return heard;
+    if (heard.needed) slowest_.add(*heard.needed);
     heard.back = health_.on_late_reply(now);
     missed_ = false;
     probes_ = 0;

@@ -47,9 +47,11 @@ class OutstandingReplies {
     /// A request that left at `sent` was served, and a station serves in order: removes the earlier
     /// ones of the same connection (that left at `connected` or later).
     void close_before(TimePoint sent, TimePoint connected);
-    /// True if what this reply may answer left over different connections, the present one of which
-    /// was opened at `connected`. Their order is unknown: it may be the reply to any of them.
-    bool spans_connections(ByteView reply, TimePoint connected) const;
+    /// This reply came: closes the oldest request that it may answer, and those before it on its
+    /// connection. Closes none if what it may answer left over the present connection, opened at
+    /// `connected`, and over an earlier one: their order is unknown. `asked`: a request that it may
+    /// answer, too, has left over the present one and is not among these.
+    void close(ByteView reply, TimePoint connected, bool asked);
     /// True if this reply may answer one of them that is another request.
     bool fits_other(ByteView reply, const Bytes& pdu) const;
     /// True if a request of another function is among them.
@@ -161,7 +163,7 @@ class BroadcastReplies {
     struct Sent {
         TimePoint at{};
         Bytes request;
-        Bytes reply;
+        Bytes reply;  ///< the normal one, made once: over() is asked for each waiting write
     };
     std::array<Sent, kBroadcasts> last_;
     std::size_t next_ = 0;

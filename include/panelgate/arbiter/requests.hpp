@@ -170,7 +170,6 @@ class OutstandingRequests {
         return std::ranges::equal(pdu, unsolicited_refusal_) &&
                now < unsolicited_refusal_at_ + DuplicateGuard::kLongest;
     }
-    bool answers_either(ByteView pdu, bool asked) const;
     void remember_refusal(TimePoint now, ByteView pdu);
     void rest(TimePoint now);
     void rest_is_over(TimePoint not_before);

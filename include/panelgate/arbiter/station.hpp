@@ -58,11 +58,8 @@ class Station {
 
     // Replies and failures
 
-    struct Heard {
-        Claim claim = Claim::unasked;
-        Duration lateness{};   ///< of a late reply, after its response timeout
-        bool back = false;     ///< it was offline
-        bool settled = false;  ///< no reply is outstanding any more
+    struct Heard : OutstandingRequests::Heard {
+        bool back = false;  ///< it was offline
     };
     /// How long after a broadcast it may answer it.
     Duration broadcast_window() const { return requests_.broadcast_window(usual()); }
