@@ -33,11 +33,11 @@ TITLES = {"": "Top level", "lines": "A line", "lines.stations": "A station",
           "modbus_tcp": "A listener for Modbus/TCP", "serial_masters": "A serial master",
           "relays": "A relay", "http.tokens": "A token"}
 
-
-# Of keys that are left out above and have no value of their own then.
+# Of keys that have neither a default nor an example in the program.
 EXAMPLES = {"profiles_dir": "/etc/panelgate/profiles", "lines.serial.data_bits": "8",
             "serial_masters.serial.data_bits": "8", "lines.timing.adaptive_ceiling": "500ms",
-            "lines.stations.template": "meter", "lines.stations.retries": "1", "lines.stations.crc_order": "low_first",
+            "lines.stations.template": "meter", "lines.stations.retries": "1",
+            "lines.stations.crc_order": "low_first",
             "lines.stations.points.bit": "3", "lines.stations.points.length": "16",
             "lines.stations.points.min": "0", "lines.stations.points.max": "400",
             "modbus_tcp.broadcast": "reply", "modbus_tcp.retransmissions": "join",
@@ -114,19 +114,18 @@ class Example:
                 continue
             # A single '#' taken out of a block that is off would put its key into the map before it.
             inner = 2 if off or key["path"] in OFF else 0
-            head = indent[:-2] + "- " if item and not off else indent
+            # The first key of a list's entry stands behind the dash.
+            place, shown = (indent[:-2], "- " + name(key)) if item else (indent, name(key))
             inside = bool(self.keys.below(key["path"]))
             absent = not inside and "example" not in key
             if not item:
                 self.comment(indent, remarks(key))
             if inside:
-                self.put(head, inner, name(key) + ":")
+                self.put(place, inner, shown + ":")
                 deeper = "    " if key["kind"] == "list" else "  "
                 self.map(key["path"], indent + deeper, inner, key["kind"] == "list")
-            elif item and off:
-                self.put(indent[:-2], 2, f"- {name(key)}: {self.keys.value(key)}")
             else:
-                self.put(head, inner or int(absent), f"{name(key)}: {self.keys.value(key)}")
+                self.put(place, inner or int(absent), f"{shown}: {self.keys.value(key)}")
             if item:
                 # A comment before its dash would belong to the list.
                 self.lines[-1] += "    # " + remarks(key)

@@ -36,7 +36,7 @@ ExitCode check(const std::string& file, const CheckOptions& options);
 /// Defaults are filled in, secrets are not shown.
 ExitCode config_get(const std::string& file, const std::string& path);
 /// Prints what keys there are at and below a path ("lines.stations.points"), with values, defaults
-/// and a sentence each; "": all.
+/// and a sentence each; "": all. `as_json`: {"keys": [...]}, for programs.
 ExitCode config_keys(const std::string& path, bool as_json);
 /// Prints a JSON Schema of the configuration.
 ExitCode schema();

@@ -120,7 +120,7 @@ std::vector<Change> differences(const config::Config& before, const config::Conf
     const Settings new_settings = by_path(after);
     const Differences all = compare(old_settings, new_settings);
     std::vector<Change> changes;
-    const config::Described keys = config::describe();
+    const config::Described& keys = config::describe();
     for (const auto& [path, difference] : all) {
         if (is_within(all, path) || follows(all, difference)) continue;
         changes.push_back(change_of(path, difference));

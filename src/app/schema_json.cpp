@@ -280,7 +280,7 @@ class Schema {
                 {"description", shapes_.at("templates").text}};
     }
 
-    config::Described described_;
+    const config::Described& described_;
     std::map<std::string, KeyShape> shapes_;
 };
 

@@ -76,29 +76,27 @@ void add_examples(const yaml::Node& node, const std::string& path,
     const bool has_keys = std::ranges::any_of(keys, [&](const yaml::KeyShape& key) {
         return path.empty() || key.path.starts_with(path + '/');
     });
-    if (!has_keys && shape != keys.end())
-        shape->example = node.kind == Kind::scalar ? node.scalar : flow_text(node);
-    if (!has_keys) return;
+    if (!has_keys) {
+        if (shape != keys.end())
+            shape->example = node.kind == Kind::scalar ? node.scalar : flow_text(node);
+        return;
+    }
     for (const yaml::Node& item : node.items) add_examples(item, path, keys);
     for (const yaml::Entry& entry : node.entries)
         add_examples(entry.value, path.empty() ? entry.key : path + '/' + entry.key, keys);
 }
 
-/// What a change of a key needs is what one of the map above it needs.
+/// What a change of a map needs, one of its keys needs. Maps come before their keys.
 void inherit_changes(std::vector<yaml::KeyShape>& keys) {
     for (yaml::KeyShape& key : keys) {
-        for (std::size_t end = key.path.rfind('/'); end != key.path.npos && key.change.empty();
-             end = end == 0 ? key.path.npos : key.path.rfind('/', end - 1)) {
-            const auto above =
-                std::ranges::find(keys, key.path.substr(0, end), &yaml::KeyShape::path);
-            if (above != keys.end()) key.change = above->change;
-        }
+        const std::size_t end = key.path.rfind('/');
+        if (end == key.path.npos || !key.change.empty()) continue;
+        const auto above = std::ranges::find(keys, key.path.substr(0, end), &yaml::KeyShape::path);
+        if (above != keys.end()) key.change = above->change;
     }
 }
 
-}  // namespace
-
-Described describe() {
+Described describe_specimen() {
     yaml::Description description;
     yaml::Problems problems("specimen");
     problems.describe(&description);
@@ -107,6 +105,13 @@ Described describe() {
     add_examples(yaml::parse(kSpecimen, problems), "", described.keys);
     inherit_changes(described.keys);
     return described;
+}
+
+}  // namespace
+
+const Described& describe() {
+    static const Described kDescribed = describe_specimen();
+    return kDescribed;
 }
 
 std::string_view Described::change_of(std::string_view setting) const {

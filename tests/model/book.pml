@@ -43,7 +43,6 @@ bool seen[ATTEMPTS];                    /* these bytes have been heard */
 
 byte now_epoch;
 byte open = NONE;                       /* the attempt that is waited for */
-byte doubt = NONE;                      /* its candidate, which may be a copy */
 bool refusal_rejected;                  /* of this attempt */
 
 #define OF(t) whose[t]
@@ -96,7 +95,7 @@ inline leave_open()
 #ifndef NO_BOOK
     outstanding[open] = true;
 #endif
-    open = NONE; doubt = NONE; refusal_rejected = false
+    open = NONE; refusal_rejected = false
 }
 
 /* True if an outstanding request other than q may have been refused. */
@@ -157,7 +156,7 @@ inline accept(t)
         outstanding[open] = true
     :: else -> close_before(open)
     fi;
-    open = NONE; doubt = NONE; refusal_rejected = false
+    open = NONE; refusal_rejected = false
 }
 
 inline hear(t)
@@ -177,7 +176,7 @@ inline hear(t)
         :: else ->
             if
 #ifndef NO_DOUBT
-            :: seen[t] -> doubt = t
+            :: seen[t] -> skip                             /* a candidate: the answer is still to come */
 #endif
             :: else -> accept(t)
             fi

@@ -18,11 +18,11 @@ struct Described {
     std::vector<yaml::KeyShape> keys;
     std::vector<yaml::KeyRule> rules;
 
-    /// What a change of a setting (Setting::path) needs beside a reload; "" nothing. Valid as long
-    /// as this.
+    /// What a change of a setting (Setting::path) needs beside a reload; "" nothing.
     std::string_view change_of(std::string_view setting) const;
 };
-Described describe();
+/// Made once, at the first call.
+const Described& describe();
 
 /// Returns the pattern of a template's name, as in KeyShape::pattern.
 std::string name_pattern();
