@@ -11,7 +11,8 @@ import textwrap
 WIDTH = 100
 HEAD = """\
 # Every key of this version. One behind '#' is not set: its value is what it is then, or an example. What
-# is behind '##' belongs to a block that is taken in as a whole, with what is needed of it.
+# is behind '##' belongs to a block that is taken in as a whole; behind '###' stand its keys that need a
+# file, or another value of a neighbour.
 # `panelgate check -c FILE` reports what is wrong with a file, and where.
 # Durations are 250us, 20ms, 2s, 5min.
 #
@@ -27,6 +28,7 @@ x-fast: &fast {data_bits: 8, stop_bits: 1}    # serial: {<<: *fast, baud: 38400}
     #timing: {response_timeout: 300ms}
 """
 # What needs a file, a device, a broker or a right that not every machine has, and a simulation.
+NEEDY = {"mqtt.password_file", "mqtt.ca", "mqtt.certificate", "mqtt.key"}
 OFF = {"http.tokens", "serial_masters", "mqtt", "realtime", "lines.simulate", "lines.stations.simulate"}
 TITLES = {"": "Top level", "lines": "A line", "lines.stations": "A station",
           "lines.stations.points": "A point", "lines.stations.poll": "A block that is polled",
@@ -68,6 +70,18 @@ class Keys:
                 return scalar(found, key["kind"])
         raise SystemExit(f"{key['path']} has neither a default nor an example")
 
+    def is_needy(self, key):
+        """Beside the values of its neighbours in the example it would be refused."""
+        if key["path"] in NEEDY:
+            return True
+        condition = key.get("condition", "").removeprefix("only with ")
+        if not condition:
+            return False
+        other, words = condition.split(": ")
+        path = key["path"].rsplit(".", 1)[0] + "." + other
+        beside = next((one for one in self.all if one["path"] == path), None)
+        return beside is None or self.value(beside) not in words.split(" or ")
+
     def maps(self, path=""):
         """The paths of maps with keys of their own, each before those inside it."""
         if self.below(path):
@@ -92,6 +106,8 @@ def remarks(key):
         facts.append(key["values"])
     if key.get("default") and key.get("example", key["default"]) != key["default"]:
         facts.append(f"default {key['default']}")
+    if condition := key.get("condition"):
+        facts.append(condition)
     return key.get("text", "") + (f" ({'; '.join(facts)})" if facts else "")
 
 
@@ -114,6 +130,7 @@ class Example:
                 continue
             # A single '#' taken out of a block that is off would put its key into the map before it.
             inner = 2 if off or key["path"] in OFF else 0
+            inner += bool(inner) and self.keys.is_needy(key)
             # The first key of a list's entry stands behind the dash.
             place, shown = (indent[:-2], "- " + name(key)) if item else (indent, name(key))
             inside = bool(self.keys.below(key["path"]))
@@ -138,6 +155,11 @@ class Example:
         return "\n".join(self.lines).rstrip("\n") + "\n"
 
 
+def said(key):
+    condition = key.get("condition", "")
+    return key.get("text", "") + (f" Only {condition.removeprefix('only ')}." if condition else "")
+
+
 def cell(text):
     return text.replace("|", "\\|")
 
@@ -156,7 +178,7 @@ def page(keys):
             default = "required" if key["required"] else f"`{key['default']}`" if "default" in key else ""
             kind = key.get("values") or {"map": "a map", "list": "a list"}.get(key["kind"], key["kind"])
             out.append("| " + " | ".join(cell(text) for text in (
-                f"`{name(key)}`", kind, default, key.get("text", ""), key.get("change", ""))) + " |")
+                f"`{name(key)}`", kind, default, said(key), key.get("change", ""))) + " |")
         out.append("")
     return "\n".join(out).rstrip("\n") + "\n"
 

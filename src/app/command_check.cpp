@@ -96,6 +96,9 @@ void print_changes(const std::string& file, const config::Config& config,
     for (const Change& change : changes)
         std::cout << "  " << to_string(change)
                   << (change.needs.empty() ? "" : " (" + change.needs + ')') << '\n';
+    const std::vector<std::string> cuts = interruptions(*compared.loaded.config, config);
+    if (!cuts.empty()) std::cout << "what a reload interrupts:\n";
+    for (const std::string& cut : cuts) std::cout << "  " << cut << '\n';
 }
 
 /// For a file with faults `lines` and the like are missing.
@@ -113,8 +116,13 @@ void print_json(const std::string& file, const Loaded& loaded, const Judged& jud
         for (const std::string& warning : loaded.config->warnings) warnings.emplace_back(warning);
     }
     for (const std::string& warning : judged.warnings) warnings.emplace_back(warning);
-    if (loaded.config && compared.loaded.config)
+    if (loaded.config && compared.loaded.config) {
         all["changes"] = to_json(differences(*compared.loaded.config, *loaded.config));
+        json::array cuts;
+        for (const std::string& cut : interruptions(*compared.loaded.config, *loaded.config))
+            cuts.emplace_back(cut);
+        all["interruptions"] = std::move(cuts);
+    }
     json::array errors = errors_json(file, loaded.problems);
     for (json::value& error : errors_json(compared.file, compared.loaded.problems))
         errors.push_back(std::move(error));

@@ -35,11 +35,20 @@ std::string shown_path(std::string path) {
 
 /// Returns "; did you mean 'lines.floor1.retries'?", or the names that come next.
 std::string hint(const std::vector<Setting>& all, const std::string& path) {
+    if (config::describe().is_key(path))
+        return ": what it names is read when the file is, and only that is kept";
     std::vector<std::string_view> paths;
     for (const Setting& setting : all) paths.push_back(setting.path);
     const std::string near = nearest(path, paths);
     return near.empty() ? "; `panelgate config get` lists all"
                         : "; did you mean '" + shown_path(near) + "'?";
+}
+
+/// A file may hold any bytes; a terminal would obey some of them.
+std::string printable(const std::string& value) {
+    std::string text = as_utf8(value);
+    std::ranges::replace_if(text, [](unsigned char c) { return c < ' ' || c == 0x7F; }, '?');
+    return text;
 }
 
 std::string words_text(const std::vector<std::string>& words) {
@@ -70,6 +79,8 @@ void print(const yaml::KeyShape& key) {
     if (const std::string values = values_text(key); !values.empty()) std::cout << ": " << values;
     if (key.required) std::cout << " (required)";
     if (!key.initial.empty()) std::cout << " (default " << key.initial << ')';
+    if (const std::string condition = config::describe().condition_of(key.path); !condition.empty())
+        std::cout << " (" << condition << ')';
     for (const std::string& line : {key.text, key.change.empty() ? "" : "Changed: " + key.change})
         if (!line.empty()) std::cout << "\n    " << line;
     std::cout << '\n';
@@ -90,6 +101,7 @@ boost::json::object to_json(const yaml::KeyShape& key) {
     add("example", key.example);
     add("text", key.text);
     add("change", key.change);
+    add("condition", config::describe().condition_of(key.path));
     return made;
 }
 
@@ -122,7 +134,7 @@ ExitCode config_get(const std::string& file, const std::string& typed) {
     const std::vector<Setting> all = config::all_settings(*loaded.config);
     const std::string path = path_typed(typed);
     const auto value = [](const Setting& setting) {
-        return setting.secret ? std::string("(secret)") : setting.value;
+        return setting.secret ? std::string("(secret)") : printable(setting.value);
     };
     bool found = false;
     for (const Setting& setting : all) {
@@ -132,7 +144,7 @@ ExitCode config_get(const std::string& file, const std::string& typed) {
         const bool is_below = path.empty() || path_typed(setting.path).starts_with(path + '/');
         if (is_it) std::cout << value(setting) << '\n';
         if (!is_it && is_below)
-            std::cout << shown_path(setting.path) << ": " << value(setting) << '\n';
+            std::cout << printable(shown_path(setting.path)) << ": " << value(setting) << '\n';
         found = found || is_it || is_below;
     }
     if (found) return kFine;

@@ -10,9 +10,11 @@
 #include <string_view>
 #include <utility>
 
+#include "northbound.hpp"
 #include "panelgate/config/describe.hpp"
 #include "panelgate/config/setting.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "running_line.hpp"
 
 namespace panelgate::app {
 
@@ -108,7 +110,55 @@ void add_profiles(const config::Config& before, const config::Config& after,
     }
 }
 
+template <class T>
+const T* named(const std::vector<T>& all, std::string_view name) {
+    const auto found = std::ranges::find(all, name, &T::name);
+    return found == all.end() ? nullptr : &*found;
+}
+
+bool is_reopened(const config::Line& before, const config::Config& after) {
+    const config::Line* now = named(after.lines, before.name);
+    return now != nullptr && !is_same_wire(before, *now, false);
+}
+
+/// True for a setting of a line that stays open, such as `simulate` of a real one.
+bool is_taken_over(const config::Config& before, const config::Config& after,
+                   std::string_view path) {
+    constexpr std::string_view kLines = "lines/";
+    if (!path.starts_with(kLines)) return false;
+    path.remove_prefix(kLines.size());
+    const config::Line* line = named(before.lines, path.substr(0, path.find('/')));
+    return line != nullptr && !is_reopened(*line, after);
+}
+
 }  // namespace
+
+std::vector<std::string> interruptions(const config::Config& before, const config::Config& after) {
+    std::vector<std::string> all;
+    const auto add = [&](const std::string& part, std::string_view what) {
+        all.push_back(part + ": " + std::string(what));
+    };
+    for (const config::Line& line : before.lines)
+        if (is_reopened(line, after)) add("lines/" + line.name, config::kOpensPort);
+    for (const serial_server::Settings& master : before.serial_masters) {
+        const auto* now = named(after.serial_masters, master.name);
+        if (now != nullptr && !master.is_same_port(*now))
+            add("serial_masters/" + master.name, config::kOpensPort);
+    }
+    for (const tcp_server::Settings& listener : before.modbus_tcp) {
+        const auto is_anew = [&](const tcp_server::Settings& now) {
+            return now.name() == listener.name() && !now.is_same_listener(listener);
+        };
+        if (std::ranges::any_of(after.modbus_tcp, is_anew))
+            add("modbus_tcp/" + listener.name(), config::kListensAnew);
+    }
+    if (before.http && after.http && !before.http->is_same_listener(*after.http))
+        add("http", config::kListensAnew);
+    if (before.mqtt && after.mqtt && !is_same_session(before, after))
+        add("mqtt", config::kConnectsAnew);
+    if (before.realtime != after.realtime) add("realtime", config::kNextStart);
+    return all;
+}
 
 std::string_view label(Kind kind) {
     constexpr std::array<std::string_view, 3> kWords{"added", "removed", "changed"};
@@ -124,7 +174,8 @@ std::vector<Change> differences(const config::Config& before, const config::Conf
     for (const auto& [path, difference] : all) {
         if (is_within(all, path) || follows(all, difference)) continue;
         changes.push_back(change_of(path, difference));
-        if (!is_one_sided(difference)) changes.back().needs = keys.change_of(path);
+        if (!is_one_sided(difference) && !is_taken_over(before, after, path))
+            changes.back().needs = keys.change_of(path);
     }
     add_profiles(before, after, changes);
     std::ranges::sort(changes, {}, &Change::path);

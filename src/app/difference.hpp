@@ -20,7 +20,8 @@ struct Change {
     /// settings of their own (an added line is reported as one change).
     std::string before;
     std::string after;
-    std::string needs = {};  ///< beside a reload: "the port is opened anew"; "" nothing
+    /// What a reload does for it beside taking it over: "the port is opened anew"; "" nothing.
+    std::string needs = {};
 };
 std::string_view label(Change::Kind kind);
 
@@ -34,6 +35,10 @@ std::vector<Change> differences(const config::Config& before, const config::Conf
 std::string to_string(const Change& change);
 /// {"path", "kind", "before", "after", "needs"} each; the last three unless they are empty.
 boost::json::array to_json(const std::vector<Change>& changes);
+
+/// What a reload interrupts, one text each: "lines/floor1: the port is opened anew". Lines, masters
+/// and listeners that come or go are not listed. Judged as the running parts judge it. Pure.
+std::vector<std::string> interruptions(const config::Config& before, const config::Config& after);
 
 /// Units of a listener or serial master by which a client would now reach another panel: the line
 /// of their station was taken away, its id or its alias has changed, stations are swapped. One

@@ -63,8 +63,10 @@ std::string usage_fault(const CLI::ParseError& error) {
     if (kind == "ValidationError") return wrong_choice(text, option);
     const int extras =
         static_cast<int>(CLI::ExitCodes::ExtrasError);  // its kind is the command's name
-    if (error.get_exit_code() == extras) return "nothing may follow '--'";
-    return "these options cannot be understood";
+    if (error.get_exit_code() != extras) return "these options cannot be understood";
+    const std::string word = text.substr(text.rfind(' ') + 1);
+    const bool is_option = word.starts_with('-') && word != "--";
+    return is_option ? "there is no option " + word + " here" : "nothing may follow '--'";
 }
 
 }  // namespace panelgate::app

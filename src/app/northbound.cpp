@@ -31,18 +31,23 @@ mqtt::Settings completed(mqtt::Settings settings) {
     return settings;
 }
 
-mqtt::Subjects subjects_of(const Plant& plant) {
+}  // namespace
+
+mqtt::Subjects subjects_of(const config::Config& config) {
     mqtt::Subjects subjects;
-    for (const Line& line : plant.lines()) subjects.add_line(line.configured->name);
-    for (const Station& station : plant.stations()) {
-        subjects.add_station(station.name);
-        if (!station.points) continue;
-        for (const points::Point& point : station.points->points()) subjects.add_point(point);
+    for (const config::Line& line : config.lines) subjects.add_line(line.name);
+    for (const config::Line& line : config.lines) {
+        for (const config::Station& station : line.stations) {
+            subjects.add_station(station.name);
+            for (const points::Point& point : station.points) subjects.add_point(point);
+        }
     }
     return subjects;
 }
 
-}  // namespace
+bool is_same_session(const config::Config& before, const config::Config& now) {
+    return before.mqtt == now.mqtt && (!now.mqtt || subjects_of(before) == subjects_of(now));
+}
 
 /// A write that was passed to its bus.
 struct BrokerSession::Order {
@@ -58,7 +63,7 @@ BrokerSession::BrokerSession(boost::asio::any_io_executor executor, rt::Clock& c
                              std::shared_ptr<const Snapshot> snapshot)
     : clock_(clock),
       settings_(completed(*snapshot->config->mqtt)),
-      publisher_(settings_, subjects_of(snapshot->plant)),
+      publisher_(settings_, subjects_of(*snapshot->config)),
       alarm_(clock.make_alarm()),
       rebirth_alarm_(clock.make_alarm()),
       writes_(std::make_shared<Writes>(Writes{this, bus::next_client_id()})),
@@ -70,7 +75,7 @@ BrokerSession::BrokerSession(boost::asio::any_io_executor executor, rt::Clock& c
 bool BrokerSession::fits(const Snapshot& snapshot) const {
     const auto& mqtt = snapshot.config->mqtt;
     return mqtt && completed(*mqtt) == settings_ &&
-           subjects_of(snapshot.plant) == publisher_.subjects();
+           subjects_of(*snapshot.config) == publisher_.subjects();
 }
 
 void BrokerSession::show(std::shared_ptr<const Snapshot> snapshot) {

@@ -21,6 +21,11 @@
 
 namespace panelgate::app {
 
+/// What a session publishes: lines, then stations with their points.
+mqtt::Subjects subjects_of(const config::Config& config);
+/// True if a session at the broker can go on: its settings and what it publishes are the same.
+bool is_same_session(const config::Config& before, const config::Config& now);
+
 /// A plant's session at an MQTT broker: publishes its points and the states of its stations and
 /// lines, and carries out writes of points. The clock outlives it. One thread.
 class BrokerSession {

@@ -198,7 +198,7 @@ bool plays_alike(const config::Line& before, const config::Line& now) {
     return before.simulated_echo == now.simulated_echo &&
            std::ranges::equal(before.stations, now.stations,
                               [](const config::Station& one, const config::Station& other) {
-                                  return one.id == other.id && one.profile == other.profile &&
+                                  return one.id == other.id && *one.profile == *other.profile &&
                                          one.faults == other.faults;
                               });
 }

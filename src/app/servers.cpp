@@ -283,21 +283,21 @@ void Servers::apply_masters(const config::Config& config, const Plant& plant) {
     const auto lines = lines_of_master(plant);
     std::vector<Master> before = std::exchange(masters_, {});
     for (const serial_server::Settings& settings : config.serial_masters) {
-        const auto same = std::ranges::find_if(before, [&](const Master& one) {
-            return one.settings == settings && one.lines == lines;
-        });
+        const auto same = std::ranges::find_if(
+            before, [&](const Master& one) { return one.settings.is_same_port(settings); });
         if (same == before.end()) {
-            masters_.push_back({settings, lines, nullptr});
+            masters_.push_back({settings, nullptr});
             continue;
         }
-        masters_.push_back(std::move(*same));
+        masters_.push_back({settings, std::move(same->master)});
+        masters_.back().master->apply(settings, tcp_server::UnitMap(settings.access, lines));
         before.erase(same);
     }
     before.clear();  // a removed master's device may be a new one's
     for (Master& one : masters_) {
         if (one.master) continue;
         one.master = std::make_unique<serial_server::SerialMaster>(
-            clock_, one.settings, tcp_server::UnitMap(one.settings.access, one.lines),
+            clock_, one.settings, tcp_server::UnitMap(one.settings.access, lines),
             line::make_tty_line(executor_, clock_, one.settings.device));
         one.master->start();
     }

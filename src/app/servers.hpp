@@ -125,7 +125,6 @@ class Servers {
     };
     struct Master {
         serial_server::Settings settings;
-        std::vector<tcp_server::LineInfo> lines;  ///< that it may use
         std::unique_ptr<serial_server::SerialMaster> master;
     };
 

@@ -114,7 +114,7 @@ const Described& describe() {
     return kDescribed;
 }
 
-std::string_view Described::change_of(std::string_view setting) const {
+const yaml::KeyShape* Described::find(std::string_view setting) const {
     const yaml::KeyShape* key = nullptr;
     bool names = false;  // the next part is the name of a list's entry
     while (!setting.empty()) {
@@ -128,7 +128,28 @@ std::string_view Described::change_of(std::string_view setting) const {
         key = &*found;
         names = key->kind == yaml::KeyShape::Kind::list;
     }
+    return key;
+}
+
+std::string_view Described::change_of(std::string_view setting) const {
+    const yaml::KeyShape* key = find(setting);
     return key == nullptr ? std::string_view() : key->change;
+}
+
+bool Described::is_key(std::string_view setting) const {
+    const yaml::KeyShape* key = find(setting);
+    const std::string_view last = setting.substr(setting.rfind('/') + 1);
+    return key != nullptr && ('/' + key->path).ends_with('/' + std::string(last));
+}
+
+std::string Described::condition_of(std::string_view key) const {
+    for (const yaml::KeyRule& rule : rules) {
+        if (rule.needs || rule.map + '/' + rule.key != key) continue;
+        std::string words;
+        for (const std::string& word : rule.words) words += (words.empty() ? "" : " or ") + word;
+        return "only with " + rule.other + ": " + words;
+    }
+    return "";
 }
 
 }  // namespace panelgate::config

@@ -26,7 +26,7 @@ using yaml::Node;
 /// RTU has 8, ASCII normally 7, and 8 on some panels (serial line V1.02, 2.5.1, 2.5.2).
 void load_data_bits(MapReader& in, SerialFormat& format) {
     const bool ascii = format.mode == SerialMode::ascii;
-    const auto bits = in.integer("data_bits", 0, 99).value_or(ascii ? 7 : 8);
+    const auto bits = in.integer("data_bits", 0, 999'999'999).value_or(ascii ? 7 : 8);
     in.within("data_bits", 7, 8);
     format.data_bits = bits == 7 && ascii ? 7 : 8;
     if (bits == format.data_bits) return;
@@ -38,18 +38,16 @@ void load_data_bits(MapReader& in, SerialFormat& format) {
 /// Reads the keys of `serial` that set the protocol of a line; a serial master sets it elsewhere.
 void load_serial_mode(MapReader& in, SerialFormat& format, modbus::HexDigits* digits) {
     if (digits == nullptr) {
-        if (!in.has("mode")) return;
-        in.problem("mode",
-                   "a serial master's mode is its framing; write framing: ascii beside "
-                   "serial, or leave it out for RTU");
-        format.mode = SerialMode::ascii;  // accepts 7 and 8 data bits
+        const bool given = in.refuse("mode",
+                                     "is a serial master's framing: write framing: ascii beside "
+                                     "serial, or leave it out for RTU");
+        if (given) format.mode = SerialMode::ascii;  // accepts 7 and 8 data bits
         return;
     }
     format.mode = in.choice<SerialMode>("mode", kSerialModeWords).value_or(format.mode);
     *digits = in.choice<modbus::HexDigits>("ascii_lower_case", kLowerCase).value_or(*digits);
     in.about("mode", "rtu", "Framing of the panels' messages.", "");
-    in.about("ascii_lower_case", "refuse",
-             "Whether hex digits a-f are taken; only with mode ascii.", "");
+    in.about("ascii_lower_case", "refuse", "Whether hex digits a-f are taken.", "");
     constexpr std::array<std::string_view, 1> kAscii{"ascii"};
     in.belongs("ascii_lower_case", "mode", kAscii);
     if (in.has("ascii_lower_case") && format.mode != SerialMode::ascii)

@@ -261,8 +261,11 @@ void check_overlap(Loading& loading, MapReader& in, const tcp_server::Settings& 
 /// The gateway's own unit must not hide a station; the default one gives way to an alias.
 void load_diagnostics(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
     in.may_be_null("diagnostics_unit", true);
-    if (!in.has("diagnostics_unit")) return;
-    settings.diagnostics_unit.reset();
+    const bool given_way =
+        settings.diagnostics_unit && settings.units.contains(*settings.diagnostics_unit);
+    const bool is_set = in.has("diagnostics_unit");
+    if (is_set || given_way) settings.diagnostics_unit.reset();
+    if (!is_set) return;
     const Node* given = in.child("diagnostics_unit");
     if (given == nullptr) return;
     constexpr std::array<std::string_view, 4> kNone{"off", "none", "no", "false"};

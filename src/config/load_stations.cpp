@@ -287,6 +287,18 @@ void check_template(Loading& loading, const Node& body) {
     loading.problems.take(least);
 }
 
+namespace {
+
+bool is_adaptive(const StationSettings& settings) { return settings.adaptive_timeout; }
+
+void warn_of_bound(Loading& loading, yaml::Mark mark) {
+    loading.warn(mark,
+                 "adaptive_floor and adaptive_ceiling do nothing without response_timeout: "
+                 "adaptive; write that, or leave them out");
+}
+
+}  // namespace
+
 void load_stations(Loading& loading, MapReader& in, LineContext work) {
     load_line_timing(loading, in, work);
     StationSettings& settings = work.timing.settings;
@@ -296,6 +308,8 @@ void load_stations(Loading& loading, MapReader& in, LineContext work) {
         for (const Node& node : list->items)
             work.line.stations.push_back(load_station(loading, node, work));
     }
+    const bool adapts = std::ranges::any_of(work.line.arbiter.stations, is_adaptive);
+    if (work.timing.unused_bound && !adapts) warn_of_bound(loading, *work.timing.unused_bound);
     warn_of_character(loading, in, work);
     warn_of_broadcasts(loading, in, work.line);
 }
@@ -306,7 +320,8 @@ std::string at_least(Duration duration) {
     return yaml::format_duration(std::chrono::ceil<std::chrono::microseconds>(duration));
 }
 
-void load_response_timeout(MapReader& in, StationSettings& settings) {
+void load_response_timeout(MapReader& in, Timing& timing) {
+    StationSettings& settings = timing.settings;
     constexpr std::string_view kKey = "response_timeout";
     if (in.is_word(kKey, "adaptive")) {
         settings.adaptive_timeout = true;  // up to the line's own, or the default
@@ -317,6 +332,9 @@ void load_response_timeout(MapReader& in, StationSettings& settings) {
     Duration& floor = settings.timeout_floor;
     floor = in.duration("adaptive_floor", 1ms, 10s).value_or(floor);
     const auto ceiling = in.duration("adaptive_ceiling", 1ms, 2min);
+    timing.unused_bound.reset();
+    for (const std::string_view bound : {"adaptive_floor", "adaptive_ceiling"})
+        if (!settings.adaptive_timeout && in.has(bound)) timing.unused_bound = in.mark(bound);
     if (!settings.adaptive_timeout) return;
     settings.response_timeout = ceiling.value_or(settings.response_timeout);
     if (floor > settings.response_timeout) {
@@ -418,7 +436,7 @@ void load_late_window(Loading& loading, MapReader& in, StationSettings& settings
 
 /// Reads the keys that lines and stations share.
 void load_common(Loading& loading, MapReader& in, const LineContext& work, Timing& timing) {
-    load_response_timeout(in, timing.settings);
+    load_response_timeout(in, timing);
     load_frame_gap(in, work, timing);
     load_late_window(loading, in, timing.settings);
     timing.think_time = in.duration("think_time", 0ms, 10s).value_or(timing.think_time);
@@ -436,6 +454,7 @@ void load_line_timing(Loading& loading, MapReader& in, LineContext& work) {
         load_reply_hole(timing, work.line.arbiter.reply_hole);
         line_timing_keys().read(timing, work.line.arbiter);
         timing.finish();
+        work.line.think_time = work.timing.think_time;
         const Duration gap = work.timing.frame_gap.value_or(silent_interval(serial));
         const bool free = !work.serial_known || serial.mode == SerialMode::ascii;
         if (!free && gap < silent_interval(serial))
@@ -462,6 +481,7 @@ StationSettings load_station_timing(Loading& loading, MapReader& in, const LineC
         refuse("broadcast_turnaround", "a broadcast goes to every station");
         refuse("reply_hole", "the adapter or the network makes the holes, not a panel");
         own.finish();
+        if (timing.unused_bound) warn_of_bound(loading, *timing.unused_bound);
     }
     station.think_time = timing.think_time;
     check_gap(loading, work, station, timing, own_gap, in.mark("timing"));

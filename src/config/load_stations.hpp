@@ -12,6 +12,7 @@ struct Timing {
     arbiter::StationSettings settings;
     std::optional<Duration> frame_gap;
     Duration think_time = 1ms;
+    std::optional<yaml::Mark> unused_bound{};  ///< of an adaptive timeout, where there is none
 };
 
 /// A line while its stations are read.

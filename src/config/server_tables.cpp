@@ -34,8 +34,8 @@ const Keys<tcp_server::Settings>& access_keys() {
                    "it may ask. Without it all.",
                    [](const Settings& settings) { return names_text(settings.lines); })
             .other("units",
-                   "Further unit ids, each to LINE/STATION; needed where two lines have "
-                   "the same station id.")
+                   "Further unit ids (0 to 255, of a serial master 1 to 247), each to "
+                   "LINE/STATION; needed where two lines have the same station id.")
             .other("access", "read_only refuses every write.",
                    [](const Settings& settings) { return access_text(settings.read_only); })
             .initially("read_write");
@@ -65,7 +65,7 @@ const Keys<tcp_server::Settings>& listener_keys() {
             .boolean("udp", &Settings::udp, "Takes datagrams on the same port as well.")
             .change_needs(kListensAnew)
             .word("ascii_lower_case", &Settings::ascii_digits, kLowerCase,
-                  "Whether hex digits a-f are taken; only with framing ascii.")
+                  "Whether hex digits a-f are taken.")
             .change_needs(kListensAnew)
             .word("broadcast", &Settings::broadcast, kBroadcasts,
                   "Answer to a write to unit 0: reply (once it is sent), silent, or deny "
@@ -109,14 +109,19 @@ const Keys<serial_server::Settings>& master_keys() {
         {{"exception", OnFailure::exception}, {"silence", OnFailure::silence}}};
     static const auto kKeys =
         Keys<Settings>()
-            .other("name", "Unique: a-z, 0-9 and '-'.")
+            .other("name", "Unique: a-z, 0-9 and '-'.",
+                   [](const Settings& settings) { return settings.name; })
             .other("device", "Serial port that the master is connected to.")
+            .change_needs(kOpensPort)
             .other("serial", "Character format.")
+            .change_needs(kOpensPort)
             .other("rs485", "Direction control of an RS-485 transceiver.")
+            .change_needs(kOpensPort)
             .word(
                 "framing", [](auto& master) -> auto& { return master.access.framing; }, kFramings,
                 "Framing of the master.")
             .initially("rtu")
+            .change_needs(kOpensPort)
             .word(
                 "broadcast", [](auto& master) -> auto& { return master.access.broadcast; },
                 kBroadcasts,
@@ -127,13 +132,15 @@ const Keys<serial_server::Settings>& master_keys() {
                   "What the master gets where a panel does not answer.")
             .word("echo", &Settings::echo, kEchoes,
                   "Whether the adapter hears what it sends; auto: found out.")
+            .change_needs(kOpensPort)
             .other("response_timeout",
                    "How long the master waits: what would be sent later is not sent. "
                    "Without it no limit but the deadline.",
                    [](const Settings& settings) {
                        const auto& timeout = settings.response_timeout;
                        return timeout ? format_duration(*timeout) : "none";
-                   });
+                   })
+            .change_needs(kOpensPort);
     return kKeys;
 }
 
@@ -170,7 +177,8 @@ const Keys<web::Settings>& http_keys() {
 const Keys<web::Token>& token_keys() {
     static const auto kKeys =
         Keys<web::Token>()
-            .other("name", "Name that is in the log; unique.")
+            .other("name", "Name that is in the log; unique.",
+                   [](const web::Token& token) { return token.name; })
             .other("role", "viewer reads, operator reads and writes.",
                    [](const web::Token& token) { return std::string(label(token.role)); })
             .other("file", "File that holds the token, and nothing else.");
@@ -197,9 +205,9 @@ const Keys<mqtt::Settings>& mqtt_keys() {
     static constexpr Words<mqtt::Format, 2> kFormats{
         {{"json", mqtt::Format::json}, {"sparkplug", mqtt::Format::sparkplug}}};
     static constexpr Words<bool, 2> kWrites{{{"none", false}, {"points", true}}};
-    const auto text = [](std::string Settings::* member) {
-        return [member](const Settings& settings) {
-            return (settings.*member).empty() ? std::string("default") : settings.*member;
+    const auto text = [](std::string Settings::* member, const char* otherwise = "none") {
+        return [member, otherwise](const Settings& settings) {
+            return (settings.*member).empty() ? std::string(otherwise) : settings.*member;
         };
     };
     static const auto kKeys =
@@ -212,14 +220,16 @@ const Keys<mqtt::Settings>& mqtt_keys() {
             .other("topic", "Beginning of the topics TOPIC/STATION/POINT, of format json.",
                    text(&Settings::topic))
             .initially("panelgate")
-            .other("group", "Group id, of format sparkplug.", text(&Settings::group))
-            .other("node", "Edge node id, of format sparkplug.", text(&Settings::node))
+            .other("group", "Group id. Without it the topic, with '-' for '/'.",
+                   text(&Settings::group, "automatic"))
+            .other("node", "Edge node id. Without it the machine's name.",
+                   text(&Settings::node, "automatic"))
             .integer("qos", &Settings::qos, 0, 1,
-                     "Quality of service, of format json; 0: what is on its way may be lost.")
+                     "Quality of service; 0: what is on its way may be lost.")
             .other("client_id", "Client id. Without it panelgate- and the machine's name.",
-                   text(&Settings::client_id))
+                   text(&Settings::client_id, "automatic"))
             .other("username", "User at the broker. Without it none.", text(&Settings::username))
-            .other("password_file", "File that holds the password.")
+            .other("password_file", "File that holds the password of `username`.")
             .duration("keep_alive", &Settings::keep_alive, 5s, 1h,
                       "Keep-alive interval, in whole seconds.")
             .integer("store", &Settings::store, 100, 1'000'000,
@@ -227,10 +237,12 @@ const Keys<mqtt::Settings>& mqtt_keys() {
             .word("write", &Settings::write, kWrites,
                   "points: who may publish TOPIC/+/+/set, or DCMD, writes points.")
             .other("ca", "PEM file of the CA, with mqtts://. Without it the system's trusted CAs.",
-                   text(&Settings::ca))
-            .other("certificate", "PEM file of the gateway's own certificate.",
+                   text(&Settings::ca, "the system's"))
+            .other("certificate",
+                   "PEM file of the gateway's own certificate, with mqtts:// and key.",
                    text(&Settings::certificate))
-            .other("key", "PEM file of that certificate's key.", text(&Settings::key));
+            .other("key", "PEM file of that certificate's key, with certificate.",
+                   text(&Settings::key));
     return kKeys;
 }
 

@@ -27,7 +27,8 @@ void show_station(const SettingWriter& line, const StationView& of) {
     const SettingWriter section = line.item("stations", of.station.name);
     station_keys().show(section, of, line);
     timing_keys().show(section.below("timing"), of.settings, line.below("timing"));
-    section.below("timing").put("think_time", yaml::format_duration(of.station.think_time));
+    section.below("timing").put("think_time", yaml::format_duration(of.station.think_time),
+                                line.below("timing"));
     fault_keys().show(section.below("simulate"), of.station.faults);
     for (const points::Point& point : of.station.points) show_point(section, point);
     Distinct reads;
@@ -43,6 +44,7 @@ void show_line(const SettingWriter& top, const Line& line) {
     section.below("serial").put("ascii_lower_case", any_case ? "take" : "refuse");
     timing_keys().show(section.below("timing"), line.arbiter.unlisted);
     line_timing_keys().show(section.below("timing"), line.arbiter);
+    section.below("timing").put("think_time", yaml::format_duration(line.think_time));
     queue_keys().show(section.below("queue"), line.arbiter.queue);
     offline_keys().show(section.below("offline"), line.arbiter.offline);
     section.below("simulate").put("echo", line.simulated_echo ? "true" : "false");

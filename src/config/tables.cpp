@@ -1,5 +1,6 @@
 #include "tables.hpp"
 
+#include <chrono>
 #include <optional>
 #include <string>
 
@@ -11,8 +12,13 @@ namespace {
 
 using yaml::format_duration;
 
+/// What was reckoned has more digits than anybody writes.
+std::string whole_microseconds(Duration duration) {
+    return format_duration(std::chrono::ceil<std::chrono::microseconds>(duration));
+}
+
 std::string or_auto(const std::optional<Duration>& duration) {
-    return duration ? format_duration(*duration) : "auto";
+    return duration ? whole_microseconds(*duration) : "auto";
 }
 
 }  // namespace
@@ -30,7 +36,6 @@ const Keys<Config>& root_keys() {
             .other("modbus_tcp", "Listeners for Modbus/TCP.")
             .other("serial_masters",
                    "Masters that ask on serial ports of their own, such as a PLC.")
-            .change_needs(kOpensPort)
             .other("http", "REST API, dashboard and metrics.")
             .other("relays", "Values that are copied from panel to panel.")
             .other("mqtt", "Values published at an MQTT broker.")
@@ -76,7 +81,7 @@ const Keys<Line>& line_keys() {
     static constexpr Words<bool, 2> kUnlisted{{{"pass", false}, {"refuse", true}}};
     static const auto kKeys =
         Keys<Line>()
-            .other("name", "Unique: a-z, 0-9 and '-'.")
+            .other("name", "Unique: a-z, 0-9 and '-'.", [](const Line& line) { return line.name; })
             .change_needs(kOpensPort)
             .other("device",
                    "Serial device, tcp://HOST:PORT (RTU over TCP), or sim (simulated panels).")
@@ -127,7 +132,8 @@ const Keys<SerialFormat>& serial_keys() {
     static const auto kKeys =
         Keys<Format>()
             .integer("baud", &Format::baud, 50, 4'000'000, "Bits per second.")
-            .other("data_bits", "Data bits of a character: 8; of ASCII 7, or 8.",
+            .other("data_bits",
+                   "Data bits of a character: 8 in RTU; 7 or 8 in ASCII, where 7 is the default.",
                    [](const Format& format) { return std::to_string(format.data_bits); })
             .word("parity", &Format::parity, kParityWords, "Of each character.")
             .integer("stop_bits", &Format::stop_bits, 1, 2, "Of each character.");
@@ -148,11 +154,12 @@ const Keys<line::Rs485>& rs485_keys() {
                   "program, as well as timers allow.")
             .word("rts_on_send", &Rs485::rts_high_on_send, kLevels, "Level of RTS while sending.")
             .duration("delay_before_send", &Rs485::delay_before_send, 0ms, 100ms,
-                      "Delay from RTS to the first bit.")
+                      "Delay from RTS to the first bit; with mode kernel of whole milliseconds.")
             .duration("delay_after_send", &Rs485::delay_after_send, 0ms, 100ms,
-                      "Delay from the last bit to the release of RTS.")
+                      "Delay from the last bit to the release of RTS; with mode kernel of whole "
+                      "milliseconds.")
             .boolean("receive_during_send", &Rs485::receive_during_send,
-                     "The receiver stays on while sending; only with mode kernel.");
+                     "The receiver stays on while sending; with mode kernel.");
     return kKeys;
 }
 
@@ -164,21 +171,28 @@ const Keys<arbiter::StationSettings>& timing_keys() {
                    "Longest time from the end of a request on the wire to the first byte "
                    "of its reply; adaptive: as the panel has needed it lately.",
                    [](const Settings& settings) {
-                       const std::string longest = format_duration(settings.response_timeout);
-                       if (!settings.adaptive_timeout) return longest;
-                       return "adaptive, " + format_duration(settings.timeout_floor) + " to " +
-                              longest;
+                       return settings.adaptive_timeout
+                                  ? "adaptive"
+                                  : format_duration(settings.response_timeout);
                    })
             .initially("500ms")
-            .other("adaptive_floor", "Shortest timeout, of response_timeout: adaptive.")
+            .other("adaptive_floor", "Shortest timeout, of response_timeout: adaptive.",
+                   [](const Settings& settings) {
+                       return settings.adaptive_timeout ? format_duration(settings.timeout_floor)
+                                                        : "";
+                   })
             .initially("20ms")
             .other("adaptive_ceiling",
-                   "Longest timeout, of response_timeout: adaptive. Without it the line's "
-                   "timeout, or 500ms.")
+                   "Longest timeout, of response_timeout: adaptive; not below adaptive_floor. "
+                   "Without it the line's timeout, or 500ms.",
+                   [](const Settings& settings) {
+                       return settings.adaptive_timeout ? format_duration(settings.response_timeout)
+                                                        : "";
+                   })
             .other("frame_gap",
                    "Silence between two frames; auto: 3.5 characters (1.75 ms above 19200 "
-                   "baud), or what the profile asks. Shorter only on sim, on tcp:// and in "
-                   "ASCII.",
+                   "baud), or what the profile asks. Shorter than 3.5 characters only on "
+                   "sim, on tcp:// and in ASCII.",
                    [](const Settings& settings) { return or_auto(settings.frame_gap); })
             .initially("auto")
             .other("late_window",
@@ -197,7 +211,7 @@ const Keys<LineTiming>& line_timing_keys() {
             .other("reply_hole",
                    "Longest silence inside a reply; auto: 60 ms and 32 characters, on "
                    "tcp:// 700 ms, in ASCII 1 s.",
-                   [](const LineTiming& line) { return format_duration(line.reply_hole); })
+                   [](const LineTiming& line) { return whole_microseconds(line.reply_hole); })
             .initially("auto")
             .duration("broadcast_turnaround", &LineTiming::broadcast_turnaround, 1ms, 1min,
                       "Pause after a broadcast, in which the panels execute it.");
@@ -206,13 +220,14 @@ const Keys<LineTiming>& line_timing_keys() {
 
 const Keys<arbiter::QueueSettings>& queue_keys() {
     using Queue = arbiter::QueueSettings;
-    static const auto kKeys = Keys<Queue>()
-                                  .integer("limit", &Queue::limit, 1, 4096,
-                                           "Most requests that wait, of all clients together.")
-                                  .integer("per_client", &Queue::per_client, 1, 4096,
-                                           "Most requests that wait, of one client.")
-                                  .duration("deadline", &Queue::deadline, 10ms, 10min,
-                                            "Longest time from a request's arrival to its answer.");
+    static const auto kKeys =
+        Keys<Queue>()
+            .integer("limit", &Queue::limit, 1, 4096,
+                     "Most requests that wait, of all clients together.")
+            .integer("per_client", &Queue::per_client, 1, 4096,
+                     "Most requests that wait, of one client; at most `limit`.")
+            .duration("deadline", &Queue::deadline, 10ms, 10min,
+                      "Longest time from a request's arrival to its answer.");
     return kKeys;
 }
 
@@ -225,7 +240,7 @@ const Keys<arbiter::OfflineSettings>& offline_keys() {
             .duration("probe_min", &Offline::probe_min, 10ms, 1h,
                       "First pause between probes of an offline station.")
             .duration("probe_max", &Offline::probe_max, 10ms, 24h,
-                      "Longest pause; it doubles from probe_min on.");
+                      "Longest pause, at least probe_min, from which it doubles.");
     return kKeys;
 }
 
@@ -235,7 +250,8 @@ const Keys<StationBody, StationView>& station_keys() {
         Keys<StationBody, StationView>()
             .other("id", "Address of the panel on the line.",
                    [](const StationView& of) { return std::to_string(of.station.id); })
-            .other("name", "Name of a-z, 0-9 and '-', unique over all lines. Without it LINE-ID.")
+            .other("name", "Name of a-z, 0-9 and '-', unique over all lines. Without it LINE-ID.",
+                   [](const StationView& of) { return of.station.name; })
             .other("template", "Template whose keys it takes; the station's own keys win.")
             .other("profile", "Panel profile; `panelgate profiles` lists them.",
                    [](const StationView& of) { return of.station.profile->name; })
@@ -318,7 +334,8 @@ const Keys<points::Point>& point_keys() {
     const auto or_none = [](const auto& number) { return number ? number->text() : "none"; };
     static const auto kKeys =
         Keys<Point>()
-            .other("name", "Name of a-z, 0-9, '-' and '_', unique in its station.")
+            .other("name", "Name of a-z, 0-9, '-' and '_', unique in its station.",
+                   [](const Point& point) { return point.name; })
             .other("at", "Register or bit in the panel's notation, such as UW100 or 400001.",
                    [](const Point& point) { return point.at; })
             .other("bit", "One bit of a register; the type is bool then.",
@@ -330,22 +347,22 @@ const Keys<points::Point>& point_keys() {
             .other("length", "Characters of a string, two in a register.",
                    [](const Point& point) { return std::to_string(point.length); })
             .word("word_order", &Point::word_order, kOrders,
-                  "Order of the bytes of values in several registers; ABCD: high word first.")
-            .other("scale", "value = raw * scale + offset.",
+                  "Order of the bytes of values in registers, not of bits; ABCD: high word first.")
+            .other("scale", "Of numbers: value = raw * scale + offset; not 0.",
                    [](const Point& point) { return number_text(point.scale); })
             .initially("1")
-            .other("offset", "See scale: value = raw * scale + offset.",
+            .other("offset", "Of numbers: value = raw * scale + offset.",
                    [](const Point& point) { return number_text(point.offset); })
             .initially("0")
             .other("unit", "Unit, as people write it.",
                    [](const Point& point) { return point.unit.empty() ? "none" : point.unit; })
-            .other("min", "Smallest value that may be written.",
+            .other("min", "Of numbers: smallest value that may be written.",
                    [=](const Point& point) { return or_none(point.min); })
-            .other("max", "Largest value that may be written.",
+            .other("max", "Of numbers: largest value that may be written.",
                    [=](const Point& point) { return or_none(point.max); })
             .boolean("writable", &Point::writable, "Clients may write it.")
-            .other("labels", "Texts of raw numbers, such as {0: off, 1: on}.")
-            .other("no_value", "Raw numbers that mean that there is no value.",
+            .other("labels", "Of integers: texts of raw numbers, such as {0: off, 1: on}.")
+            .other("no_value", "Of numbers: raw ones that mean that there is no value.",
                    [](const Point& point) {
                        return listed(point.no_value,
                                      [](std::int64_t raw) { return std::to_string(raw); });

@@ -26,11 +26,6 @@ inline constexpr Words<EchoMode, 3> kEchoes{
 inline constexpr Words<modbus::HexDigits, 2> kLowerCase{
     {{"refuse", modbus::HexDigits::upper_only}, {"take", modbus::HexDigits::any_case}}};
 
-/// What changes of some keys need beside a reload.
-inline constexpr std::string_view kOpensPort = "the port is opened anew";
-inline constexpr std::string_view kListensAnew = "it listens anew, and its clients connect again";
-inline constexpr std::string_view kConnectsAnew = "it connects to the broker anew";
-
 inline std::string access_text(bool read_only) { return read_only ? "read_only" : "read_write"; }
 
 /// "[a, b]"

@@ -40,6 +40,11 @@ void Conversation::reset() {
     echo_state_ = first_state(settings_.echo);
 }
 
+void Conversation::serve(const Units& served) {
+    served_ = served;
+    hearing_->serve(served);
+}
+
 void Conversation::on_line_up() { counters_.up = true; }
 
 void Conversation::on_line_down() {

@@ -52,6 +52,8 @@ class Conversation {
     /// dropped.
     void on_answer(TimePoint now, std::uint64_t ticket, const std::optional<Bytes>& pdu);
     void on_deadline(TimePoint now);
+    /// Serves these units from now on; a request in progress gets its answer.
+    void serve(const Units& served);
     /// Accepts no further requests.
     void finish() { finishing_ = true; }
     /// True while a request awaits its answer or its reply's transmission.

@@ -28,6 +28,7 @@ class AsciiHearing final : public Hearing {
     }
     std::size_t pending() const override { return framer_.partial() ? modbus::kMinAsciiAdu : 0; }
     bool knows_length() const override { return framer_.partial(); }
+    void serve(const Units&) override {}  // a frame's ends tell it apart, whoever it is for
     std::size_t take_faults() override {
         return framer_.take_faults() + std::exchange(dropped_, 0);
     }

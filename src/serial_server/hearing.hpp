@@ -37,6 +37,8 @@ class Hearing {
     virtual bool knows_length() const = 0;
     /// Returns the number of framing faults since the last call.
     virtual std::size_t take_faults() = 0;
+    /// The gateway answers for these units from now on.
+    virtual void serve(const Units& served) = 0;
 };
 
 /// Creates the parser for settings.access.framing.
@@ -59,6 +61,7 @@ class RtuHearing final : public Hearing {
     std::size_t pending() const override { return heard_.size(); }
     bool knows_length() const override;
     std::size_t take_faults() override;
+    void serve(const Units& served) override { served_ = served; }
 
   private:
     struct Judgement {

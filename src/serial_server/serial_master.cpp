@@ -48,6 +48,7 @@ class SerialMaster::Core final : public line::Line::Events,
           drive_(clock, *line_, conversation_, *this) {}
 
     void start() { line_->start(*this); }
+    void apply(Settings settings, tcp_server::UnitMap units);
     void finish() { conversation_.finish(); }
     bool idle() const { return !conversation_.busy() && open_broadcasts_ == 0; }
     void stop();
@@ -85,6 +86,12 @@ class SerialMaster::Core final : public line::Line::Events,
     std::size_t open_broadcasts_ = 0;  ///< outstanding, on all lines
     bool stopped_ = false;
 };
+
+void SerialMaster::Core::apply(Settings settings, tcp_server::UnitMap units) {
+    settings_ = std::move(settings);
+    map_ = std::move(units);
+    conversation_.serve(served_by(map_));
+}
 
 void SerialMaster::Core::stop() {
     if (std::exchange(stopped_, true)) return;
@@ -185,6 +192,9 @@ SerialMaster::SerialMaster(rt::Clock& clock, Settings settings, tcp_server::Unit
 SerialMaster::~SerialMaster() { core_->stop(); }
 
 void SerialMaster::start() { core_->start(); }
+void SerialMaster::apply(Settings settings, tcp_server::UnitMap units) {
+    core_->apply(std::move(settings), std::move(units));
+}
 void SerialMaster::finish() { core_->finish(); }
 bool SerialMaster::idle() const { return core_->idle(); }
 void SerialMaster::stop() { core_->stop(); }

@@ -248,11 +248,15 @@ std::string MapReader::place_of(const Entry& entry, bool exactly) const {
     return "";
 }
 
-void MapReader::refuse(std::string_view key, const std::string& why) {
+bool MapReader::refuse(std::string_view key, const std::string& why) {
+    bool given = false;
     for (const Entry& entry : node_->entries) {
-        if (entry.key == key) problems_->add(entry.value.mark, std::string(key) + ' ' + why);
+        if (entry.key != key) continue;
+        problems_->add(entry.value.mark, std::string(key) + ' ' + why);
+        given = true;
     }
     refused_.push_back(key);
+    return given;
 }
 
 void MapReader::finish() {

@@ -92,6 +92,7 @@ class CommandLine(unittest.TestCase):
                             ("reload --weaker", "--weaker requires --rollback"),
                             ("address autonics-gplp-s", "NOTATION is missing"),
                             ("run --simulate=x", "an option that takes no value was given one"),
+                            ("config get log --format json", "there is no option --format here"),
                             ("run -- x", "nothing may follow '--'")):
             command = typed.split()[0]
             self.assertEqual(self.expect(USAGE, *typed.split()).stderr,
@@ -289,7 +290,14 @@ class Files(unittest.TestCase):
         self.assertEqual(told["changes"], [
             {"path": "log/level", "kind": "changed", "before": "info", "after": "warn"},
             {"path": "relays/press/UW0 to press/UW100", "kind": "added"}])
-        self.assertTrue(told["valid"])
+        self.assertEqual((told["valid"], told["interruptions"]), (True, []))
+
+    def test_a_comparison_says_what_a_reload_interrupts(self):
+        old = self.file.with_name("old.yaml")
+        old.write_text(good())
+        self.file.write_text(good().replace("device: sim", "device: /dev/ttyUSB7"))
+        text = run("check", "-c", str(self.file), "--diff", str(old)).stdout
+        self.assertIn("what a reload interrupts:\n  lines/floor1: the port is opened anew\n", text)
 
     def test_a_comparison_tells_the_faults_of_both_files(self):
         old = self.file.with_name("old.yaml")

@@ -55,6 +55,19 @@ class Reference(unittest.TestCase):
                 self.assertTrue(off or line.lstrip().startswith("# "), line)
         self.assertTrue(any(line.lstrip().startswith("##framing:") for line in example))
 
+    def test_a_block_that_is_off_can_be_taken_in_as_a_whole(self):
+        example = (ROOT / "config/panelgate.example.yaml").read_text()
+        example = re.sub(r"/run/secrets/\w+", "token", example)
+        taken = re.sub(r"(?m)^( *)##(?!#)", r"\1", example)
+        taken = re.sub(r"(?m)^( +)simulate: *\n(?:\1 .*\n)+", "", taken)  # of another kind of line
+        self.assertNotEqual(taken, example)
+        with tempfile.TemporaryDirectory() as folder:
+            (pathlib.Path(folder) / "token").write_text("0123456789abcdef")
+            (pathlib.Path(folder) / "all.yaml").write_text(taken)
+            said = subprocess.run([harness.PANELGATE, "check", "-c", "all.yaml", "--allow-overload"],
+                                  cwd=folder, capture_output=True, text=True)
+            self.assertEqual(said.returncode, 0, said.stderr)
+
     def test_the_example_says_what_is_left_out(self):
         """A commented key has the value that it has when it is left out: typed in, nothing changes."""
         example = (ROOT / "config/panelgate.example.yaml").read_text()

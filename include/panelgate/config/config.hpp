@@ -54,6 +54,7 @@ struct Line {
     arbiter::Settings arbiter;  ///< with the resolved timing of every station
     bool listens = false;       ///< another master polls it: the gateway never sends
     bool refuse_unlisted = false;
+    Duration think_time = 1ms;    ///< of stations without their own
     bool simulated_echo = false;  ///< the simulated adapter echoes what is sent
     std::vector<Station> stations;
     friend bool operator==(const Line&, const Line&) = default;

@@ -9,6 +9,10 @@
 
 namespace panelgate::config {
 
+/// What changes of some keys need beside a reload.
+inline constexpr std::string_view kOpensPort = "the port is opened anew";
+inline constexpr std::string_view kListensAnew = "it listens anew, and its clients connect again";
+inline constexpr std::string_view kConnectsAnew = "it connects to the broker anew";
 /// The change of a key that a reload cannot take over (KeyShape::change).
 inline constexpr std::string_view kNextStart = "takes effect at the next start";
 
@@ -18,8 +22,15 @@ struct Described {
     std::vector<yaml::KeyShape> keys;
     std::vector<yaml::KeyRule> rules;
 
+    /// The key of a setting's path (Setting::path), or the deepest map above it; nullptr: none.
+    const yaml::KeyShape* find(std::string_view setting) const;
+
     /// What a change of a setting (Setting::path) needs beside a reload; "" nothing.
     std::string_view change_of(std::string_view setting) const;
+    /// True for a setting's path that ends in a key.
+    bool is_key(std::string_view setting) const;
+    /// "only with mode: kernel or rts", of a key whose presence depends on a neighbour; "" none.
+    std::string condition_of(std::string_view key) const;
 };
 /// Made once, at the first call.
 const Described& describe();

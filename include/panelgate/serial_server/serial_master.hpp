@@ -23,6 +23,8 @@ class SerialMaster {
     SerialMaster& operator=(const SerialMaster&) = delete;
 
     void start();
+    /// Requires settings.is_same_port(). A request in progress gets its answer as before.
+    void apply(Settings settings, tcp_server::UnitMap units);
     /// Accepts no further requests; accepted ones are still answered.
     void finish();
     /// True if no accepted request is outstanding.

@@ -36,6 +36,13 @@ struct Settings {
     /// produces them. Longer than an adapter's latency timer.
     Duration glitch = 20ms;
     std::size_t open_broadcasts = 8;  ///< outstanding on the lines; more are dropped
+    /// True if `other` differs only in what can change without reopening the port: what the master
+    /// may access, and how failures and broadcasts are answered.
+    bool is_same_port(const Settings& other) const {
+        return name == other.name && device == other.device && echo == other.echo &&
+               access.framing == other.access.framing && hole == other.hole &&
+               glitch == other.glitch && response_timeout == other.response_timeout;
+    }
     friend bool operator==(const Settings&, const Settings&) = default;
 };
 

@@ -124,7 +124,7 @@ class MapReader {
 
     /// Reports "KEY why" if a key of other versions is present; it is never suggested. `key` must
     /// outlive this.
-    void refuse(std::string_view key, const std::string& why);
+    bool refuse(std::string_view key, const std::string& why);
 
     /// Reports unknown keys. Call once, last.
     void finish();

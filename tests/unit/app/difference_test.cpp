@@ -132,5 +132,28 @@ TEST(Difference, AsJsonHasPathKindAndBothValues) {
               R"([{"path":"lines/floor1/retries","kind":"changed","before":"1","after":"2"}])");
 }
 
+TEST(Difference, NamesWhatIsInterruptedAlsoByWhatComesOrGoesOnALine) {
+    const auto cut = [](const std::string& before, const std::string& after) {
+        return interruptions(load(before), load(after));
+    };
+    EXPECT_THAT(cut(plant("", kPress), plant("queue: {deadline: 3s}, ", kPress)), IsEmpty());
+    const std::string two = kPress + ", {id: 5, name: mixer}";
+    const std::string mqtt = "mqtt: {broker: 'mqtt://b:1883'}\n";
+    EXPECT_THAT(cut(plant("", kPress) + mqtt, plant("", two) + mqtt),
+                ElementsAre("lines/floor1: the port is opened anew",
+                            "mqtt: it connects to the broker anew"))
+        << "simulated panels are played by the port";
+    const auto real = [&](const std::string& stations, const std::string& more = {}) {
+        return "lines: [{name: floor1, device: /dev/ttyS1, stations: [" + stations +
+               "]}]\nserial_masters: [{name: plc, device: /dev/ttyS2" + more + "}]\n";
+    };
+    EXPECT_THAT(cut(real(kPress), real(two)), IsEmpty()) << "a master's port stays open";
+    EXPECT_THAT(cut(real(kPress), real("{id: 31, name: press, simulate: {dead: true}}")),
+                IsEmpty());
+    EXPECT_THAT(cut(real(two), real(two, ", units: {7: floor1/5}, broadcast: deny")), IsEmpty());
+    EXPECT_THAT(cut(real(two), real(two, ", echo: on")),
+                ElementsAre("serial_masters/plc: the port is opened anew"));
+}
+
 }  // namespace
 }  // namespace panelgate::app::difference_test

@@ -130,6 +130,25 @@ TEST(SerialMaster, RefusesWritesWhereOnlyReadsAreAllowed) {
     EXPECT_THAT(house.bus.requests, IsEmpty());
 }
 
+TEST(SerialMaster, ServesOtherUnitsWithoutOpeningItsPortAnewAndAnswersWhatWasAsked) {
+    House house;
+    house.hear(kRequest);
+    Settings now = house.settings;
+    now.access.units = {{7, {"floor1", 5}}};
+    ASSERT_TRUE(now.is_same_port(house.settings));
+    house.master.apply(now, tcp_server::UnitMap(now.access, {{"floor1", &house.bus, {5}, false}}));
+    house.answer(FakeBus::reply(kOneValue));
+    EXPECT_THAT(house.told(), ElementsAre(kReply)) << "asked before";
+    house.hear(kRequest);
+    house.run();
+    EXPECT_THAT(house.bus.requests, SizeIs(1)) << "no unit of ours any more";
+    house.hear(encode_adu(7, kReadOne));
+    house.run();
+    ASSERT_THAT(house.bus.requests, SizeIs(2));
+    EXPECT_EQ(house.bus.requests.back().station, 5);
+    EXPECT_EQ(house.master.counters().reopens, 0U);
+}
+
 TEST(SerialMaster, SendsBroadcastsThatALaterRequestDoesNotTakeBack) {
     House house;
     house.hear(encode_adu(0, kWrite));
