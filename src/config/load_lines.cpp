@@ -279,6 +279,8 @@ void load_lines(Loading& loading, MapReader& root) {
     root.may_be_null("lines", false);
     root.entries("lines", 1, 0);
     if (list == nullptr && root.is_mistyped("lines")) return;
+    loading.names_missing = list == nullptr && root.child("lines") != nullptr;
+    if (loading.names_missing) return;
     if (list == nullptr || list->items.empty()) {
         refuse_no_lines(loading, root);
         return;

@@ -170,6 +170,7 @@ std::optional<End> load_end(Loading& loading, MapReader& in, std::string_view ke
     end.end.station = text->substr(0, slash);
     end.end.at = text->substr(slash + 1);
     end.station = find_station(loading.config, end.end.station);
+    if (end.station == nullptr && loading.names_missing) return std::nullopt;
     if (end.station == nullptr) {
         std::vector<std::string_view> names(loading.station_names.begin(),
                                             loading.station_names.end());

@@ -107,6 +107,7 @@ const Line* find_line(const Config& config, std::string_view name) {
 /// Returns nullptr and adds a problem at `mark` if there is none.
 const Line* find_line(Loading& loading, yaml::Mark mark, const std::string& name) {
     if (const Line* line = find_line(loading.config, name)) return line;
+    if (loading.names_missing) return nullptr;
     std::vector<std::string_view> names;
     names.reserve(loading.config.lines.size());
     for (const Line& line : loading.config.lines) names.push_back(line.name);
@@ -198,6 +199,7 @@ std::optional<tcp_server::UnitTarget> unit_target(Loading& loading, const Node& 
     const auto station = find_station(*line, text);
     if (station && *station != 0) warn_of_unlisted(loading, node.mark, *line, *station);
     if (station) return tcp_server::UnitTarget{name, *station};
+    if (loading.names_missing) return std::nullopt;
     std::vector<std::string_view> names;
     names.reserve(line->stations.size());
     for (const Station& known : line->stations) names.push_back(known.name);

@@ -221,7 +221,7 @@ yaml::Problems faults_of(Loading& loading, const Node& body, const PanelProfile*
     yaml::Problems faults(loading.problems.file());
     Config config;
     config.profiles = loading.config.profiles;
-    Loading alone{loading.files, faults, config, {}};
+    Loading alone{loading.files, faults, config, {}, false};
     Line line;
     MapReader in(body, faults, "a station");
     Station station;
@@ -307,6 +307,8 @@ void load_stations(Loading& loading, MapReader& in, LineContext work) {
     if (const Node* list = in.sequence("stations", "[{id: 31, name: press}]")) {
         for (const Node& node : list->items)
             work.line.stations.push_back(load_station(loading, node, work));
+    } else if (in.child("stations") != nullptr) {
+        loading.names_missing = true;
     }
     const bool adapts = std::ranges::any_of(work.line.arbiter.stations, is_adaptive);
     if (work.timing.unused_bound && !adapts) warn_of_bound(loading, *work.timing.unused_bound);

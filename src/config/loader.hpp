@@ -20,6 +20,8 @@ struct Loading {
     yaml::Problems& problems;
     Config& config;
     std::set<std::string> station_names;
+    /// `lines`, or a line's `stations`, was no list: names that are not known may be right.
+    bool names_missing = false;
 
     void warn(yaml::Mark mark, const std::string& message) {
         std::string text = yaml::format({problems.file(), mark, "warning: " + message});
