@@ -46,6 +46,7 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
                                    Duration think) {
     const Group& group = attempt.group();
     Replied result;
+    result.before = condition();
     result.back = health_.on_reply(now);
     probes_ = 0;
     wants_check_ = read_turn_ = false;
@@ -103,13 +104,21 @@ bool Station::on_given_up(TimePoint now, Fault fault, bool is_read) {
         health_.on_damaged();
         return false;
     }
-    if (is_read || !answers_reads()) return health_.on_silence(now, unheard());
+    if (is_read || !answers_reads()) return health_.on_silence(now, speculative());
     wants_check_ = health_.on_silent_write();
     return false;
 }
 
+Condition Station::condition() const {
+    if (health_.offline()) return Condition::offline;
+    if (failing()) return Condition::failing;
+    if (flaky()) return Condition::flaky;
+    if (missed_last()) return Condition::missed;
+    return health_.last_heard() ? Condition::well : Condition::unheard;
+}
+
 bool Station::may_retry(const Group& group) const {
-    if (group.abandoned() || health_.offline() || failing() || unheard()) return false;
+    if (group.abandoned() || health_.offline() || failing() || speculative()) return false;
     if (missed_last() && !group.first_silence) return false;
     const bool harmless = group.request.is_read() || (settings_.retry_writes && group.repeatable);
     const int failed = group.attempts - (group.doubted.empty() ? 0 : 1);
@@ -152,7 +161,7 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
         const int longer = probes_ % kOneIn == kOneIn - 1 ? 1 + probes_ / kOneIn % kDoublings : 0;
         return std::min(whole, short_wait(line) * (1 << longer));
     }
-    if (health_.offline() || missed_last() || unheard() || flaky_beside_others)
+    if (health_.offline() || missed_last() || speculative() || flaky_beside_others)
         return short_wait(line);
     // Not a write: it may need longer, and its outcome is worth waiting for.
     if (urgent && slowest() && group.request.is_read())

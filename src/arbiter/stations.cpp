@@ -71,14 +71,14 @@ TimePoint Stations::throttled_until(std::uint8_t id) const {
     return std::min(station->affordable_at(), others_active_until(*station));
 }
 
-bool Stations::is_unheard_id(std::uint8_t id) const {
+bool Stations::is_speculative(std::uint8_t id) const {
     const Station* station = find(id);
     return id != kBroadcast &&
-           (station == nullptr ? !configured_.contains(id) : station->unheard());
+           (station == nullptr ? !configured_.contains(id) : station->speculative());
 }
 
 bool Stations::may_spend(TimePoint now, const Job& job) const {
-    if (is_unheard_id(job.station)) return unheard_.allows(now, timeout_cost());
+    if (is_speculative(job.station)) return unheard_.allows(now, timeout_cost());
     const Station* station = find(job.station);
     if (station == nullptr) return true;
     // An ignored write says nothing about reads while these are answered.
@@ -93,11 +93,11 @@ bool Stations::refuses(TimePoint now, const Job& job) {
     if (job.station == kBroadcast) return false;
     forget_unheard(now);
     Station& station = of(job.station);
-    if (station.unheard()) station.on_wanted(now);
+    if (station.speculative()) station.on_wanted(now);
     if (!station.health().offline()) return false;
-    if (station.unheard() && job.search) return false;
-    const bool may_wake = station.unheard() || !job.request.is_read();
-    const ProbeBudget& budget = station.unheard() ? asked_unheard_ : probes();
+    if (station.speculative() && job.search) return false;
+    const bool may_wake = station.speculative() || !job.request.is_read();
+    const ProbeBudget& budget = station.speculative() ? asked_unheard_ : probes();
     if (may_wake && budget.allows(now) && station.take_half_open(now, job.request.is_read()))
         return false;
     station.requests().on_wanted(job.request);
@@ -124,6 +124,11 @@ StationHealth Stations::health(std::uint8_t id) const {
     return found == nullptr ? StationHealth(offline_) : found->health();
 }
 
+Condition Stations::condition(std::uint8_t id) const {
+    const Station* found = find(id);
+    return found == nullptr ? Condition::unheard : found->condition();
+}
+
 Duration Stations::response_timeout(std::uint8_t id) const {
     const Station* found = find(id);
     return found == nullptr ? settings(id).response_timeout : found->response_timeout();
@@ -132,7 +137,7 @@ Duration Stations::response_timeout(std::uint8_t id) const {
 void Stations::on_failed(TimePoint now, const Group& group, Verdict verdict, Duration cost) {
     Station& station = of(group.station);
     station.on_failed(now, verdict, cost, group.request.is_read() ? nullptr : &group.request);
-    if (station.unheard()) {
+    if (station.speculative()) {
         unheard_.spend(now, cost, 2 * timeout_cost());
         if (station.health().offline()) asked_unheard_.spend(now, cost, kOthersActive);
     } else if (station.health().offline()) {
@@ -151,7 +156,7 @@ void Stations::on_failed(TimePoint now, const Group& group, Verdict verdict, Dur
 /// Probes of offline stations must be within their budget.
 std::optional<TimePoint> Stations::probe_at(const Station& station) const {
     if (station.wants_check()) return station.probe_due();
-    if (!station.health().offline() || station.unheard()) return std::nullopt;
+    if (!station.health().offline() || station.speculative()) return std::nullopt;
     return std::max(station.probe_due(), probes().next());
 }
 

@@ -45,6 +45,25 @@ std::string turn(const Reason& reason) {
            instead;
 }
 
+/// What follows from it (README, Health and budgets).
+std::string means(Condition condition) {
+    switch (condition) {
+        case Condition::well:
+            return "its reads are retried as configured";
+        case Condition::unheard:
+            return "it has the whole response timeout";
+        case Condition::missed:
+            return "it has as long as it has ever needed, and no retry";
+        case Condition::flaky:
+            return "it has no retry beside others, who do not wait long for it";
+        case Condition::failing:
+            return "no retries, and a fifth of the line's time at most";
+        case Condition::offline:
+            return "only probes are sent";
+    }
+    std::abort();
+}
+
 }  // namespace
 
 Reason start(TimePoint now, const Group& group, const JobQueue& queue, const ClientNames& names) {
@@ -89,6 +108,11 @@ std::string shed(const Job& job, const ClientNames& names) {
 std::string doubted(const Job& job, const ClientNames& names) {
     return describe(job, names) +
            " asked once more: its answer repeats an earlier one and may be a duplicate of it";
+}
+
+std::string condition(std::uint8_t station, Condition now) {
+    return "station " + std::to_string(station) + " is " + std::string(label(now)) +
+           " now: " + means(now);
 }
 
 std::string line_rests(Duration rest, const Group& group) {
@@ -268,12 +292,13 @@ void Arbiter::settle(TimePoint now) {
     Attempt attempt = take_active(now);
     Group& group = attempt.group();
     const Bytes& reply = attempt.reply();
-    const Duration waited = attempt.waited(now);
-    const Duration think = std::max(waited - silent_interval(settings_.serial), Duration::zero());
+    const Duration think =
+        std::max(attempt.waited(now) - silent_interval(settings_.serial), Duration::zero());
     const Duration needed = attempt.first_sign(now);
     const TimePoint proved = station.requests().surely_answered(attempt.timing().started, reply);
     const Station::Replied replied = station.on_reply(now, attempt, needed, think);
     stations_.on_reply(now, group.shows_pace() ? std::optional(needed) : std::nullopt);
+    explain_condition(now, group.station, replied.before);
     if (replied.back) stations_.on_recovery();
     if (settings_.may_stall) stations_.on_proved(now, proved);
     schedule_.on_transport_proved(proved);
@@ -355,6 +380,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     }
     if (verdict == Verdict::silent && attempt.echoed()) echo_memory_.on_unanswered(group.request);
     const bool affordable = stations_.affords_retry(now, station);
+    const Condition before = station.condition();
     stations_.on_failed(now, group, verdict, cost);
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
         quiet_.quarantine(now, group.station, *until);
@@ -377,6 +403,12 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     } else {
         give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);
     }
+    explain_condition(now, attempt.group().station, before);
+}
+
+void Arbiter::explain_condition(TimePoint now, std::uint8_t station, Condition before) {
+    const Condition is = stations_.condition(station);
+    if (is != before) outbox_.decide(now, [&] { return explain::condition(station, is); });
 }
 
 /// The parts of a joined read are sent again, except for clients that have left.
@@ -398,7 +430,7 @@ void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
     if (group.probe) station.requests().on_probe_unanswered(group.distinct_length);
     if (group.distinct_length) return;
     if (!station.on_given_up(now, fault, group.request.is_read())) return;
-    if (!station.unheard()) outbox_.event(Kind::offline, group.station);
+    if (!station.speculative()) outbox_.event(Kind::offline, group.station);
     const auto theirs = [&](const Job& job) { return job.station == group.station; };
     for (const Job& job : backlog.remove_if(theirs)) outbox_.finish(job, Fault::offline);
 }

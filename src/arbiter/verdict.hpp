@@ -51,6 +51,8 @@ std::string full(const Job& job, const QueueSettings& settings, std::size_t wait
                  const ClientNames& names);
 std::string shed(const Job& job, const ClientNames& names);
 std::string doubted(const Job& job, const ClientNames& names);
+/// A station's condition has changed.
+std::string condition(std::uint8_t station, Condition now);
 std::string line_rests(Duration rest, const Group& group);
 std::string expired(TimePoint now, const Job& job, bool transmitted, const ClientNames& names);
 

@@ -100,6 +100,24 @@ std::string_view label(Health health) {
     std::abort();
 }
 
+std::string_view label(Condition condition) {
+    switch (condition) {
+        case Condition::well:
+            return "well";
+        case Condition::unheard:
+            return "unheard";
+        case Condition::missed:
+            return "missed";
+        case Condition::flaky:
+            return "flaky";
+        case Condition::failing:
+            return "failing";
+        case Condition::offline:
+            return "offline";
+    }
+    std::abort();
+}
+
 std::string_view label(PriorityClass priority) {
     switch (priority) {
         case PriorityClass::write:

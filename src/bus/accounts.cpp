@@ -346,11 +346,17 @@ OutcomeCounts RequestCounters::outcomes(std::uint8_t station) const {
 
 std::vector<StationReport> RequestCounters::report(const arbiter::Arbiter& arbiter) const {
     // One that has never been heard is not up, and nobody knows yet that it is down.
-    return report(arbiter.station_counters(), [&](std::uint8_t id) {
+    auto reports = report(arbiter.station_counters(), [&](std::uint8_t id) {
         const arbiter::StationHealth& health = arbiter.health(id);
         const bool is_open = health.state() == Health::suspect && !health.last_heard();
         return is_open ? Health::unknown : health.state();
     });
+    std::size_t next = 0;  // the reports are in the order of the stations
+    for (const auto& [id, counted] : stations_) {
+        StationReport& made = reports[next++];
+        if (made.up) made.condition = arbiter.condition(id);
+    }
+    return reports;
 }
 
 std::vector<StationReport> RequestCounters::report(

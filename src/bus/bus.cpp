@@ -386,6 +386,7 @@ StationStatus Bus::station_status(std::uint8_t station) const {
     const arbiter::StationHealth health = state_->arbiter.health(station);
     StationStatus status;
     status.state = health.state();
+    status.condition = state_->arbiter.condition(station);
     status.returns = health.returns() + state_->up_count;
     const TimePoint now = state_->clock.now();
     if (const auto last = health.last_success()) status.last_success = now - *last;

@@ -244,14 +244,21 @@ void add_station_state(Families& out, const Snapshot& snapshot) {
     Family success =
         make_gauge("panelgate_station_last_success_timestamp_seconds",
                    "When a configured station last answered; absent while it never did.");
+    Family condition = make_gauge(
+        "panelgate_station_condition",
+        "How a configured station has done lately: 0 well, 1 unheard, 2 missed, 3 flaky, 4 "
+        "failing, 5 offline; absent like panelgate_station_up, and in listen mode.");
     each_station(snapshot, [&](const LineReport& line, const StationReport& station) {
         if (!station.configured) return;
+        if (station.condition)
+            condition.gauge(of_station(line, station), static_cast<int>(*station.condition));
         if (station.up) up.gauge(of_station(line, station), *station.up ? 1 : 0);
         if (station.last_success_unix > 0) {
             success.gauge(of_station(line, station), station.last_success_unix);
         }
     });
     out.push_back(up.take());
+    out.push_back(condition.take());
     out.push_back(success.take());
 }
 

@@ -163,6 +163,7 @@ class Arbiter {
     }
     /// Unknown if the station was never asked.
     StationHealth health(std::uint8_t id) const { return stations_.health(id); }
+    Condition condition(std::uint8_t id) const { return stations_.condition(id); }
     /// Time that the next request to this station waits for its reply to begin.
     Duration response_timeout(std::uint8_t id) const { return stations_.response_timeout(id); }
     const BusShares& shares() const { return outbox_.shares(); }
@@ -188,6 +189,7 @@ class Arbiter {
     void fail(TimePoint now, Verdict verdict);
     void give_back(Group& group);
     void give_up(TimePoint now, const Group& group, Fault fault);
+    void explain_condition(TimePoint now, std::uint8_t station, Condition before);
     Attempt take_active(TimePoint now);
     void expire(TimePoint now);
     void expire_active(TimePoint now);

@@ -70,6 +70,7 @@ class Station {
     void on_unsolicited_bytes(TimePoint now) { trail_.on_unsolicited(now); }
 
     struct Replied {
+        Condition before = Condition::well;
         bool back = false;              ///< it was offline
         bool trailed = false;           ///< something followed the previous reply
         std::optional<Duration> drift;  ///< new: its replies come this near the response timeout
@@ -107,10 +108,12 @@ class Station {
     /// Returns true if this client's request may be the probe, once per interval. A write that was
     /// ignored does not prevent a read from being the next one.
     bool take_half_open(TimePoint now, bool is_read);
-    /// True if it is neither listed nor was ever heard.
-    bool unheard() const { return !listed_ && !health_.last_heard(); }
+    /// The worst that is true of it now.
+    Condition condition() const;
+    /// True if it is neither listed nor was ever heard: there may be no such station.
+    bool speculative() const { return !listed_ && !health_.last_heard(); }
     bool forgettable(TimePoint now) const {
-        return unheard() && !requests_.any() && now >= asked_ + kForgetUnheard;
+        return speculative() && !requests_.any() && now >= asked_ + kForgetUnheard;
     }
     /// True if it missed its last request, and is not offline yet.
     bool missed_last() const {

@@ -75,6 +75,7 @@ class Stations {
     Duration latest_reply(std::uint8_t id) const;
 
     StationHealth health(std::uint8_t id) const;
+    Condition condition(std::uint8_t id) const;
     Duration response_timeout(std::uint8_t id) const;
     /// True if the station is offline and this job is not its probe. Any request may probe an
     /// unheard station.
@@ -117,7 +118,7 @@ class Stations {
     bool any_online() const;
     /// When it is probed; empty: never.
     std::optional<TimePoint> probe_at(const Station& station) const;
-    bool is_unheard_id(std::uint8_t id) const;
+    bool is_speculative(std::uint8_t id) const;
     /// True if another station has answered lately, and after this one failed: the line works.
     bool others_active(TimePoint now, const Station& station) const {
         return now < others_active_until(station);

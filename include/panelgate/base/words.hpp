@@ -61,6 +61,19 @@ enum class Health : std::uint8_t {
 };
 std::string_view label(Health health);
 
+/// How a station has done lately. Decides how long it is waited for, whether its reads are retried
+/// and what its failures may cost the others (src/arbiter/README.md). From good to bad, which is
+/// also the value of panelgate_station_condition.
+enum class Condition : std::uint8_t {
+    well,     ///< it has answered its last request
+    unheard,  ///< never heard, and not offline
+    missed,   ///< its last attempt was silent
+    flaky,    ///< half of its last 8 attempts were silent
+    failing,  ///< two transactions in a row have failed
+    offline,  ///< offline.after silent transactions in a row
+};
+std::string_view label(Condition condition);
+
 /// Priority on a line, highest first (P9).
 enum class PriorityClass : std::uint8_t { write, read, poll, probe };
 inline constexpr std::size_t kPriorityClasses = 4;

@@ -27,8 +27,9 @@ struct StationReport {
     Histogram request_duration;
     arbiter::StationCounters wire;
     bool configured = false;
-    std::optional<bool> up;        ///< whether it answers; nullopt if not asked yet
-    double last_success_unix = 0;  ///< seconds since 1970; 0: never
+    std::optional<bool> up;                ///< whether it answers; nullopt if not asked yet
+    std::optional<Condition> condition{};  ///< with `up`; not in listen mode
+    double last_success_unix = 0;          ///< seconds since 1970; 0: never
 };
 
 /// A finding of the line doctor.

@@ -48,6 +48,8 @@ json::object describe(const StationEntry& station) {
     object["unit"] = nullptr;
     if (station.unit) object["unit"] = *station.unit;
     object["state"] = label(status.state);
+    object["condition"] = nullptr;
+    if (status.condition) object["condition"] = label(*status.condition);
     object["read_only"] = station.read_only;
     object["last_success_ms"] = nullptr;
     if (status.last_success) {

@@ -14,7 +14,7 @@ import {live} from './live.js';
 function facts(station) {
     const rows = [[t('line'), `${station.line}:${station.id}`], [t('profile'), station.profile ?? t('no.profile')],
         [t('unit'), station.unit ?? '–'], [t('access'), word('access', station.read_only ? 'read_only' : 'read_write')],
-        [t('last'), duration(station.last_success_ms)]];
+        [t('last'), duration(station.last_success_ms)], [t('condition'), station.condition ? word('condition', station.condition) : '–']];
     return rows.map(([name, value]) => h('div', null, h('dt', null, name), h('dd', null, String(value))));
 }
 

@@ -286,5 +286,32 @@ TEST_F(StationTest, OnlyAnUnheardStationIsForgottenWhenNotWantedForAMinute) {
     EXPECT_FALSE(unheard.forgettable(now_ + 1h)) << "it was heard";
 }
 
+/// One silent or damaged transaction, without a retry.
+TEST_F(StationTest, IsInTheWorstConditionThatIsTrueOfIt) {
+    const auto fails = [&](Verdict verdict) {
+        miss(kRead, verdict);
+        station_.on_given_up(now_, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);
+        return station_.condition();
+    };
+    EXPECT_EQ(station_.condition(), Condition::unheard);
+    EXPECT_EQ(fails(Verdict::silent), Condition::missed) << "listed, and never heard";
+    answer(kRead, kReply);
+    EXPECT_EQ(station_.condition(), Condition::well);
+    EXPECT_EQ(fails(Verdict::damaged), Condition::well) << "not silent, and only once";
+    EXPECT_EQ(fails(Verdict::damaged), Condition::failing);
+    answer(kRead, kOtherValue);
+    EXPECT_EQ(station_.condition(), Condition::well);
+    EXPECT_EQ(fails(Verdict::silent), Condition::missed);
+    EXPECT_EQ(fails(Verdict::silent), Condition::failing);
+    EXPECT_EQ(fails(Verdict::silent), Condition::offline);
+    answer(kRead, kThirdValue);
+    EXPECT_EQ(station_.condition(), Condition::well) << "it is back";
+    for (int i = 0; i < Station::kFlaky; ++i) {
+        fails(Verdict::silent);
+        answer(kRead, kReply);
+    }
+    EXPECT_EQ(station_.condition(), Condition::flaky);
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter::station_test

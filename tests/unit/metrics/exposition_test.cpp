@@ -196,8 +196,10 @@ TEST(Exposition, P10LeavesOutWhatAStationNeverSaidAndOthersCannotSay) {
     station.up.reset();
     EXPECT_THAT(exposition(snapshot), Not(HasSubstr("last_success")));
     EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_station_up{")));
+    EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_station_condition{")));
     station.up = false;
-    expect_samples(snapshot, {"station_up{PRESS} 0"});
+    station.condition = Condition::failing;
+    expect_samples(snapshot, {"station_up{PRESS} 0", "station_condition{PRESS} 4"});
 }
 
 TEST(Exposition, P10DriverErrorsAreShownForLinesWhoseDriverCounts) {

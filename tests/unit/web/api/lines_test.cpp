@@ -65,14 +65,14 @@ TEST_F(ApiLines, P9ShowsWhatEachClientHasUsedOfALine) {
 
 TEST_F(ApiLines, P10ShowsStationsWithoutTouchingTheBus) {
     add_meter();
-    bus.stations[31] = {Health::online, 1500ms};
+    bus.stations[31] = {Health::online, Condition::well, 1500ms};
     const auto stations = get("/api/v1/stations").at("stations").as_array();
     ASSERT_EQ(stations.size(), 2u);
     EXPECT_EQ(stations[0],
               json_of(R"({"name":"press","line":"floor1","id":31,"profile":"test-panel",
-        "unit":101,"state":"online","read_only":false,"last_success_ms":1500})"));
+        "unit":101,"state":"online","condition":"well","read_only":false,"last_success_ms":1500})"));
     EXPECT_EQ(stations[1], json_of(R"({"name":"meter","line":"floor1","id":5,"profile":null,
-        "unit":null,"state":"unknown","read_only":true,"last_success_ms":null})"));
+        "unit":null,"state":"unknown","condition":null,"read_only":true,"last_success_ms":null})"));
     EXPECT_EQ(get("/api/v1/stations/floor1:31").at("name"), "press");
     EXPECT_EQ(get("/api/v1/stations/floor1%3A7").at("name"), "floor1:7");
     EXPECT_TRUE(bus.requests.empty());
