@@ -53,7 +53,7 @@ def asked(program):
     def run(*words):
         return subprocess.run([*program, "help", *words], check=True, capture_output=True,
                               text=True).stdout
-    listed = re.search(r"(?s)Subcommands:\n(.*)", run())[1]
+    listed = run().split("\nExamples:")[0].split("\nOptions:")[1].split("\n\n", 1)[1]
     names = re.findall(r"(?m)^  (\S+)", listed)
     about = {name: re.search(rf"(?m)^  {name}\s+(.*)$", listed)[1] for name in names}
     return [Command(name, run(name)) for name in names if name not in ("help", "version")], about

@@ -30,6 +30,8 @@ class CommandLine(unittest.TestCase):
         self.assertRegex(self.expect(0, "--version").stdout, r"^panelgate \d+\.\d+\.\d+\n"
                          r"commit \w+, \w+ \d.*\nboost 1\.\d+\.\d+, .*yaml-cpp \d.*\n$")
         text = self.expect(0, "--help").stdout
+        for group in ("Begin", "Run", "Ask a running gateway", "Configuration", "Tools", "Examples"):
+            self.assertIn(f"\n{group}:\n", text)
         for command in ("run", "demo", "check", "simulate", "address", "profiles",
                         "health", "schema", "import", "init", "scan", "config"):
             self.assertRegex(text, rf"(?m)^\s+{command}\b")
@@ -72,8 +74,10 @@ class CommandLine(unittest.TestCase):
         for typed, near in (("chekc", "check"), ("simulat", "simulate"), ("dmeo", "demo")):
             told = self.expect(USAGE, typed, "-c", "x.yaml").stderr
             self.assertIn(f"there is no command '{typed}'; did you mean '{near}'?", told)
-        self.assertIn("Commands: run demo check", self.expect(USAGE, "fly").stderr)
-        self.assertIn("a command is missing", self.expect(USAGE).stderr)
+        self.assertIn("Commands: demo scan init run", self.expect(USAGE, "fly").stderr)
+        told = self.expect(USAGE).stderr
+        for word in ("a command is missing", "To begin:", "panelgate demo", "panelgate init", "panelgate run"):
+            self.assertIn(word, told)
 
     def test_a_mistyped_option_is_told_the_nearest(self):
         for typed, near in (("--confg", "--config"), ("--formt=json", "--format"), ("-C", "-c")):

@@ -1,0 +1,148 @@
+#include "asking_commands.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace panelgate::app {
+
+namespace {
+
+constexpr const char* kStation = "a station's name, its id, or LINE/ID";
+constexpr const char* kPlace =
+    "a notation such as UW100, TABLE/ADDRESS such as holding-registers/4, or a point's name; also "
+    "in one word with the station: oven/temperature";
+constexpr const char* kExitCodes =
+    "Exit codes: 0 fine; 1 the gateway refuses, or there is no such place; 64 usage; 66 the token "
+    "file\ncannot be read; 69 no gateway answers.";
+
+/// What one command has typed: lives as long as its App.
+struct Typed {
+    GatewayOptions at;
+    std::string station;
+    std::string place;
+    std::vector<std::string> more;
+    std::string type;
+    std::string order;
+    unsigned count = 0;
+    std::string format = "text";
+    TraceOptions trace;
+    std::string file;
+    bool once = false;
+
+    std::vector<std::string> words() const {
+        std::vector<std::string> all{station, place};
+        all.insert(all.end(), more.begin(), more.end());
+        std::erase(all, "");
+        return all;
+    }
+};
+
+class Adder {
+  public:
+    Adder(CLI::App& cli, ExitCode& code) : cli_(cli), code_(code) {}
+
+    /// A command, with the options that say which gateway.
+    CLI::App* add(const char* name, const char* about, const std::shared_ptr<Typed>& typed) {
+        CLI::App* command = cli_.add_subcommand(name, about);
+        command->group(kAsk);
+        command->add_option("-c,--config", typed->at.file, "its file, which says where it listens")
+            ->capture_default_str();
+        command->add_option("--http", typed->at.http,
+                            "ADDR:PORT of its REST API; without: what the configuration file says, "
+                            "or 127.0.0.1:8080");
+        command->add_option("--token-file", typed->at.token_file,
+                            "a file whose first line is a token");
+        command->footer(kExitCodes);
+        return command;
+    }
+
+    void add_place(CLI::App* command, const std::shared_ptr<Typed>& typed) {
+        command->add_option("STATION", typed->station, kStation)->required();
+        command->add_option("PLACE", typed->place, kPlace);
+        command->add_option("--type", typed->type,
+                            "of the values: u16, i16, u32, i32, f32, bool, string, ...");
+        command->add_option("--order", typed->order, "of the bytes of a longer type, such as CDAB");
+    }
+
+    template <class Run>
+    void on_call(CLI::App* command, Run run) {
+        command->callback([&code = code_, run = std::move(run)] { code = run(); });
+    }
+
+  private:
+    CLI::App& cli_;
+    ExitCode& code_;
+};
+
+void add_read(Adder& adder) {
+    const auto typed = std::make_shared<Typed>();
+    CLI::App* command = adder.add("read", "read a value of a panel", typed);
+    adder.add_place(command, typed);
+    command->add_option("--count", typed->count, "how many values")->check(CLI::PositiveNumber);
+    command->add_option("--format", typed->format, "text or json")
+        ->check(CLI::IsMember({"text", "json"}));
+    command->footer(
+        "Exit codes: 0 it is read; 1 the gateway refuses, the panel does not answer, or a point "
+        "has "
+        "no\ncurrent value; 64 usage; 66 the token file cannot be read; 69 no gateway answers.");
+    adder.on_call(command, [typed] {
+        return read(typed->at, {.words = typed->words(),
+                                .type = typed->type,
+                                .order = typed->order,
+                                .count = typed->count,
+                                .json = typed->format == "json"});
+    });
+}
+
+void add_write(Adder& adder) {
+    const auto typed = std::make_shared<Typed>();
+    CLI::App* command = adder.add("write", "write a value to a panel", typed);
+    adder.add_place(command, typed);
+    command->add_option("VALUE", typed->more,
+                        "a number, true or false, on or off, or a text; several go to places that "
+                        "follow each other");
+    command->footer(
+        "Exit codes: 0 the panel has confirmed it; 1 refused, or not confirmed: the message says "
+        "whether\nit was transmitted; 64 usage; 66 the token file cannot be read; 69 no gateway "
+        "answers.");
+    adder.on_call(command, [typed] {
+        return write(typed->at,
+                     {.words = typed->words(), .type = typed->type, .order = typed->order});
+    });
+}
+
+void add_watch(Adder& adder) {
+    const auto typed = std::make_shared<Typed>();
+    CLI::App* command =
+        adder.add("watch", "print a line whenever a value of a panel changes", typed);
+    adder.add_place(command, typed);
+    command->add_option("MORE", typed->more, "further places, or stations with theirs");
+    command->add_option("--count", typed->count, "end after so many lines")
+        ->check(CLI::PositiveNumber);
+    command->footer(
+        "Points are printed as the gateway polls them, other places are read once a second. Times "
+        "are UTC.\nCtrl-C ends it with 0. Other exit codes: 1 the gateway refuses, or there is no "
+        "such place; 64 usage;\n66 the token file cannot be read; 69 no gateway answers.");
+    adder.on_call(command, [typed] {
+        return watch(typed->at, {.words = typed->words(),
+                                 .type = typed->type,
+                                 .order = typed->order,
+                                 .count = typed->count});
+    });
+}
+
+}  // namespace
+
+void add_asking_commands(CLI::App& cli, ExitCode& code) {
+    Adder adder(cli, code);
+    add_read(adder);
+    add_write(adder);
+    add_watch(adder);
+}
+
+}  // namespace panelgate::app
