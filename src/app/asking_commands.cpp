@@ -136,6 +136,59 @@ void add_watch(Adder& adder) {
     });
 }
 
+void add_status(Adder& adder) {
+    const auto typed = std::make_shared<Typed>();
+    CLI::App* command =
+        adder.add("status", "say how lines and stations are, and what is not well", typed);
+    command->footer(
+        "Exit codes: 0 all is well; 1 a line, a station, a relay or a listener is not, or there "
+        "are "
+        "findings;\n64 usage; 66 the token file cannot be read; 69 no gateway answers.");
+    adder.on_call(command, [typed] { return status(typed->at); });
+    const auto shown = std::make_shared<Typed>();
+    command = adder.add("top", "show load, clients and slow panels, each second anew", shown);
+    command->add_flag("--once", shown->once, "one look, as on a pipe");
+    adder.on_call(command, [shown] { return top(shown->at, shown->once); });
+}
+
+void add_trace(Adder& adder) {
+    const auto typed = std::make_shared<Typed>();
+    typed->trace.count = 20;
+    CLI::App* command = adder.add("trace", "print the last transactions, with their frames", typed);
+    command->add_option("--station", typed->trace.station, std::string("only of ") + kStation);
+    command->add_option("--line", typed->trace.line, "only of this line");
+    command->add_flag("--errors", typed->trace.errors, "only what failed");
+    command->add_option("--count", typed->trace.count, "how many, at most")
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+    command->add_flag("--follow", typed->trace.follow, "go on with what comes");
+    adder.on_call(command, [typed] { return trace(typed->at, typed->trace); });
+}
+
+void add_report(Adder& adder) {
+    const auto typed = std::make_shared<Typed>();
+    CLI::App* command = adder.add(
+        "report", "write all that a gateway tells of itself into a file, for support", typed);
+    command->add_option("-o,--output", typed->file,
+                        "a file that is not there yet, - for standard output; without: "
+                        "panelgate-report-TIME.json");
+    command->footer(
+        "The file is JSON: configuration without secrets, state, findings, incidents, traces, "
+        "metrics.\nExit codes: 0 it is written; 1 the gateway refuses; 64 usage, or the file is "
+        "there; 66 the token file\ncannot be read; 69 no gateway answers; 70 the file cannot be "
+        "written.");
+    adder.on_call(command, [typed] { return report(typed->at, typed->file); });
+}
+
+/// For the shell's completion; not in the help.
+void add_names(Adder& adder) {
+    const auto typed = std::make_shared<Typed>();
+    CLI::App* command = adder.add("names", "print names of stations, or of points", typed);
+    command->group("");
+    command->add_option("STATION", typed->station, "whose points");
+    adder.on_call(command, [typed] { return names(typed->at, typed->station); });
+}
+
 }  // namespace
 
 void add_asking_commands(CLI::App& cli, ExitCode& code) {
@@ -143,6 +196,10 @@ void add_asking_commands(CLI::App& cli, ExitCode& code) {
     add_read(adder);
     add_write(adder);
     add_watch(adder);
+    add_status(adder);
+    add_trace(adder);
+    add_report(adder);
+    add_names(adder);
 }
 
 }  // namespace panelgate::app
