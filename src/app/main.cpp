@@ -17,6 +17,7 @@
 #include "build_info.hpp"
 #include "commands.hpp"
 #include "panelgate/base/text.hpp"
+#include "panelgate/cli/adapters.hpp"
 
 namespace panelgate::app {
 
@@ -189,8 +190,10 @@ class CommandLine {
         const bool extra = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
         const CLI::App& asked = *cli_.get_subcommand(command);
         if (extra && !asked.remaining().empty()) return unexpected(asked);
-        std::cerr << "panelgate: " << command << ": " << usage_fault(error) << "; `panelgate help "
-                  << command << "` says what it takes\n";
+        const std::string fault = usage_fault(error);
+        std::cerr << "panelgate: " << command << ": " << fault << "; `panelgate help " << command
+                  << "` says what it takes\n";
+        if (fault.starts_with("DEVICE")) std::cerr << cli::adapters_text(cli::adapters("/dev"));
         return kUsage;
     }
 

@@ -92,7 +92,6 @@ class CommandLine(unittest.TestCase):
         for typed, told in (("check --format xml", "--format must be text or json, not 'xml'"),
                             ("check --format", "--format needs a value after it"),
                             ("check -c a -c b", "--config may be given once"),
-                            ("scan", "DEVICE is missing"),
                             ("reload --weaker", "--weaker requires --rollback"),
                             ("address autonics-gplp-s", "NOTATION is missing"),
                             ("run --simulate=x", "an option that takes no value was given one"),
@@ -101,6 +100,13 @@ class CommandLine(unittest.TestCase):
             self.assertEqual(self.expect(USAGE, *typed.split()).stderr,
                              f"panelgate: {command}: {told}; `panelgate help {command}` says what "
                              "it takes\n")
+
+    def test_without_a_device_the_adapters_are_listed(self):
+        for command in ("scan", "init"):
+            first, rest = self.expect(USAGE, command).stderr.split("\n", 1)
+            self.assertEqual(first, f"panelgate: {command}: DEVICE is missing; `panelgate help {command}` "
+                                    "says what it takes")
+            self.assertRegex(rest, "^  (no USB adapter is here|USB adapters that are here:)")
 
     def test_the_demo_and_the_log_name_the_dashboard_first(self):
         with subprocess.Popen([harness.PANELGATE, "demo", "--http", "127.0.0.1:0", "--modbus",
@@ -193,6 +199,7 @@ class Files(unittest.TestCase):
             ended = run(command, "-c", str(self.file))
             self.assertEqual(ended.returncode, NO_INPUT)
             self.assertRegex(ended.stderr, rf"^[^\n]*{self.file.name}[^\n]*\n$")
+            self.assertIn("`panelgate demo` needs none, `panelgate init DEVICE -o FILE` writes one", ended.stderr)
 
     def test_an_unknown_key_points_at_itself_and_names_the_nearest(self):
         text = good()
