@@ -2,9 +2,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
 #include <memory>
 #include <string>
-#include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -41,6 +42,18 @@ struct Typed {
         return all;
     }
 };
+
+/// A check of `--count`, in words.
+auto from_1_to(unsigned most) {
+    return [most](const std::string& typed) {
+        unsigned number = 0;
+        const char* const end = typed.data() + typed.size();
+        const auto [stop, error] = std::from_chars(typed.data(), end, number);
+        if (error == std::errc() && stop == end && number >= 1 && number <= most)
+            return std::string();
+        return "it is a whole number from 1 to " + std::to_string(most) + ", not '" + typed + '\'';
+    };
+}
 
 class Adder {
   public:
@@ -83,7 +96,7 @@ void add_read(Adder& adder) {
     const auto typed = std::make_shared<Typed>();
     CLI::App* command = adder.add("read", "read a value of a panel", typed);
     adder.add_place(command, typed);
-    command->add_option("--count", typed->count, "how many values")->check(CLI::PositiveNumber);
+    command->add_option("--count", typed->count, "how many values")->check(from_1_to(65536));
     command->add_option("--format", typed->format, "text or json")
         ->check(CLI::IsMember({"text", "json"}));
     command->footer(
@@ -123,7 +136,7 @@ void add_watch(Adder& adder) {
     adder.add_place(command, typed);
     command->add_option("MORE", typed->more, "further places, or stations with theirs");
     command->add_option("--count", typed->count, "end after so many lines")
-        ->check(CLI::PositiveNumber);
+        ->check(from_1_to(1'000'000'000));
     command->footer(
         "Points are printed as the gateway polls them, other places are read once a second. Times "
         "are UTC.\nCtrl-C ends it with 0. Other exit codes: 1 the gateway refuses, or there is no "
@@ -160,7 +173,7 @@ void add_trace(Adder& adder) {
     command->add_flag("--errors", typed->trace.errors, "only what failed");
     command->add_option("--count", typed->trace.count, "how many, at most")
         ->capture_default_str()
-        ->check(CLI::PositiveNumber);
+        ->check(from_1_to(500));
     command->add_flag("--follow", typed->trace.follow, "go on with what comes");
     adder.on_call(command, [typed] { return trace(typed->at, typed->trace); });
 }

@@ -17,7 +17,7 @@ namespace json = boost::json;
 
 constexpr Duration kPatience = 60s;  // a large file on a small machine
 constexpr Duration kHealthTimeout = 2s;
-constexpr std::size_t kMost = 8 * 1024 * 1024;  // bytes of the verdict
+constexpr std::size_t kMostOfVerdict = 8 * 1024 * 1024;  // bytes of the verdict
 
 std::string text_in(const json::object& object, std::string_view name) {
     const json::value* found = object.if_contains(name);
@@ -84,8 +84,8 @@ ExitCode reload(const ReloadOptions& options) {
         (options.weaker ? "&weaker=true" : "") + " HTTP/1.1\r\nHost: " + place +
         (secret->empty() ? "" : "\r\nAuthorization: Bearer ") + *secret +
         "\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
-    const HttpReply reply =
-        ask(address, port, request, kPatience, kMost, [](const HttpReply&) { return false; });
+    const HttpReply reply = ask(address, port, request, kPatience, kMostOfVerdict,
+                                [](const HttpReply&) { return false; });
     boost::system::error_code wrong;
     const json::value body = json::parse(reply.body(), wrong);
     if (!wrong && body.is_object() && body.as_object().contains("outcome"))

@@ -1,6 +1,5 @@
 // status and top: what a running gateway tells of its lines and stations.
 #include <unistd.h>
-#include <csignal>
 #include <cstdlib>
 #include <iostream>
 #include <optional>
@@ -58,12 +57,6 @@ std::optional<cli::Overview> look(const GatewayClient& gateway, ExitCode& code) 
     const GatewayAnswer ready = gateway.get("/readyz");
     if (ready.status != 200) overview.not_ready = first_line(ready.body + ready.failure);
     return overview;
-}
-
-void end_with_signals() {
-    const auto end = [](int) { ::_exit(kFine); };
-    std::signal(SIGINT, end);
-    std::signal(SIGTERM, end);
 }
 
 /// A screen that is drawn anew each second, also while the gateway is away.

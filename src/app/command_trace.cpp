@@ -3,7 +3,6 @@
 #include <unistd.h>
 #include <algorithm>
 #include <cerrno>
-#include <csignal>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -27,7 +26,7 @@ namespace panelgate::app {
 namespace {
 
 constexpr unsigned kMostEntries = 500;  // of a page of a trace
-constexpr auto kPause = 500ms;
+constexpr auto kBetweenPages = 500ms;
 
 struct TracedLine {
     std::string path;
@@ -124,11 +123,7 @@ ExitCode trace(const GatewayOptions& at, const TraceOptions& options) {
     if (!gateway) return code;
     auto lines = lines_to_trace(*gateway, options, code);
     if (!lines) return code;
-    if (options.follow) {
-        const auto end = [](int) { ::_exit(kFine); };
-        std::signal(SIGINT, end);
-        std::signal(SIGTERM, end);
-    }
+    if (options.follow) end_with_signals();
     auto page = read_page(*gateway, *lines, code);
     if (!page) return code;
     if (page->size() > options.count)
@@ -138,7 +133,7 @@ ExitCode trace(const GatewayOptions& at, const TraceOptions& options) {
         for (const cli::TraceLine& line : *page) std::cout << line.text;
         std::cout << std::flush;
         if (!options.follow || !std::cout) return kFine;
-        std::this_thread::sleep_for(kPause);
+        std::this_thread::sleep_for(kBetweenPages);
         page = read_page(*gateway, *lines, code);
         if (!page) return code;
     }

@@ -1,9 +1,7 @@
 // watch: a line at each change of places of a running gateway.
-#include <unistd.h>
 #include <boost/json/parse.hpp>
 #include <boost/json/value.hpp>
 #include <chrono>
-#include <csignal>
 #include <cstddef>
 #include <cstdlib>
 #include <iostream>
@@ -23,14 +21,8 @@ namespace panelgate::app {
 
 namespace {
 
-constexpr auto kPause = 1s;  // between readings, and before a gateway that is gone is asked again
-
-/// Every line is written as a whole, so that a signal may end the process at any time.
-void end_with_signals() {
-    const auto end = [](int) { ::_exit(kFine); };
-    std::signal(SIGINT, end);
-    std::signal(SIGTERM, end);
-}
+constexpr auto kBetweenReads =
+    1s;  // between readings, and before a gateway that is gone is asked again
 
 class Watch {
   public:
@@ -48,7 +40,7 @@ class Watch {
         const bool streams = events_path().has_value();
         while (!(streams ? follow() : read_all())) {
             if (code_ != kFine) return code_;
-            std::this_thread::sleep_for(kPause);
+            std::this_thread::sleep_for(kBetweenReads);
         }
         return kFine;
     }

@@ -1,8 +1,10 @@
 #include "gateway_client.hpp"
 
+#include <unistd.h>
 #include <boost/json/parse.hpp>
 #include <boost/json/value.hpp>
 #include <charconv>
+#include <csignal>
 #include <cstddef>
 #include <fstream>
 #include <iostream>
@@ -15,9 +17,15 @@
 
 namespace panelgate::app {
 
+void end_with_signals() {
+    const auto end = [](int) { ::_exit(kFine); };
+    std::signal(SIGINT, end);
+    std::signal(SIGTERM, end);
+}
+
 namespace {
 
-constexpr std::size_t kMost = 64 * 1024 * 1024;   // bytes of an answer
+constexpr std::size_t kMostOfAnswer = 64 * 1024 * 1024;  // bytes of an answer
 constexpr std::size_t kMostEvents = 1024 * 1024;  // bytes of a stream, before it is opened anew
 constexpr Duration kStream = 600s;                // the same in time
 
@@ -104,7 +112,7 @@ GatewayAnswer answer_of(const HttpReply& reply) {
 }  // namespace
 
 GatewayAnswer GatewayClient::put_question(const std::string& request, Duration patience) const {
-    return answer_of(ask(endpoint_.address, endpoint_.port, request, patience, kMost,
+    return answer_of(ask(endpoint_.address, endpoint_.port, request, patience, kMostOfAnswer,
                          [](const HttpReply&) { return false; }));
 }
 

@@ -82,5 +82,8 @@ ExitCode explain_place(const GatewayClient& gateway, const GatewayPlace& place,
                        const GatewayAnswer& answer, const std::string& verb);
 /// All stations; nothing, with a message on stderr and `code` set, if they cannot be had.
 std::optional<std::vector<cli::Station>> all_stations(const GatewayClient& gateway, ExitCode& code);
+/// From now on SIGINT and SIGTERM end the process with 0, for commands that print until then: each
+/// of their lines is written as a whole.
+void end_with_signals();
 
 }  // namespace panelgate::app

@@ -29,7 +29,7 @@ std::string row(const std::string& time, const std::array<std::string, 4>& words
            padded(words[3], 18) + ' ' + rest + '\n';
 }
 
-std::string shown(const json::object& object, std::string_view name) {
+std::string clean_text(const json::object& object, std::string_view name) {
     return printable(text_of(object, name));
 }
 
@@ -40,13 +40,13 @@ std::string total_of(const json::object& transaction) {
 }
 
 std::string frames_of(const json::object& transaction) {
-    const std::string reply = shown(transaction, "reply");
-    std::string text = "> " + shown(transaction, "request");
+    const std::string reply = clean_text(transaction, "reply");
+    std::string text = "> " + clean_text(transaction, "request");
     if (!reply.empty()) text += "  < " + reply;
     return text;
 }
 
-std::string name_of(unsigned id, const std::map<unsigned, std::string>& names) {
+std::string station_name(unsigned id, const std::map<unsigned, std::string>& names) {
     const auto found = names.find(id);
     if (found != names.end()) return printable(found->second);
     return id == 0 ? "broadcast" : std::to_string(id);
@@ -80,15 +80,16 @@ std::vector<TraceLine> trace_lines(const json::object& page, const TraceFilter& 
     for (const json::object* one : objects_of(page, "transactions")) {
         const auto id = static_cast<unsigned>(number_of(*one, "station").value_or(0));
         if (!is_wanted(*one, id, filter)) continue;
-        const std::string time = shown(*one, "time");
-        const std::array<std::string, 4> words{name_of(id, names), shown(*one, "reason"),
-                                               shown(*one, "outcome"), shown(*one, "client")};
+        const std::string time = clean_text(*one, "time");
+        const std::array<std::string, 4> words{station_name(id, names), clean_text(*one, "reason"),
+                                               clean_text(*one, "outcome"),
+                                               clean_text(*one, "client")};
         lines.push_back({time, row(time, words, total_of(*one), frames_of(*one))});
     }
     for (const json::object* one : objects_of(page, "decisions")) {
-        const std::string text = shown(*one, "text");
+        const std::string text = clean_text(*one, "text");
         if (!names_station(text, filter)) continue;
-        const std::string time = shown(*one, "time");
+        const std::string time = clean_text(*one, "time");
         lines.push_back({time, padded(time, 27) + text + '\n'});
     }
     std::ranges::sort(lines, {}, [](const TraceLine& line) { return line.time; });
@@ -109,12 +110,14 @@ std::string without_passwords(std::string text) {
     return text;
 }
 
-std::string quoted(std::string_view text) { return json::serialize(json::string(as_utf8(text))); }
+std::string json_quoted(std::string_view text) {
+    return json::serialize(json::string(as_utf8(text)));
+}
 
-std::string value_of(const ReportPart& part) {
+std::string json_of_part(const ReportPart& part) {
     std::string_view body = part.body;
     while (body.ends_with('\n')) body.remove_suffix(1);
-    return part.is_json && !body.empty() ? std::string(body) : quoted(part.body);
+    return part.is_json && !body.empty() ? std::string(body) : json_quoted(part.body);
 }
 
 }  // namespace
@@ -130,8 +133,9 @@ std::string report_text(const std::vector<ReportPart>& parts) {
         const bool begins = nested && open != head;
         if (text.size() > 1 && (begins || open != head || !nested)) text += ",\n";
         if (nested && !begins) text += ",\n";
-        if (begins) text += quoted(head) + ":{";
-        text += quoted(nested ? part.name.substr(slash + 1) : part.name) + ':' + value_of(part);
+        if (begins) text += json_quoted(head) + ":{";
+        text += json_quoted(nested ? part.name.substr(slash + 1) : part.name) + ':' +
+                json_of_part(part);
         open = head;
     }
     return without_passwords(text + (open.empty() ? "}\n" : "}}\n"));

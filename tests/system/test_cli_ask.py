@@ -59,6 +59,7 @@ class Asking(unittest.TestCase):
                 ("read oven/mode press/UW0", "read takes one place"),
                 ("read coils/4", "a station is missing before 'coils/4'"),
                 ("read oven/mode --type u16", "leave out --type"),
+                ("read oven GDT1 --count x", "--count: it is a whole number from 1 to 65536, not 'x'"),
                 ("write oven/mode", "VALUE is missing"),
                 ("write press/setpoint 21,5", "such as 21.5")):
             with self.subTest(words):

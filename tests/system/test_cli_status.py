@@ -2,8 +2,10 @@
 import json
 import os
 import pathlib
+import pty
 import signal
 import stat
+import subprocess
 import tempfile
 import unittest
 
@@ -49,6 +51,34 @@ class State(unittest.TestCase):
             self.assertNotIn(" ok ", errors)
         finally:
             self.gateway.rest("PUT", "/api/v1/simulator/mixer", {"dead": 0})
+
+    def on_a_terminal(self, *arguments, **env):
+        """What a command draws, up to two screens or its end."""
+        ours, theirs = pty.openpty()
+        with os.fdopen(ours, "rb", buffering=0) as screen:
+            process = subprocess.Popen([harness.PANELGATE, *arguments, "--http", self.http], stdout=theirs,
+                                       stdin=subprocess.DEVNULL, env={**os.environ, "TERM": "xterm", **env})
+            os.close(theirs)
+            drawn = b""
+            try:
+                while drawn.count(b"Ctrl-C ends it.") < 2 and (more := screen.read(4096)):
+                    drawn += more
+            except OSError:  # its end
+                pass
+            process.send_signal(signal.SIGINT)
+            return process.wait(harness.PATIENCE), drawn.decode()
+
+    def test_colours_are_for_terminals_that_want_them(self):
+        self.assertIn("\x1b[32monline\x1b[0m", self.on_a_terminal("status")[1])
+        self.assertNotIn("\x1b", self.on_a_terminal("status", NO_COLOR="1")[1])
+        self.assertNotIn("\x1b", self.on_a_terminal("status", TERM="dumb")[1])
+
+    def test_top_draws_each_second_until_ctrl_c(self):
+        code, drawn = self.on_a_terminal("top", NO_COLOR="1")
+        self.assertEqual(code, 0, drawn)
+        screens = drawn.split("\x1b[H\x1b[2J")[1:]
+        self.assertIn("figures since its start", screens[0])
+        self.assertRegex(screens[1], r"figures of the last [12]\.\d s(.|\r|\n)*floor1 +up +[\d.]+ % .* [\d.]+ ms")
 
     def test_top_looks_once_on_a_pipe(self):
         for arguments in (("top",), ("top", "--once")):
