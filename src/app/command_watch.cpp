@@ -117,8 +117,8 @@ class Watch {
             *events_path(), [&] { return (enough = read_all()) || code_ != kFine; },
             [&](const cli::Event& event) { return enough = take(event); });
         if (!ended) return enough;
-        if (ended->is_ok() && ended->failure.empty()) return false;  // long enough: once more
-        if (ended->is_ok() || ended->status == 0)
+        if (ended->is_ok()) return false;  // long enough: once more
+        if (ended->status == 0)
             say_gone(*ended);
         else
             code_ = gateway_.explain(*ended);

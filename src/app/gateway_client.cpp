@@ -109,6 +109,12 @@ GatewayAnswer answer_of(const HttpReply& reply) {
     return answer;
 }
 
+GatewayAnswer no_answer(const char* why) {
+    GatewayAnswer answer;
+    answer.failure = why;
+    return answer;
+}
+
 }  // namespace
 
 GatewayAnswer GatewayClient::put_question(const std::string& request, Duration patience) const {
@@ -144,7 +150,7 @@ std::optional<GatewayAnswer> GatewayClient::follow(
                                 kStream, kMostEvents, look);
     if (done) return std::nullopt;
     GatewayAnswer answer = answer_of(reply);
-    if (answer.is_ok() && reply.error) answer.failure = "the connection has ended";
+    if (answer.is_ok() && reply.error) return no_answer("the connection has ended");
     return answer;
 }
 

@@ -53,9 +53,14 @@ Cell errors_of(const Figures& figures) {
             figures.errors > 0 ? Colour::warning : Colour::none};
 }
 
+/// Unknown: nobody has asked it, or its line is down. Heard: it answers another master.
+bool is_well(std::string_view state) {
+    return state == "online" || state == "heard" || state == "unknown";
+}
+
 Colour colour_of(std::string_view state) {
-    if (state == "online" || state == "up" || state == "ok") return Colour::good;
-    return state == "unknown" || state == "waiting" ? Colour::warning : Colour::bad;
+    if (state == "unknown") return Colour::warning;
+    return is_well(state) ? Colour::good : Colour::bad;
 }
 
 std::string line_of(const Overview& overview, const json::object& station) {
@@ -94,7 +99,7 @@ std::vector<std::string> troubles(const Overview& overview) {
     for (const json::object* station : objects_of(overview.stations, "stations")) {
         const std::string state = shown(*station, "state");
         const auto last = number_of(*station, "last_success_ms");
-        if (state == "online" || state == "unknown") continue;
+        if (is_well(state)) continue;
         list.push_back(shown(*station, "name") + " is " + state +
                        (last ? ", its last answer is " + span_text(*last / 1000) + " old"
                              : ", it has never answered"));

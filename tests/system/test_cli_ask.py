@@ -100,6 +100,18 @@ class NoGateway(unittest.TestCase):
         ended = harness.run("read", "oven/mode", "--http", "nowhere")
         self.assertEqual((ended.returncode, ended.stderr.count("\n")), (USAGE, 1))
 
+    def test_a_gateway_that_is_started_anew_is_waited_for(self):
+        with harness.demo() as gateway:
+            http = f"127.0.0.1:{gateway.http_port()}"
+            with harness.Program("watch", "oven/mode", "--http", http) as watching:
+                watching.out.wait_for("oven/mode  0 .off.")
+                self.assertEqual(gateway.stop(), 0)
+                watching.log.wait_for("no gateway answers at .*; waiting for it")
+                with harness.Program("demo", "--http", http, "--modbus", "127.0.0.1:0") as anew:
+                    anew.rest("PUT", "/api/v1/stations/oven/points/mode", {"value": 2})
+                    watching.out.wait_for("oven/mode  2 .automatic.")
+                    self.assertEqual(watching.stop(signal.SIGINT), 0)
+
     def test_a_token_is_asked_for(self):
         with tempfile.TemporaryDirectory() as folder:
             token = pathlib.Path(folder) / "token"

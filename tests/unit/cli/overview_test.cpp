@@ -81,6 +81,11 @@ TEST(StatusText, IsTwoTablesAndAVerdict) {
               "\n"
               "all is well\n");
     EXPECT_THAT(troubles(well()), IsEmpty());
+    Overview listening = well();
+    listening.lines[0]["mode"] = "listen";
+    listening.stations = object(R"({"stations":[{"name":"press","state":"heard"}]})");
+    EXPECT_THAT(troubles(listening), IsEmpty());
+    EXPECT_THAT(status_text(listening, false), HasSubstr("floor1  up, listening  52.5 %"));
 }
 
 TEST(StatusText, NamesWhatIsNotWell) {
