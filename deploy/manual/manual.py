@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""manual.py FOLDER PROGRAM...: panelgate.1, panelgate.yaml.5 and the bash completion, into FOLDER.
+"""manual.py FOLDER PROGRAM...: panelgate.1, panelgate.yaml.5 and the completions, into FOLDER.
 
 Made of what stands in one place already: commands and options are what `PROGRAM help` prints, keys
 are config/panelgate.example.yaml. PROGRAM may have words before it (an emulator). The date is
@@ -16,6 +16,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 EXAMPLE = HERE.parents[1] / "config/panelgate.example.yaml"
 ENTRY = re.compile(r"^  (\S.*?)(?:\s{2,}(\S.*))?$")
 COLUMN = " " * 30
+OF_FILES = ("-c", "--config", "--profiles", "--diff", "--token-file", "-o", "--output")  # their value
 
 
 class Command:
@@ -53,7 +54,7 @@ def asked(program):
     def run(*words):
         return subprocess.run([*program, "help", *words], check=True, capture_output=True,
                               text=True).stdout
-    listed = re.search(r"(?s)Subcommands:\n(.*)", run())[1]
+    listed = run().split("\nExamples:")[0].split("\nOptions:")[1].split("\n\n", 1)[1]
     names = re.findall(r"(?m)^  (\S+)", listed)
     about = {name: re.search(rf"(?m)^  {name}\s+(.*)$", listed)[1] for name in names}
     return [Command(name, run(name)) for name in names if name not in ("help", "version")], about
@@ -114,15 +115,40 @@ def page_5():
 
 
 def completion(commands, about):
+    """What the completions of all shells are filled with."""
     def case(pattern, words):
-        return f"        {pattern}) words='{words}' ;;"
+        return f"        {pattern}) list='{words}' ;;"
     values = [case("|".join(f"{command.name}:{name}" for name in names), " ".join(words))
               for command in commands for names, words in command.options() if words]
     options = [case(f"{command.name}:*", " ".join(name for names, _ in command.options()
                                                   for name in names)) for command in commands]
     helped = case("help:*", " ".join(command.name for command in commands))
-    return filled("panelgate.bash", {"NAMES": " ".join(about), "VALUES": "\n".join(values),
-                                     "OPTIONS": "\n".join([*options, helped])})
+    asking = [command.name for command in commands if "STATION" in command.usage]
+    described = [f"            {quoted(f'{name}:{what}')}" for name, what in about.items()]
+    return {"NAMES": " ".join(about), "DESCRIBED": "\n".join(described), "VALUES": "\n".join(values),
+            "OPTIONS": "\n".join([*options, helped]),
+            "FILES": "        " + " | ".join(f"*:{name}" for name in OF_FILES) + ")",
+            "ASKING": "        " + " | ".join(f"{name}:*" for name in asking) + ")"}
+
+
+def fish_completion(commands, about):
+    lines = [f"complete -c panelgate -n __fish_use_subcommand -f -a {name} -d {quoted(what)}"
+             for name, what in about.items()]
+    lines.append("complete -c panelgate -n '__fish_seen_subcommand_from help' -f -a " +
+                 quoted(" ".join(command.name for command in commands)))
+    for command in commands:
+        for names, words in command.options():
+            flags = " ".join(f"-l {name[2:]}" if name.startswith("--") else f"-s {name[1:]}" for name in names)
+            takes = "-f" if words is None else f"-x -a {quoted(' '.join(words))}" if words \
+                else "-r -F" if set(names) & set(OF_FILES) else "-x"
+            lines.append(f"complete -c panelgate -n '__fish_seen_subcommand_from {command.name}' {flags} {takes}")
+    asking = " ".join(command.name for command in commands if "STATION" in command.usage)
+    return {"COMPLETE": "\n".join(lines), "ASKING": asking}
+
+
+def quoted(text):
+    """A word of a shell, without what would end it."""
+    return "'" + text.replace("'", "") + "'"
 
 
 def filled(name, values):
@@ -138,7 +164,10 @@ def main(folder, *program):
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "panelgate.1").write_text(filled("panelgate.1", page_1(commands)))
     (folder / "panelgate.yaml.5").write_text(filled("panelgate.yaml.5", page_5()))
-    (folder / "panelgate.bash").write_text(completion(commands, about))
+    words = completion(commands, about)
+    for shell in ("bash", "zsh"):
+        (folder / f"panelgate.{shell}").write_text(filled(f"panelgate.{shell}", words))
+    (folder / "panelgate.fish").write_text(filled("panelgate.fish", fish_completion(commands, about)))
 
 
 if __name__ == "__main__":

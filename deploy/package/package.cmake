@@ -17,6 +17,9 @@ install(DIRECTORY ${DEPLOY}/prometheus ${DEPLOY}/grafana DESTINATION ${DOC}/exam
 install(FILES ${HERE}/copyright DESTINATION ${DOC})
 install(FILES ${PANELGATE_DOCUMENTS}/panelgate.bash DESTINATION share/bash-completion/completions
         RENAME panelgate)
+install(FILES ${PANELGATE_DOCUMENTS}/panelgate.zsh DESTINATION share/zsh/vendor-completions
+        RENAME _panelgate)
+install(FILES ${PANELGATE_DOCUMENTS}/panelgate.fish DESTINATION share/fish/vendor_completions.d)
 install(FILES ${PANELGATE_DOCUMENTS}/changelog.gz ${PANELGATE_DOCUMENTS}/changelog.Debian.gz
         DESTINATION ${DOC})
 install(FILES ${PANELGATE_DOCUMENTS}/panelgate.1.gz DESTINATION share/man/man1)

@@ -1,12 +1,11 @@
 #include <boost/json/parse.hpp>
 #include <boost/json/value.hpp>
-#include <fstream>
 #include <iostream>
-#include <optional>
 #include <string>
 #include <variant>
 
 #include "commands.hpp"
+#include "gateway_client.hpp"
 #include "http_door.hpp"
 #include "panelgate/base/network.hpp"
 
@@ -18,7 +17,7 @@ namespace json = boost::json;
 
 constexpr Duration kPatience = 60s;  // a large file on a small machine
 constexpr Duration kHealthTimeout = 2s;
-constexpr std::size_t kMost = 8 * 1024 * 1024;  // bytes of the verdict
+constexpr std::size_t kMostOfVerdict = 8 * 1024 * 1024;  // bytes of the verdict
 
 std::string text_in(const json::object& object, std::string_view name) {
     const json::value* found = object.if_contains(name);
@@ -68,16 +67,6 @@ ExitCode print_verdict(const json::object& verdict) {
     return outcome == "invalid" ? kBadConfig : kUnavailable;
 }
 
-/// The token; "" if no file is given; nothing, with a message on stderr, if it cannot be read.
-std::optional<std::string> secret_in(const std::string& file) {
-    if (file.empty()) return "";
-    std::ifstream in(file);
-    std::string secret;
-    if (std::getline(in, secret) && !secret.empty()) return secret;
-    std::cerr << "panelgate: no token can be read from " << file << " (its first line is one)\n";
-    return std::nullopt;
-}
-
 }  // namespace
 
 ExitCode reload(const ReloadOptions& options) {
@@ -86,7 +75,7 @@ ExitCode reload(const ReloadOptions& options) {
         std::cerr << "panelgate: not reloaded: " << none->why << "; or kill -HUP its process\n";
         return none->code;
     }
-    const auto secret = secret_in(options.token_file);
+    const auto secret = token_in(options.token_file);
     if (!secret) return kNoInput;
     const auto& [address, port] = std::get<config::Endpoint>(endpoint);
     const std::string place = endpoint_text(address, port);
@@ -95,8 +84,8 @@ ExitCode reload(const ReloadOptions& options) {
         (options.weaker ? "&weaker=true" : "") + " HTTP/1.1\r\nHost: " + place +
         (secret->empty() ? "" : "\r\nAuthorization: Bearer ") + *secret +
         "\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
-    const HttpReply reply =
-        ask(address, port, request, kPatience, kMost, [](const HttpReply&) { return false; });
+    const HttpReply reply = ask(address, port, request, kPatience, kMostOfVerdict,
+                                [](const HttpReply&) { return false; });
     boost::system::error_code wrong;
     const json::value body = json::parse(reply.body(), wrong);
     if (!wrong && body.is_object() && body.as_object().contains("outcome"))

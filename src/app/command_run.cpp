@@ -239,6 +239,8 @@ void print_demo_help(const config::Config& config, const Gateway& gateway) {
               << "  press 31 autonics-gplp-s   mixer 5 autonics-gp-2005   io 17 autonics-arm\n"
               << "  oven 20 panasonic-gt       filler 1 omron-cp2e\n\n"
               << "Try, in another terminal:\n"
+              << "  panelgate read oven/temperature --http " << url.substr(url.rfind('/') + 1)
+              << '\n'
               << "  curl -s " << url << "/api/v1/stations\n"
               << "  curl -s '" << url << "/api/v1/stations/press/devices/UW0?count=5'\n"
               << "  curl -s -X PUT -d '{\"values\":[215]}' " << url

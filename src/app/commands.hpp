@@ -43,6 +43,55 @@ ExitCode schema();
 /// Checks whether the gateway is ready. `http`: "ADDR:PORT" of its REST API; if empty, the address
 /// from `file`, or the default if there is no readable file.
 ExitCode health(const std::string& file, const std::string& http);
+/// Which running gateway is asked.
+struct GatewayOptions {
+    std::string file = kDefaultConfig;  ///< names its HTTP address
+    std::string http{};                 ///< overrides it: "ADDR:PORT"
+    std::string token_file{};           ///< its first line is a token
+};
+/// The command line of `read`; texts are empty and `count` 0 when not given.
+struct ReadOptions {
+    std::vector<std::string> words;  ///< STATION PLACE, or both as one
+    std::string type;
+    std::string order;
+    unsigned count = 0;
+    bool json = false;
+};
+/// Reads a place through a running gateway.
+ExitCode read(const GatewayOptions& at, const ReadOptions& options);
+struct WriteOptions {
+    std::vector<std::string> words;  ///< STATION PLACE VALUE...
+    std::string type;
+    std::string order;
+};
+/// Writes a place through a running gateway.
+ExitCode write(const GatewayOptions& at, const WriteOptions& options);
+struct WatchOptions {
+    std::vector<std::string> words;  ///< stations, each with its places
+    std::string type;
+    std::string order;
+    unsigned count = 0;  ///< lines after which it ends; 0: never
+};
+/// Prints a line at each change of places.
+ExitCode watch(const GatewayOptions& at, const WatchOptions& options);
+/// Prints the state of lines and stations.
+ExitCode status(const GatewayOptions& at);
+/// Shows load, clients and slow panels; again each second unless `once`.
+ExitCode top(const GatewayOptions& at, bool once);
+struct TraceOptions {
+    std::string station;
+    std::string line;
+    bool errors = false;  ///< only transactions that failed
+    unsigned count = 20;  ///< the last of them
+    bool follow = false;
+};
+/// Prints transactions.
+ExitCode trace(const GatewayOptions& at, const TraceOptions& options);
+/// Writes a bundle for support; "": a name with the time.
+ExitCode report(const GatewayOptions& at, const std::string& file);
+/// Prints the names of stations, or of a station's points, for the shell's completion; says nothing
+/// if they cannot be had.
+ExitCode names(const GatewayOptions& at, const std::string& station);
 /// The command line of `reload` as typed.
 struct ReloadOptions {
     std::string file;        ///< names the gateway's HTTP address

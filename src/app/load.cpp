@@ -75,9 +75,14 @@ Loaded load_file(const std::string& typed, const std::string& option) {
     const std::string path = path_of(typed);
     Loaded loaded = read_file(path);
     if (loaded.code == kNoInput) {
-        std::cerr << "panelgate: cannot read " << path << ": "
-                  << loaded.problems.front().message.substr(kCannotRead.size())
-                  << " (give another file with " << option << ")\n";
+        const std::string why = loaded.problems.front().message.substr(kCannotRead.size());
+        const bool is_missing = option == "-c" && why == std::strerror(ENOENT);
+        std::cerr << "panelgate: cannot read " << path << ": " << why << " (give another file with "
+                  << option
+                  << (is_missing ? "; `panelgate demo` needs none, `panelgate init DEVICE -o FILE` "
+                                   "writes one"
+                                 : "")
+                  << ")\n";
     }
     std::cerr << loaded.error_text;
     return loaded;

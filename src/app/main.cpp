@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <exception>
+#include <initializer_list>
 #include <iostream>
 #include <set>
 #include <string>
@@ -12,9 +13,11 @@
 #include <utility>
 #include <vector>
 
+#include "asking_commands.hpp"
 #include "build_info.hpp"
 #include "commands.hpp"
 #include "panelgate/base/text.hpp"
+#include "panelgate/cli/adapters.hpp"
 
 namespace panelgate::app {
 
@@ -79,30 +82,50 @@ using namespace panelgate::app;
 constexpr const char* kAbout =
     "panelgate: a Modbus RTU-to-TCP gateway for operator panels on RS-485 lines";
 
+constexpr const char* kExamples =
+    "Examples:\n"
+    "  panelgate demo                                   five simulated panels and a dashboard\n"
+    "  panelgate init /dev/ttyUSB0 -o panelgate.yaml    find panels, write a configuration\n"
+    "  panelgate run -c panelgate.yaml                  serve them\n"
+    "  panelgate read oven/temperature                  ask the gateway that runs\n"
+    "  panelgate check -c panelgate.yaml                what a configuration means\n"
+    "  panelgate address panasonic-gt GDT108            where a notation is in Modbus\n";
+constexpr const char* kFirstSteps =
+    "To begin:\n"
+    "  panelgate demo                                   look at it: simulated panels, no hardware\n"
+    "  panelgate init /dev/ttyUSB0 -o panelgate.yaml    find the panels of a line, and write a\n"
+    "                                                   configuration (scan only looks)\n"
+    "  panelgate run -c panelgate.yaml                  serve them\n";
+
 /// The command line; parsing it runs the command.
 class CommandLine {
   public:
     CommandLine() {
         cli_.set_version_flag("-V,--version", build_text());
         cli_.require_subcommand(1);
-        add_run();
         add_demo();
-        add_check();
-        add_config();
-        add_simulate();
         add_scan();
-        add_address();
-        add_profiles();
+        add_init();
+        add_run();
+        add_simulate();
+        add_asking_commands(cli_, code_);
         add_health();
         add_reload();
-        add_import();
+        add_check();
+        add_config();
         add_schema();
-        add_init();
+        add_import();
+        add_address();
+        add_profiles();
         add_help();
+        add_groups();
     }
 
     ExitCode parse(std::vector<std::string> words) {
-        if (words.empty()) return which_command("a command is missing");
+        if (words.empty()) {
+            std::cerr << "panelgate: a command is missing\n" << kFirstSteps;
+            return listed_commands();
+        }
         if (words[0] == "help") {
             words.erase(words.begin());
             words.emplace_back("--help");
@@ -115,6 +138,7 @@ class CommandLine {
             return which_command("a command is missing before '" + words[0] + '\'');
         const std::string command = words[0];
         try {
+            keep_negative_values(words);
             std::ranges::reverse(words);  // the order that CLI11 expects
             cli_.parse(std::move(words));
         } catch (const CLI::ParseError& error) {
@@ -129,13 +153,33 @@ class CommandLine {
     std::vector<std::string> commands() const {
         std::vector<std::string> names;
         for (const CLI::App* command : cli_.get_subcommands({}))
-            names.push_back(command->get_name());
+            if (!command->get_group().empty()) names.push_back(command->get_name());
         return names;
     }
 
+    /// Puts what is no option of `write` behind "--": there "-5" is a value.
+    static void keep_negative_values(std::vector<std::string>& words) {
+        const auto is_negative = [](const std::string& word) {
+            return word.size() > 1 && word[0] == '-' && word.find_first_of("0123456789.") == 1;
+        };
+        if (words[0] != "write" || std::ranges::none_of(words, is_negative)) return;
+        std::vector<std::string> options{words[0]};
+        std::vector<std::string> values{"--"};
+        for (std::size_t i = 1; i < words.size(); ++i) {
+            const bool is_option = words[i].starts_with('-') && !is_negative(words[i]);
+            if (words[i] == "--") continue;
+            (is_option ? options : values).push_back(words[i]);
+            const bool takes_next = is_option && words[i].find('=') == std::string::npos;
+            if (takes_next && i + 1 < words.size()) options.push_back(words[++i]);
+        }
+        options.insert(options.end(), values.begin(), values.end());
+        words = std::move(options);
+    }
+
     bool has_command(const std::string& name) const {
-        const auto names = commands();
-        return std::ranges::find(names, name) != names.end();
+        return std::ranges::any_of(cli_.get_subcommands({}), [&](const CLI::App* command) {
+            return command->get_name() == name;
+        });
     }
 
     static std::string did_you_mean(std::string_view typed, const std::vector<std::string>& known) {
@@ -148,8 +192,10 @@ class CommandLine {
         const bool extra = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
         const CLI::App& asked = *cli_.get_subcommand(command);
         if (extra && !asked.remaining().empty()) return unexpected(asked);
-        std::cerr << "panelgate: " << command << ": " << usage_fault(error) << "; `panelgate help "
-                  << command << "` says what it takes\n";
+        const std::string fault = usage_fault(error);
+        std::cerr << "panelgate: " << command << ": " << fault << "; `panelgate help " << command
+                  << "` says what it takes\n";
+        if (fault.starts_with("DEVICE")) std::cerr << cli::adapters_text(cli::adapters("/dev"));
         return kUsage;
     }
 
@@ -178,7 +224,12 @@ class CommandLine {
     }
 
     ExitCode which_command(const std::string& what) const {
-        std::cerr << "panelgate: " << what << "\nCommands:";
+        std::cerr << "panelgate: " << what << '\n';
+        return listed_commands();
+    }
+
+    ExitCode listed_commands() const {
+        std::cerr << "Commands:";
         for (const std::string& name : commands()) std::cerr << ' ' << name;
         std::cerr << "; `panelgate help` says what they do\n";
         return kUsage;
@@ -189,6 +240,19 @@ class CommandLine {
             cli_.add_subcommand("version", "print the version, the commit and the libraries");
         version->callback([] { std::cout << build_text() << '\n'; });
         cli_.add_subcommand("help", "say what all commands do, or what COMMAND does");
+    }
+
+    /// Commands in the order of their groups, and what to type first.
+    void add_groups() {
+        const auto put = [this](const char* group, std::initializer_list<const char*> names) {
+            for (const char* name : names) cli_.get_subcommand(name)->group(group);
+        };
+        put(kBegin, {"demo", "scan", "init"});
+        put(kRun, {"run", "simulate"});
+        put(kAsk, {"health", "reload"});
+        put(kConfiguration, {"check", "config", "schema", "import"});
+        put(kTools, {"address", "profiles", "version", "help"});
+        cli_.footer(kExamples);
     }
 
     void add_profiles_dir(CLI::App* command, std::string& dir) {

@@ -16,6 +16,8 @@
 #include <utility>
 
 #include "load.hpp"
+#include "panelgate/base/text.hpp"
+#include "panelgate/cli/adapters.hpp"
 #include "panelgate/line/line.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/line/tcp_line.hpp"
@@ -32,7 +34,7 @@
 namespace panelgate::app {
 
 /// Drives a Scanner over a line until it is done, the line fails or a signal comes. Shows the
-/// progress on stderr if that is a terminal.
+/// progress on stderr: on a terminal as it is, elsewhere a line every 5 s.
 class ScanRun final : public line::Line::Events {
   public:
     /// `settings` and `profiles` outlive it.
@@ -59,6 +61,10 @@ class ScanRun final : public line::Line::Events {
   private:
     void end(const std::string& why);
     void redraw();
+    void tell();
+    std::string progress(std::size_t width) const {
+        return scan::format_progress(scanner_->progress(clock_.now()), width);
+    }
 
     boost::asio::io_context& io_;
     const scan::Settings& settings_;
@@ -120,7 +126,7 @@ void ScanRun::end(const std::string& why) {
 void ScanRun::on_up() {
     scanner_ = std::make_unique<scan::Scanner>(profiles_, settings_, clock_.now());
     drive_.emplace(clock_, *line_, *scanner_, *this);
-    if (shows_progress()) redraw();
+    shows_progress() ? redraw() : tell();
     drive_->hear([](TimePoint) {});
 }
 
@@ -140,9 +146,18 @@ void ScanRun::settled(TimePoint) {
 
 void ScanRun::redraw() {
     constexpr Duration kPause = 200ms;
-    std::cerr << '\r' << scan::format_progress(scanner_->progress(clock_.now()), width() - 1)
-              << kClear << std::flush;
+    std::cerr << '\r' << progress(width() - 1) << kClear << std::flush;
     redraw_->arm(clock_.now() + kPause, [this] { redraw(); });
+}
+
+/// The same for a pipe: a line now and then.
+void ScanRun::tell() {
+    constexpr Duration kPause = 5s;
+    constexpr std::size_t kWidth = 120;
+    redraw_->arm(clock_.now() + kPause, [this] {
+        std::cerr << "panelgate: " << trimmed(progress(kWidth)) << '\n' << std::flush;
+        tell();
+    });
 }
 
 namespace {
@@ -187,6 +202,9 @@ bool run_scan(const ScanOptions& options, const scan::Settings& settings, ScanOu
         return true;
     }
     std::cerr << "panelgate: " << run.cut_short() << '\n';
+    std::error_code none;
+    if (!settings.remote && !std::filesystem::exists(options.device, none))
+        std::cerr << cli::adapters_text(cli::adapters("/dev"));
     return false;
 }
 

@@ -30,6 +30,8 @@ class CommandLine(unittest.TestCase):
         self.assertRegex(self.expect(0, "--version").stdout, r"^panelgate \d+\.\d+\.\d+\n"
                          r"commit \w+, \w+ \d.*\nboost 1\.\d+\.\d+, .*yaml-cpp \d.*\n$")
         text = self.expect(0, "--help").stdout
+        for group in ("Begin", "Run", "Ask a running gateway", "Configuration", "Tools", "Examples"):
+            self.assertIn(f"\n{group}:\n", text)
         for command in ("run", "demo", "check", "simulate", "address", "profiles",
                         "health", "schema", "import", "init", "scan", "config"):
             self.assertRegex(text, rf"(?m)^\s+{command}\b")
@@ -72,8 +74,10 @@ class CommandLine(unittest.TestCase):
         for typed, near in (("chekc", "check"), ("simulat", "simulate"), ("dmeo", "demo")):
             told = self.expect(USAGE, typed, "-c", "x.yaml").stderr
             self.assertIn(f"there is no command '{typed}'; did you mean '{near}'?", told)
-        self.assertIn("Commands: run demo check", self.expect(USAGE, "fly").stderr)
-        self.assertIn("a command is missing", self.expect(USAGE).stderr)
+        self.assertIn("Commands: demo scan init run", self.expect(USAGE, "fly").stderr)
+        told = self.expect(USAGE).stderr
+        for word in ("a command is missing", "To begin:", "panelgate demo", "panelgate init", "panelgate run"):
+            self.assertIn(word, told)
 
     def test_a_mistyped_option_is_told_the_nearest(self):
         for typed, near in (("--confg", "--config"), ("--formt=json", "--format"), ("-C", "-c")):
@@ -88,7 +92,6 @@ class CommandLine(unittest.TestCase):
         for typed, told in (("check --format xml", "--format must be text or json, not 'xml'"),
                             ("check --format", "--format needs a value after it"),
                             ("check -c a -c b", "--config may be given once"),
-                            ("scan", "DEVICE is missing"),
                             ("reload --weaker", "--weaker requires --rollback"),
                             ("address autonics-gplp-s", "NOTATION is missing"),
                             ("run --simulate=x", "an option that takes no value was given one"),
@@ -98,6 +101,13 @@ class CommandLine(unittest.TestCase):
             self.assertEqual(self.expect(USAGE, *typed.split()).stderr,
                              f"panelgate: {command}: {told}; `panelgate help {command}` says what "
                              "it takes\n")
+
+    def test_without_a_device_the_adapters_are_listed(self):
+        for command in ("scan", "init"):
+            first, rest = self.expect(USAGE, command).stderr.split("\n", 1)
+            self.assertEqual(first, f"panelgate: {command}: DEVICE is missing; `panelgate help {command}` "
+                                    "says what it takes")
+            self.assertRegex(rest, "^  (no USB adapter is here|USB adapters that are here:)")
 
     def test_the_demo_and_the_log_name_the_dashboard_first(self):
         with subprocess.Popen([harness.PANELGATE, "demo", "--http", "127.0.0.1:0", "--modbus",
@@ -190,6 +200,7 @@ class Files(unittest.TestCase):
             ended = run(command, "-c", str(self.file))
             self.assertEqual(ended.returncode, NO_INPUT)
             self.assertRegex(ended.stderr, rf"^[^\n]*{self.file.name}[^\n]*\n$")
+            self.assertIn("`panelgate demo` needs none, `panelgate init DEVICE -o FILE` writes one", ended.stderr)
 
     def test_an_unknown_key_points_at_itself_and_names_the_nearest(self):
         text = good()

@@ -41,7 +41,7 @@ class Manual(unittest.TestCase):
 
     def test_each_command_with_each_option_is_in_the_page(self):
         page = self.page("panelgate.1")
-        listed = harness.run("help").stdout.split("Subcommands:")[1]
+        listed = harness.run("help").stdout.split("\nExamples:")[0].split("\nBegin:")[1]
         commands = set(re.findall(r"(?m)^  (\w+)", listed)) - {"help", "version"}
         self.assertIn("run", commands)
         for command in commands:
@@ -54,7 +54,7 @@ class Manual(unittest.TestCase):
     def test_each_exit_code_is_in_the_page(self):
         page = self.page("panelgate.1")
         codes = (ROOT / "src/app/commands.hpp").read_text()
-        for code in re.findall(r"= (\d+)", codes):
+        for code in re.findall(r"\bk\w+ = (\d+)", codes):
             self.assertIn(f"\n.It {code}\n", page)
 
     def test_each_key_of_the_configuration_is_in_the_page(self):
@@ -64,12 +64,19 @@ class Manual(unittest.TestCase):
         self.assertGreater(len(keys), 80)
         self.assertEqual([key for key in sorted(keys) if not re.search(rf"\b{key}:", page)], [])
 
-    def completed(self, *words):
-        script = (f"source {self.folder}/panelgate.bash; COMP_WORDS=({' '.join(words)}); "
-                  "COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _panelgate; echo ${COMPREPLY[@]}")
+    def shell(self, *command):
         path = f"{pathlib.Path(harness.PANELGATE).parent}:{os.environ['PATH']}"
-        return subprocess.run(["bash", "-c", script], env={**os.environ, "PATH": path}, text=True,
+        return subprocess.run(command, env={**os.environ, "PATH": path}, text=True,
                               capture_output=True, check=True).stdout.split()
+
+    def completed(self, *words):
+        return self.shell("bash", "-c", f"source {self.folder}/panelgate.bash; COMP_WORDS=({' '.join(words)}); "
+                          "COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _panelgate; echo ${COMPREPLY[@]}")
+
+    def completed_by_zsh(self, *words):
+        return self.shell("zsh", "-fc", "compadd() { shift; print -l -- $@ }; _files() { print files }; "
+                          "_describe() { print -l ${commands%%:*} }; "
+                          f"words=({' '.join(words)}); CURRENT=$#words; source {self.folder}/panelgate.zsh")
 
     def test_bash_completes_commands_options_and_their_values(self):
         self.assertEqual(self.completed("panelgate", "che"), ["check"])
@@ -78,6 +85,39 @@ class Manual(unittest.TestCase):
         self.assertEqual(self.completed("panelgate", "address", "omr"), ["omron-cp2e"])
         file = str(self.folder / "panelgate.y")
         self.assertEqual(self.completed("panelgate", "run", "-c", file), [file + "aml.5"])
+
+    def test_bash_completes_stations_and_points_of_a_running_gateway(self):
+        with harness.demo() as gateway:
+            at = ("--http", f"127.0.0.1:{gateway.http_port()}")
+            self.assertEqual(self.completed("panelgate", "read", *at, "o"), ["oven"])
+            self.assertEqual(self.completed("panelgate", "watch", *at, "oven", "t"), ["temperature"])
+            self.assertIn("--token-file", self.completed("panelgate", "write", *at, "oven", "--to"))
+            if shutil.which("zsh"):
+                self.assertEqual(self.completed_by_zsh("panelgate", "read", *at, "oven", "t"),
+                                 ["temperature", "mode", "files"])
+
+    @unittest.skipUnless(shutil.which("zsh"), "no zsh here")
+    def test_zsh_completes_the_same(self):
+        self.assertLessEqual({"read", "check", "run"}, set(self.completed_by_zsh("panelgate", "c")))
+        self.assertEqual(self.completed_by_zsh("panelgate", "check", "--format", '""'), ["text", "json", "files"])
+        self.assertIn("--simulate", self.completed_by_zsh("panelgate", "run", "--s"))
+        self.assertEqual(self.completed_by_zsh("panelgate", "run", "-c", '""'), ["files"])
+
+    @unittest.skipUnless(shutil.which("fish"), "no fish here")
+    def test_fish_completes_the_same(self):
+        def completed(line):
+            return self.shell("fish", "-c", f"source {self.folder}/panelgate.fish; complete -C '{line}' | cut -f1")
+        self.assertIn("check", completed("panelgate che"))
+        self.assertEqual(completed("panelgate check --format "), ["json", "text"])
+        self.assertIn("--simulate", completed("panelgate run --s"))
+        self.assertEqual(completed("panelgate address omr"), ["omron-cp2e"])
+
+    def test_no_completion_lacks_an_option(self):
+        texts = {shell: (self.folder / f"panelgate.{shell}").read_text() for shell in ("bash", "zsh", "fish")}
+        for option in set(re.findall(r"--([a-z][\w-]+)", harness.run("help", "trace").stdout)):
+            self.assertIn(f"--{option}", texts["bash"])
+            self.assertIn(f"--{option}", texts["zsh"])
+            self.assertIn(f"-l {option}", texts["fish"])
 
 
 if __name__ == "__main__":

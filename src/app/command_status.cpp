@@ -1,0 +1,118 @@
+// status and top: what a running gateway tells of its lines and stations.
+#include <unistd.h>
+#include <cstdlib>
+#include <iostream>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "commands.hpp"
+#include "gateway_client.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/cli/overview.hpp"
+#include "panelgate/cli/table.hpp"
+#include "panelgate/rt/clock.hpp"
+
+namespace panelgate::app {
+
+namespace {
+
+constexpr const char* kHome = "\x1b[H\x1b[2J";  // clears the screen
+
+bool is_coloured() {
+    return cli::wants_colours(::isatty(STDOUT_FILENO) == 1, std::getenv("NO_COLOR"),
+                              std::getenv("TERM"));
+}
+
+/// Asks for what must be there; false, with a message on stderr and `code` set, if it is not.
+bool ask_for(const GatewayClient& gateway, const std::string& path, boost::json::object& into,
+             ExitCode& code) {
+    GatewayAnswer answer = gateway.get(path);
+    if (!answer.is_ok()) {
+        code = gateway.explain(answer);
+        return false;
+    }
+    into = std::move(answer.json);
+    return true;
+}
+
+std::optional<cli::Overview> look(const GatewayClient& gateway, ExitCode& code) {
+    cli::Overview overview;
+    overview.url = gateway.url();
+    boost::json::object lines;
+    if (!ask_for(gateway, "/api/v1/lines", lines, code) ||
+        !ask_for(gateway, "/api/v1/stations", overview.stations, code) ||
+        !ask_for(gateway, "/api/v1/relays", overview.relays, code))
+        return std::nullopt;
+    for (const auto* line : cli::objects_of(lines, "lines")) {
+        boost::json::object all;
+        if (!ask_for(gateway, "/api/v1/lines/" + cli::escaped(cli::text_of(*line, "name")), all,
+                     code))
+            return std::nullopt;
+        overview.lines.push_back(std::move(all));
+    }
+    overview.figures = cli::figures_of(gateway.get("/metrics").body);
+    const GatewayAnswer ready = gateway.get("/readyz");
+    if (ready.status != 200) overview.not_ready = first_line(ready.body + ready.failure);
+    return overview;
+}
+
+/// A screen that is drawn anew each second, also while the gateway is away.
+[[noreturn]] void draw_for_ever(const GatewayClient& gateway, cli::Overview overview) {
+    cli::AllFigures before;
+    double seconds = 0;
+    double asked = rt::wall_seconds();
+    std::string trouble;
+    for (;;) {
+        const cli::AllFigures figures = overview.figures;
+        overview.figures = cli::difference(figures, before);
+        std::cout << kHome + cli::top_text(overview, seconds, is_coloured()) + trouble +
+                         "\nCtrl-C ends it.\n"
+                  << std::flush;
+        if (!std::cout) std::_Exit(kFine);
+        std::this_thread::sleep_for(1s);
+        trouble.clear();
+        const GatewayAnswer there = gateway.get("/readyz");
+        ExitCode code = kFine;
+        auto next = there.status != 0 ? look(gateway, code) : std::nullopt;
+        overview.figures = figures;
+        if (!next) {
+            trouble = '\n' + gateway.reason(there) + '\n';
+            continue;
+        }
+        before = figures;
+        const double now = rt::wall_seconds();
+        seconds = now - std::exchange(asked, now);
+        overview = std::move(*next);
+    }
+}
+
+}  // namespace
+
+ExitCode status(const GatewayOptions& at) {
+    ExitCode code = kFine;
+    const auto gateway = GatewayClient::make(at, code);
+    if (!gateway) return code;
+    const auto overview = look(*gateway, code);
+    if (!overview) return code;
+    std::cout << cli::status_text(*overview, is_coloured());
+    return cli::troubles(*overview).empty() ? kFine : kNotReady;
+}
+
+ExitCode top(const GatewayOptions& at, bool once) {
+    ExitCode code = kFine;
+    const auto gateway = GatewayClient::make(at, code);
+    if (!gateway) return code;
+    auto overview = look(*gateway, code);
+    if (!overview) return code;
+    if (once || ::isatty(STDOUT_FILENO) != 1) {
+        std::cout << cli::top_text(*overview, 0, is_coloured());
+        return kFine;
+    }
+    end_with_signals();
+    draw_for_ever(*gateway, std::move(*overview));
+}
+
+}  // namespace panelgate::app

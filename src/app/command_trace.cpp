@@ -1,0 +1,270 @@
+// trace: the transactions of a running gateway's lines; report: all that it tells, for support.
+#include <fcntl.h>
+#include <unistd.h>
+#include <algorithm>
+#include <cerrno>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <iostream>
+#include <map>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "build_info.hpp"
+#include "commands.hpp"
+#include "gateway_client.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/cli/trace_text.hpp"
+#include "panelgate/rt/clock.hpp"
+
+namespace panelgate::app {
+
+namespace {
+
+constexpr unsigned kMostEntries = 500;  // of a page of a trace
+constexpr auto kBetweenPages = 500ms;
+
+struct TracedLine {
+    std::string path;
+    cli::TraceFilter filter;
+    std::map<unsigned, std::string> names;
+    std::string next{};  ///< sequence number where the next page begins
+};
+
+std::optional<std::vector<std::string>> line_names(const GatewayClient& gateway, ExitCode& code) {
+    const GatewayAnswer answer = gateway.get("/api/v1/lines");
+    if (!answer.is_ok()) {
+        code = gateway.explain(answer);
+        return std::nullopt;
+    }
+    std::vector<std::string> names;
+    for (const auto* line : cli::objects_of(answer.json, "lines"))
+        names.push_back(cli::text_of(*line, "name"));
+    return names;
+}
+
+/// The station that is asked for; "" for the line if there is none such.
+std::optional<cli::Station> station_of(const std::vector<cli::Station>& all,
+                                       const std::string& typed) {
+    const cli::Named named = cli::find_station(all, typed);
+    if (!named.wrong.empty()) {
+        std::cerr << "panelgate: " << named.wrong << '\n';
+        return std::nullopt;
+    }
+    const auto found = std::ranges::find(all, named.name, &cli::Station::name);
+    if (found != all.end()) return *found;
+    const std::size_t colon = named.name.rfind(':');
+    return cli::Station{"", named.name.substr(0, colon),
+                        static_cast<unsigned>(std::stoul(named.name.substr(colon + 1)))};
+}
+
+std::optional<std::vector<TracedLine>> lines_to_trace(const GatewayClient& gateway,
+                                                      const TraceOptions& options, ExitCode& code) {
+    const auto lines = line_names(gateway, code);
+    const auto stations = lines ? all_stations(gateway, code) : std::nullopt;
+    if (!stations) return std::nullopt;
+    code = kNotReady;
+    std::optional<cli::Station> wanted;
+    if (!options.station.empty() && !(wanted = station_of(*stations, options.station)))
+        return std::nullopt;
+    if (!options.line.empty() && std::ranges::find(*lines, options.line) == lines->end()) {
+        std::cerr << "panelgate: there is no line '" << options.line << '\''
+                  << cli::suggestion(options.line, *lines) << '\n';
+        return std::nullopt;
+    }
+    std::vector<TracedLine> traced;
+    for (const std::string& line : *lines) {
+        if (!options.line.empty() && line != options.line) continue;
+        if (wanted && wanted->line != line) continue;
+        TracedLine one{.path = "/api/v1/lines/" + cli::escaped(line) + "/trace",
+                       .filter = {.station = wanted ? wanted->id : 0,
+                                  .name = wanted ? wanted->name : "",
+                                  .errors = options.errors},
+                       .names = {}};
+        for (const cli::Station& station : *stations)
+            if (station.line == line) one.names[station.id] = station.name;
+        traced.push_back(std::move(one));
+    }
+    code = kFine;
+    return traced;
+}
+
+/// What is new on all lines; nothing, with a message on stderr and `code` set, if that cannot be
+/// had.
+std::optional<std::vector<cli::TraceLine>> read_page(const GatewayClient& gateway,
+                                                     std::vector<TracedLine>& lines,
+                                                     ExitCode& code) {
+    std::vector<cli::TraceLine> all;
+    for (TracedLine& line : lines) {
+        const GatewayAnswer answer = gateway.get(
+            line.path + (line.next.empty() ? "?last=" : "?since=" + line.next + "&last=") +
+            std::to_string(kMostEntries));
+        if (!answer.is_ok()) {
+            code = gateway.explain(answer);
+            return std::nullopt;
+        }
+        if (const auto* next = answer.json.if_contains("next")) line.next = cli::value_text(*next);
+        for (auto& one : cli::trace_lines(answer.json, line.filter, line.names))
+            all.push_back(std::move(one));
+    }
+    std::ranges::sort(all, {}, [](const cli::TraceLine& line) { return line.time; });
+    return all;
+}
+
+}  // namespace
+
+ExitCode trace(const GatewayOptions& at, const TraceOptions& options) {
+    ExitCode code = kFine;
+    const auto gateway = GatewayClient::make(at, code);
+    if (!gateway) return code;
+    auto lines = lines_to_trace(*gateway, options, code);
+    if (!lines) return code;
+    if (options.follow) end_with_signals();
+    auto page = read_page(*gateway, *lines, code);
+    if (!page) return code;
+    if (page->size() > options.count)
+        page->erase(page->begin(), page->end() - static_cast<std::ptrdiff_t>(options.count));
+    std::cout << cli::trace_heading();
+    for (;;) {
+        for (const cli::TraceLine& line : *page) std::cout << line.text;
+        std::cout << std::flush;
+        if (!options.follow || !std::cout) return kFine;
+        std::this_thread::sleep_for(kBetweenPages);
+        page = read_page(*gateway, *lines, code);
+        if (!page) return code;
+    }
+}
+
+namespace {
+
+class Report {
+  public:
+    explicit Report(const GatewayClient& gateway) : gateway_(gateway) {}
+
+    std::optional<std::string> make(ExitCode& code) {
+        const auto lines = line_names(gateway_, code);
+        if (!lines) return std::nullopt;
+        add("time", rfc3339(rt::wall_now()));
+        add("gateway", gateway_.url());
+        add("asked_by", build_text());
+        for (const char* name :
+             {"version", "configuration", "reload", "stations", "points", "relays"})
+            ask(name, std::string("/api/v1/") + name);
+        ask("ready", "/readyz");
+        for (const std::string& line : *lines) add_line(line);
+        for (const char* part : {"history", "incidents", "trace"}) {
+            for (const std::string& line : *lines) add_part(part, line);
+        }
+        ask("metrics", "/metrics");
+        for (std::size_t i = 0; i < missing_.size(); ++i)
+            add("missing/" + std::to_string(i + 1), missing_[i]);
+        return gateway_.without_token(cli::report_text(parts_));
+    }
+    const std::vector<std::string>& missing() const { return missing_; }
+
+  private:
+    void add(const std::string& name, std::string text, bool is_json = false) {
+        parts_.push_back({name, std::move(text), is_json});
+    }
+
+    /// A refusal takes nothing from the rest: it is named.
+    GatewayAnswer ask(const std::string& name, const std::string& path) {
+        GatewayAnswer answer = gateway_.get(path);
+        const bool is_readiness = path == "/readyz";
+        if (answer.is_ok() || (is_readiness && answer.status != 0))
+            add(name, answer.body, !answer.json.empty());
+        else
+            missing_.push_back(name + ": " + gateway_.reason(answer));
+        return answer;
+    }
+
+    void add_line(const std::string& line) {
+        ask("lines/" + line, "/api/v1/lines/" + cli::escaped(line));
+    }
+
+    void add_part(const std::string& part, const std::string& line) {
+        const std::string path = "/api/v1/lines/" + cli::escaped(line) + '/' + part;
+        if (part != "incidents") {
+            ask(part + '/' + line, path + (part == "trace" ? "?last=500" : ""));
+            return;
+        }
+        const GatewayAnswer answer = gateway_.get(path);
+        for (const auto* incident : cli::objects_of(answer.json, "incidents")) {
+            const std::string id = cli::value_text(incident->at("id"));
+            ask("incidents/" + line + ' ' + id, path + '/' + id);
+        }
+    }
+
+    const GatewayClient& gateway_;
+    std::vector<cli::ReportPart> parts_;
+    std::vector<std::string> missing_;
+};
+
+/// "panelgate-report-20261126T014245Z.json"
+std::string usual_name() {
+    std::string time = rfc3339(rt::wall_now()).substr(0, 19);
+    std::erase_if(time, [](char c) { return c == '-' || c == ':'; });
+    return "panelgate-report-" + time + "Z.json";
+}
+
+/// Writes a new file that only its owner can read.
+ExitCode write_new(const std::string& file, const std::string& text) {
+    const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    if (fd < 0 && errno == EEXIST) {
+        std::cerr << "panelgate: " << file << " is there already; give another name with -o\n";
+        return kUsage;
+    }
+    bool written = fd >= 0;
+    for (std::size_t done = 0; written && done < text.size();) {
+        const ssize_t now = ::write(fd, text.data() + done, text.size() - done);
+        written = now > 0;
+        if (written) done += static_cast<std::size_t>(now);
+    }
+    if (!written)
+        std::cerr << "panelgate: cannot write " << file << ": " << std::strerror(errno) << '\n';
+    if (fd >= 0) ::close(fd);
+    return written ? kFine : kInternal;
+}
+
+}  // namespace
+
+ExitCode report(const GatewayOptions& at, const std::string& file) {
+    const std::string name = file.empty() ? usual_name() : file;
+    if (name != "-" && ::access(name.c_str(), F_OK) == 0) return write_new(name, "");
+    ExitCode code = kFine;
+    const auto gateway = GatewayClient::make(at, code);
+    if (!gateway) return code;
+    Report report(*gateway);
+    const auto text = report.make(code);
+    if (!text) return code;
+    for (const std::string& one : report.missing())
+        std::cerr << "panelgate: not in the report: " << one << '\n';
+    if (name == "-") {
+        std::cout << *text;
+        return kFine;
+    }
+    code = write_new(name, *text);
+    if (code == kFine)
+        std::cerr << "panelgate: wrote " << name << ", " << text->size() / 1024 + 1
+                  << " KiB: configuration without secrets, state, findings, incidents, traces and "
+                     "metrics\n";
+    return code;
+}
+
+ExitCode names(const GatewayOptions& at, const std::string& station) {
+    std::cerr.setstate(std::ios::failbit);  // a completion says nothing
+    ExitCode code = kFine;
+    const auto gateway = GatewayClient::make(at, code);
+    if (!gateway) return code;
+    const std::string path = station.empty() ? "" : "/" + cli::escaped(station) + "/points";
+    const GatewayAnswer answer = gateway->get("/api/v1/stations" + path, 1s);
+    for (const auto* one : cli::objects_of(answer.json, station.empty() ? "stations" : "points"))
+        std::cout << cli::text_of(*one, "name") << '\n';
+    return answer.is_ok() ? kFine : kNotReady;
+}
+
+}  // namespace panelgate::app

@@ -1,0 +1,223 @@
+#include "gateway_client.hpp"
+
+#include <unistd.h>
+#include <boost/json/parse.hpp>
+#include <boost/json/value.hpp>
+#include <charconv>
+#include <csignal>
+#include <cstddef>
+#include <fstream>
+#include <iostream>
+#include <utility>
+#include <variant>
+
+#include "panelgate/base/network.hpp"
+#include "panelgate/base/text.hpp"
+#include "panelgate/cli/table.hpp"
+
+namespace panelgate::app {
+
+void end_with_signals() {
+    const auto end = [](int) { ::_exit(kFine); };
+    std::signal(SIGINT, end);
+    std::signal(SIGTERM, end);
+}
+
+namespace {
+
+constexpr std::size_t kMostOfAnswer = 64 * 1024 * 1024;  // bytes of an answer
+constexpr std::size_t kMostEvents = 1024 * 1024;  // bytes of a stream, before it is opened anew
+constexpr Duration kStream = 600s;                // the same in time
+
+}  // namespace
+
+std::optional<std::string> token_in(const std::string& file) {
+    if (file.empty()) return "";
+    std::ifstream in(file);
+    std::string line;
+    std::getline(in, line);
+    std::string token(trimmed(std::string_view(line).substr(0, line.find('\r'))));
+    if (!token.empty()) return token;
+    std::cerr << "panelgate: no token can be read from " << file << " (its first line is one)\n";
+    return std::nullopt;
+}
+
+std::string GatewayAnswer::problem() const {
+    const std::string type = cli::text_of(json, "type");
+    return type.substr(type.rfind(':') + 1);
+}
+
+std::optional<GatewayClient> GatewayClient::make(const GatewayOptions& options, ExitCode& code) {
+    const auto found = http_endpoint(options.file, options.http);
+    if (const auto* none = std::get_if<NoHttpEndpoint>(&found)) {
+        std::cerr << "panelgate: " << none->why << '\n';
+        code = none->code;
+        return std::nullopt;
+    }
+    auto token = token_in(options.token_file);
+    if (!token) {
+        code = kNoInput;
+        return std::nullopt;
+    }
+    GatewayClient client;
+    client.endpoint_ = std::get<config::Endpoint>(found);
+    client.token_ = std::move(*token);
+    client.token_file_ = options.token_file;
+    return client;
+}
+
+std::string GatewayClient::url() const {
+    return "http://" + endpoint_text(endpoint_.address, endpoint_.port);
+}
+
+std::string GatewayClient::without_token(std::string text) const {
+    constexpr std::string_view kLeftOut = "(left out)";
+    if (token_.empty()) return text;
+    for (std::size_t at = text.find(token_); at != text.npos;
+         at = text.find(token_, at + kLeftOut.size()))
+        text.replace(at, token_.size(), kLeftOut);
+    return text;
+}
+
+std::string GatewayClient::request(const std::string& verb, const std::string& path,
+                                   const std::string& body) const {
+    std::string made = verb + ' ' + path +
+                       " HTTP/1.1\r\nHost: " + endpoint_text(endpoint_.address, endpoint_.port);
+    if (!token_.empty()) made += "\r\nAuthorization: Bearer " + token_;
+    if (verb != "GET")
+        made +=
+            "\r\nContent-Type: application/json\r\nContent-Length: " + std::to_string(body.size());
+    return made + "\r\nConnection: close\r\n\r\n" + body;
+}
+
+namespace {
+
+GatewayAnswer answer_of(const HttpReply& reply) {
+    GatewayAnswer answer;
+    if (reply.text.empty()) {
+        answer.failure = reply.failure();
+    } else if (!reply.is_http()) {
+        answer.failure = "an answer that is no HTTP: " + first_line(reply.text);
+    } else {
+        const std::string status = reply.status();
+        std::from_chars(status.data(), status.data() + status.size(), answer.status);
+        answer.body = reply.body();
+        boost::system::error_code wrong;
+        boost::json::value value = boost::json::parse(answer.body, wrong);
+        if (!wrong && value.is_object()) answer.json = std::move(value.as_object());
+    }
+    return answer;
+}
+
+GatewayAnswer no_answer(const char* why) {
+    GatewayAnswer answer;
+    answer.failure = why;
+    return answer;
+}
+
+}  // namespace
+
+GatewayAnswer GatewayClient::put_question(const std::string& request, Duration patience) const {
+    return answer_of(ask(endpoint_.address, endpoint_.port, request, patience, kMostOfAnswer,
+                         [](const HttpReply&) { return false; }));
+}
+
+GatewayAnswer GatewayClient::get(const std::string& path, Duration patience) const {
+    return put_question(request("GET", path, ""), patience);
+}
+
+GatewayAnswer GatewayClient::put(const std::string& path, const std::string& body) const {
+    return put_question(request("PUT", path, body), 30s);
+}
+
+std::optional<GatewayAnswer> GatewayClient::follow(
+    const std::string& path, const std::function<bool()>& on_open,
+    const std::function<bool(const cli::Event&)>& on_event) const {
+    cli::EventCutter cutter;
+    std::size_t taken = 0;  // bytes of the body
+    bool opened = false;
+    bool done = false;
+    const auto look = [&](const HttpReply& reply) {
+        const std::string_view body = reply.body();
+        if (body.empty() || !(reply.status() + ' ').starts_with("200 ")) return false;
+        if (!std::exchange(opened, true) && on_open()) return done = true;
+        for (const cli::Event& event : cutter.take(body.substr(taken)))
+            if (on_event(event)) return done = true;
+        taken = body.size();
+        return false;
+    };
+    const HttpReply reply = ask(endpoint_.address, endpoint_.port, request("GET", path, ""),
+                                kStream, kMostEvents, look);
+    if (done) return std::nullopt;
+    GatewayAnswer answer = answer_of(reply);
+    if (answer.is_ok() && reply.error) return no_answer("the connection has ended");
+    return answer;
+}
+
+std::string GatewayClient::reason(const GatewayAnswer& answer) const {
+    if (answer.status == 0) return "no gateway answers at " + url() + ": " + answer.failure;
+    const std::string detail = cli::printable(cli::text_of(answer.json, "detail"));
+    if (answer.status == 401 && token_.empty())
+        return url() + " wants a token: --token-file FILE, whose first line is one";
+    if (answer.status == 401)
+        return url() + " does not take the token in " + token_file_ +
+               (detail.empty() ? "" : ": " + detail);
+    return detail.empty() ? url() + " answers " + std::to_string(answer.status) : detail;
+}
+
+ExitCode GatewayClient::explain(const GatewayAnswer& answer, const std::string& what) const {
+    std::cerr << "panelgate: " << what << reason(answer) << '\n';
+    if (answer.status != 0) return kNotReady;
+    std::cerr << "  (`panelgate run` and `panelgate demo` start one; where another listens: --http "
+                 "ADDR:PORT)\n";
+    return kUnavailable;
+}
+
+std::optional<std::vector<cli::Station>> all_stations(const GatewayClient& gateway,
+                                                      ExitCode& code) {
+    const GatewayAnswer answer = gateway.get("/api/v1/stations");
+    if (!answer.is_ok()) {
+        code = gateway.explain(answer);
+        return std::nullopt;
+    }
+    std::vector<cli::Station> all;
+    for (const auto* one : cli::objects_of(answer.json, "stations"))
+        all.push_back({cli::text_of(*one, "name"), cli::text_of(*one, "line"),
+                       static_cast<unsigned>(cli::number_of(*one, "id").value_or(0))});
+    return all;
+}
+
+std::optional<GatewayPlace> find_place(const GatewayClient& gateway, const cli::Place& typed,
+                                       ExitCode& code) {
+    const auto all = all_stations(gateway, code);
+    if (!all) return std::nullopt;
+    const cli::Named station = cli::find_station(*all, typed.station);
+    if (!station.wrong.empty()) {
+        std::cerr << "panelgate: " << station.wrong << '\n';
+        code = kNotReady;
+        return std::nullopt;
+    }
+    GatewayPlace found;
+    found.station = station.name;
+    found.place = typed.place;
+    const GatewayAnswer listed =
+        gateway.get("/api/v1/stations/" + cli::escaped(station.name) + "/points");
+    for (const auto* point : cli::objects_of(listed.json, "points")) {
+        found.points.push_back(cli::text_of(*point, "name"));
+        if (found.points.back() == typed.place) found.type = cli::text_of(*point, "type");
+    }
+    found.target = cli::target_of(station.name, typed.place, found.points);
+    return found;
+}
+
+ExitCode explain_place(const GatewayClient& gateway, const GatewayPlace& place,
+                       const GatewayAnswer& answer, const std::string& verb) {
+    if (answer.status == 0 || answer.status == 401) return gateway.explain(answer);
+    std::string why = verb == "read" ? gateway.reason(answer) : cli::not_written_text(answer.json);
+    if (answer.problem() == "unknown-notation")
+        why = cli::unknown_place(why, place.place, place.points);
+    std::cerr << "panelgate: " << place.target.shown << " was not " << verb << ": " << why << '\n';
+    return kNotReady;
+}
+
+}  // namespace panelgate::app

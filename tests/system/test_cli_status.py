@@ -1,0 +1,161 @@
+"""status, top, trace and report of a running gateway; what is not well is named."""
+import json
+import os
+import pathlib
+import pty
+import signal
+import stat
+import subprocess
+import tempfile
+import unittest
+
+import config
+import harness
+
+REFUSED, USAGE, UNAVAILABLE, INTERNAL = 1, 64, 69, 70
+
+
+class State(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.gateway = harness.demo()
+        cls.addClassCleanup(cls.gateway.__exit__, None, None, None)
+        cls.http = f"127.0.0.1:{cls.gateway.http_port()}"
+        cls.gateway.values("/api/v1/stations/press/devices/UW0")
+
+    def ask(self, *arguments, **options):
+        return harness.run(*arguments, "--http", self.http, **options)
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def test_a_panel_that_is_silent_is_not_well(self):
+        well = self.ask("status")
+        self.assertEqual((well.returncode, well.stderr), (0, ""), well.stdout)
+        self.assertRegex(well.stdout, r"(?m)^LINE +STATE +LOAD")
+        self.assertRegex(well.stdout, r"(?m)^floor1 +up +[\d.]+ % ")
+        self.assertRegex(well.stdout, r"(?m)^press +floor1/31 +autonics-gplp-s +online +[\d.]+ s ago +[\d.]+ ms +0 of \d+$")
+        self.assertTrue(well.stdout.endswith("\nall is well\n"))
+        self.assertNotIn("\x1b", well.stdout)
+        self.gateway.rest("PUT", "/api/v1/simulator/mixer", {"dead": 1})
+        try:
+            for _ in range(4):
+                self.gateway.get("/api/v1/stations/mixer/devices/UW0")
+            told = self.ask("status")
+            self.assertEqual(told.returncode, REFUSED, told.stdout)
+            self.assertRegex(told.stdout, r"not all is well:\n  mixer is offline, its last answer is")
+            errors = self.ask("trace", "--errors", "--station", "mixer").stdout
+            self.assertRegex(errors, r"(?m)^\S+Z +mixer +\w+ +timeout ")
+            self.assertNotIn(" ok ", errors)
+        finally:
+            self.gateway.rest("PUT", "/api/v1/simulator/mixer", {"dead": 0})
+
+    def on_a_terminal(self, *arguments, **env):
+        """What a command draws, up to two screens or its end."""
+        ours, theirs = pty.openpty()
+        with os.fdopen(ours, "rb", buffering=0) as screen:
+            process = subprocess.Popen([harness.PANELGATE, *arguments, "--http", self.http], stdout=theirs,
+                                       stdin=subprocess.DEVNULL, env={**os.environ, "TERM": "xterm", **env})
+            os.close(theirs)
+            drawn = b""
+            try:
+                while drawn.count(b"Ctrl-C ends it.") < 2 and (more := screen.read(4096)):
+                    drawn += more
+            except OSError:  # its end
+                pass
+            process.send_signal(signal.SIGINT)
+            return process.wait(harness.PATIENCE), drawn.decode()
+
+    def test_colours_are_for_terminals_that_want_them(self):
+        self.assertIn("\x1b[32monline\x1b[0m", self.on_a_terminal("status")[1])
+        self.assertNotIn("\x1b", self.on_a_terminal("status", NO_COLOR="1")[1])
+        self.assertNotIn("\x1b", self.on_a_terminal("status", TERM="dumb")[1])
+
+    def test_top_draws_each_second_until_ctrl_c(self):
+        code, drawn = self.on_a_terminal("top", NO_COLOR="1")
+        self.assertEqual(code, 0, drawn)
+        screens = drawn.split("\x1b[H\x1b[2J")[1:]
+        self.assertIn("figures since its start", screens[0])
+        self.assertRegex(screens[1], r"figures of the last [12]\.\d s(.|\r|\n)*floor1 +up +[\d.]+ % .* [\d.]+ ms")
+
+    def test_top_looks_once_on_a_pipe(self):
+        for arguments in (("top",), ("top", "--once")):
+            looked = self.ask(*arguments)
+            self.assertEqual(looked.returncode, 0, looked.stderr)
+            for heading in ("LINE", "CLIENT", "SLOWEST"):
+                self.assertRegex(looked.stdout, rf"(?m)^{heading} ")
+            self.assertRegex(looked.stdout, r"(?m)^floor1 +up +[\d.]+ % +\[[# ]{20}\]")
+
+    def test_a_trace_has_the_last_transactions(self):
+        self.gateway.values("/api/v1/stations/press/devices/UW0")
+        text = self.ask("trace", "--station", "floor1/31", "--count", "2").stdout
+        lines = text.splitlines()
+        self.assertTrue(lines[0].startswith("TIME "))
+        self.assertLessEqual(len(lines), 3)
+        self.assertRegex(lines[-1], r"^\d{4}-\d\d-\d\dT[\d:.]+Z press +(read|poll) +ok +[\d.]+ ms  .*> 1F .*  < 1F ")
+        for typed, told in ((("--line", "flor1"), "did you mean 'floor1'?"),
+                            (("--station", "presss"), "did you mean 'press'?")):
+            ended = self.ask("trace", *typed)
+            self.assertEqual((ended.returncode, ended.stdout), (REFUSED, ""))
+            self.assertIn(told, ended.stderr)
+
+    def test_a_trace_is_followed_until_a_signal(self):
+        with harness.Program("trace", "--follow", "--count", "1", "--http", self.http) as following:
+            following.out.wait_for("Z ", 3)
+            self.assertEqual(following.stop(signal.SIGINT), 0)
+
+    def test_a_report_holds_all_that_there_is_and_writes_over_nothing(self):
+        file = self.folder / "report.json"
+        written = self.ask("report", "-o", str(file))
+        self.assertEqual((written.returncode, written.stdout), (0, ""), written.stderr)
+        self.assertIn(f"wrote {file}", written.stderr)
+        self.assertEqual(stat.S_IMODE(file.stat().st_mode), 0o600)
+        report = json.loads(file.read_text())
+        self.assertLessEqual({"version", "configuration", "lines", "stations", "points", "relays", "history",
+                              "trace", "metrics", "ready", "time"}, set(report))
+        self.assertNotIn("missing", report)
+        self.assertIn("findings", report["lines"]["floor1"])
+        self.assertIn("panelgate_requests_total", report["metrics"])
+        before = file.read_bytes()
+        again = self.ask("report", "-o", str(file))
+        self.assertEqual((again.returncode, again.stderr.count("\n")), (USAGE, 1))
+        self.assertEqual(file.read_bytes(), before)
+        self.assertEqual(self.ask("report", "-o", str(self.folder / "no/report.json")).returncode, INTERNAL)
+        named = self.ask("report", cwd=self.folder)
+        self.assertEqual(named.returncode, 0, named.stderr)
+        self.assertEqual(len(list(self.folder.glob("panelgate-report-*Z.json"))), 1)
+
+    def test_names_are_printed_for_the_shell(self):
+        self.assertEqual(self.ask("names").stdout.split(), ["press", "mixer", "io", "oven", "filler"])
+        self.assertEqual(self.ask("names", "oven").stdout.split(), ["temperature", "mode"])
+        self.assertEqual(self.ask("names", "nobody").stderr, "")
+
+
+class Secrets(unittest.TestCase):
+    def test_a_report_has_neither_tokens_nor_passwords(self):
+        with tempfile.TemporaryDirectory() as folder:
+            token = pathlib.Path(folder) / "token"
+            token.write_text("0123456789abcdef\n")
+            token.chmod(0o600)
+            http = f"{config.FREE_PORT}, anonymous: none, tokens: [{{name: ops, role: operator, file: {token}}}]"
+            with harness.configured(config.gateway(config.line(), http=http)) as gateway:
+                at = ("--http", f"127.0.0.1:{gateway.http_port()}")
+                refused = harness.run("status", *at)
+                self.assertEqual(refused.returncode, REFUSED)
+                self.assertIn("--token-file", refused.stderr)
+                made = harness.run("report", "-o", "-", *at, "--token-file", str(token))
+                self.assertEqual(made.returncode, 0, made.stderr)
+                self.assertNotIn("0123456789abcdef", made.stdout)
+                self.assertIn("configuration", json.loads(made.stdout))
+
+    def test_without_a_gateway_there_is_nothing_to_show(self):
+        for command in ("status", "top", "trace", "report"):
+            ended = harness.run(command, "--http", "127.0.0.1:9", cwd=os.path.dirname(harness.PANELGATE))
+            self.assertEqual((ended.returncode, ended.stdout), (UNAVAILABLE, ""), command)
+            self.assertIn("no gateway answers at http://127.0.0.1:9", ended.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
