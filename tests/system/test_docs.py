@@ -59,7 +59,7 @@ BASE = {"lines": """lines:
       - {id: 5, name: oven, profile: panasonic-gt}
 """, "modbus_tcp": "modbus_tcp: [{listen: 127.0.0.1:1502}]\n",
         "http": "http: {listen: 127.0.0.1:8080}\n"}
-HELD = r"/(?:run/secrets|run/credentials/[\w.]+|etc/credstore|etc/panelgate)/[\w./-]+"  # of the machine
+HELD = r"(?:\$\{\w+:-/etc/credstore\}|/run/secrets|/run/credentials/[\w.]+|/etc/credstore|/etc/panelgate)/[\w./-]+"
 
 
 def as_station(block):
@@ -118,8 +118,8 @@ class Reader:
         return block.commands()
 
     def check(self, name, text):
-        def made(found):
-            file = self.folder / found[0].lstrip("/")
+        def made(found):  # what the machine holds, such as tokens, is in the page's folder
+            file = self.folder / re.sub(r"[${}:]", "", found[0]).lstrip("/")
             file.parent.mkdir(parents=True, exist_ok=True)
             if not file.exists() and not re.search(r"profiles\b", found[0]):
                 file.write_text("0123456789abcdef0123456789abcdef\n")
