@@ -1,4 +1,5 @@
 """A page of Markdown, as its tests see it: blocks with the marks before their fences, and prose."""
+import collections
 import dataclasses
 import re
 
@@ -69,11 +70,13 @@ class Page:
     def anchors(self):
         """What a link may have behind '#', by GitHub's rules."""
         found = []
+        seen = collections.Counter()
         for _, line in self.prose:
             if heading := re.match(r"#{1,6} (.+)", line):
                 shown = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading[1].strip())
                 slug = re.sub(r"[^\w\- ]", "", shown.lower()).replace(" ", "-")
-                found.append(f"{slug}-{found.count(slug)}" if slug in found else slug)
+                found.append(f"{slug}-{seen[slug]}" if seen[slug] else slug)
+                seen[slug] += 1
         return found + re.findall(r"<a (?:id|name)=\"([^\"]+)\"", self.text)
 
 

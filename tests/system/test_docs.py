@@ -209,6 +209,41 @@ def until_read(demo):
                 return
 
 
+class Itself(unittest.TestCase):
+    """What is planted is found."""
+
+    def test_marks_belong_to_the_next_fence(self):
+        page = Page("<!-- serial: 9600 7E2 -->\n<!-- test: config-part mqtt -->\n```yaml\na: 1\n```\n"
+                    "<!-- not run: no broker -->\n\n- x\n  ```sh\n  a \\\n    b\n  ```\n")
+        first, second = page.blocks
+        self.assertEqual((first.mark, first.argument, first.serial, first.line),
+                         ("config-part", "mqtt", "9600 7E2", 3))
+        self.assertEqual((second.mark, second.commands()), ("", ["a b"]))  # the empty line parts them
+
+    def test_a_block_that_says_what_is_not_is_found(self):
+        for text in ("<!-- test: program -->\n```sh\npanelgate frobnicate\n```\n",
+                     "<!-- test: program-1 -->\n```sh\npanelgate --version\n```\n",
+                     "<!-- test: program -->\n```sh\npanelgate --version\n```\n"
+                     "<!-- test: output -->\n```text\npanelgate ...\nand more\n```\n",
+                     "<!-- test: program -->\n```sh\ntrue\n```\n",
+                     "<!-- test: config -->\n```yaml\nlines: 7\n```\n",
+                     "<!-- test: station -->\n```yaml\n- {id: 248}\n```\n",
+                     "<!-- test: config-part mqtt -->\n```yaml\nlog: {level: info}\n```\n",
+                     "<!-- test: script -->\n```sh\ndeploy/nothing.sh\n```\n"):
+            with self.subTest(text=text), tempfile.TemporaryDirectory() as folder:
+                reader = Reader(Page(text), folder, None)
+                with self.assertRaises(AssertionError):
+                    for block in reader.page.blocks:
+                        reader.follow(block)
+
+    def test_prose_is_cut_into_paragraphs_links_and_anchors(self):
+        page = Page("# A `b`, c\n\none\ntwo\n\n- three\n- [four](x.md#y 'z') `[no](no)`\n\n| five |\n"
+                    "```text\n[no](no)\n```\n## A b c\n## A b c\n")
+        self.assertEqual([text.split()[-1] for _, text in page.paragraphs()], ["two", "three", "`[no](no)`"])
+        self.assertEqual(page.links(), ["x.md#y"])
+        self.assertEqual(page.anchors(), ["a-b-c", "a-b-c-1", "a-b-c-2"])
+
+
 class Words(unittest.TestCase):
     def test_ways_arrive(self):
         for name, page in PAGES.items():
