@@ -14,20 +14,20 @@ import unittest
 
 import harness
 from harness import ROOT
+from markdown import Page
 
 README = (ROOT / "README.md").read_text()
-BLOCKS = re.findall(r"(?ms)^(?:<!-- test: (\S+) -->\n)?```(\w*)\n(.*?)^```$", README)
+PAGE = Page(README)
 
 
 def blocks(mark):
-    found = [text for marked, _, text in BLOCKS if marked == mark]
+    found = PAGE.marked(mark)
     assert found, f"README.md has no block '{mark}'"
     return found
 
 
 def commands(mark):
-    lines = [line for text in blocks(mark) for line in text.splitlines()]
-    return [line for line in lines if line and not line.startswith("#")]
+    return [line for block in blocks(mark) for line in block.commands()]
 
 
 class Readme(unittest.TestCase):
@@ -38,8 +38,8 @@ class Readme(unittest.TestCase):
         return done.stdout
 
     def test_every_block_of_commands_and_yaml_is_tested(self):
-        self.assertEqual([text for mark, kind, text in BLOCKS
-                          if kind in ("sh", "yaml") and not mark], [])
+        self.assertEqual([block.line for block in PAGE.blocks
+                          if block.kind in ("sh", "yaml") and not block.mark], [])
 
     def test_it_is_short(self):
         self.assertLessEqual(len(README.splitlines()), 215)
@@ -73,6 +73,7 @@ class Readme(unittest.TestCase):
     def test_its_configuration_is_valid_and_its_sample_errors_are_exact(self):
         [good] = blocks("config")
         [expected] = blocks("config-errors")
+        good = good.text
         bad = good.replace("baud:", "bauds:").replace("500ms", "500")
         with tempfile.TemporaryDirectory() as folder:
             (pathlib.Path(folder) / "good.yaml").write_text(good)
@@ -80,7 +81,7 @@ class Readme(unittest.TestCase):
             checked = harness.run("check", "-c", "good.yaml", cwd=folder)
             self.assertEqual(checked.returncode, 0, checked.stderr)
             checked = harness.run("check", "-c", "panelgate.yaml", cwd=folder)
-            self.assertEqual((checked.returncode, checked.stderr), (78, expected))
+            self.assertEqual((checked.returncode, checked.stderr), (78, expected.text))
 
 
 if __name__ == "__main__":
