@@ -1,6 +1,7 @@
 #include "panelgate/arbiter/outstanding.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "panelgate/modbus/function.hpp"
@@ -47,8 +48,34 @@ bool OutstandingReplies::has_other_function(std::uint8_t function) const {
 }
 
 void OutstandingReplies::close_before(TimePoint sent, TimePoint connected) {
-    std::erase_if(entries_,
-                  [&](const Entry& one) { return one.sent < sent && one.sent >= connected; });
+    std::erase_if(entries_, [&](Entry& one) {
+        const bool is_before = one.sent < sent && one.sent >= connected;
+        if (is_before) closed_.push_back(std::move(one));
+        return is_before;
+    });
+    while (closed_.size() > kMost) closed_.pop_front();
+}
+
+void OutstandingReplies::lapse() {
+    std::ranges::move(entries_, std::back_inserter(closed_));
+    entries_.clear();
+    while (closed_.size() > kMost) closed_.pop_front();
+}
+
+bool OutstandingReplies::fits_closed(ByteView reply, TimePoint open, ByteView but) const {
+    return std::ranges::any_of(closed_, [&](const Entry& one) {
+        return one.sent > open && !std::ranges::equal(one.pdu, but) &&
+               modbus::answers(one.pdu, reply);
+    });
+}
+
+OutstandingReplies::Entry OutstandingReplies::take_closed(ByteView reply, TimePoint open) {
+    const auto found = std::ranges::find_if(closed_, [&](const Entry& one) {
+        return one.sent > open && modbus::answers(one.pdu, reply);
+    });
+    Entry taken = std::move(*found);
+    closed_.erase(found);
+    return taken;
 }
 
 void OutstandingReplies::close(ByteView reply, TimePoint connected, bool asked) {

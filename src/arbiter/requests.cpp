@@ -51,6 +51,7 @@ Claim OutstandingRequests::claim_of(TimePoint now, ByteView pdu) const {
         return Claim::duplicate;  // the outstanding reply still comes
     if (replies_.fits(pdu)) return Claim::late;
     if (duplicate) return Claim::duplicate;
+    if (replies_.fits_closed(pdu, now - kClosedMemory * timeout_)) return Claim::late;
     return duplicates_.is_second(now, pdu) ? Claim::second : Claim::unasked;
 }
 
@@ -70,7 +71,8 @@ TimePoint OutstandingRequests::surely_answered(TimePoint started, ByteView reply
 }
 
 void OutstandingRequests::on_asked(TimePoint now, const Group& group, bool in_transit) {
-    if (now >= rested() && !in_transit) replies_.clear();
+    if (now >= rested() && !in_transit) replies_.lapse();
+    if (disordered_at_ && now > *disordered_at_ + kForgetDisorder) disordered_at_.reset();
     if (group.span && !group.distinct_length) last_read_ = group.request;
 }
 
@@ -143,14 +145,14 @@ void OutstandingRequests::settle(TimePoint now, const Attempt& attempt) {
         rest_is_over(now + duplicates_.take_doubt());
     } else if (replies_.fits(attempt.reply())) {
         // Each attempt may have been answered with it, this one too.
-        replies_.close(attempt.reply(), connected_, true);
+        close(attempt.reply(), true);
         replies_.add(sent, group.request.pdu());
         rest(now);
     } else if (now < again_until_ && late_.worst() > Duration::zero()) {
         // It may be the damaged reply resent, and the reply to this attempt is late.
         on_unanswered(now, group.request.pdu(), sent);
     } else {
-        replies_.close_before(sent, connected_);
+        if (!disordered_at_) replies_.close_before(sent, connected_);
         not_before_ = std::max(not_before_, now + duplicates_.take_doubt());
         if (!any()) until_ = {};
     }
@@ -183,6 +185,7 @@ OutstandingRequests::Heard OutstandingRequests::on_unsolicited(TimePoint now, By
         not_before_ = std::max(not_before_, duplicates_.rest_until());
         return heard;
     }
+    if (!replies_.fits(pdu)) return on_disorder(now, pdu);
     // The oldest one whose reply could still come: an older one would overstate the lateness.
     const OutstandingReplies::Entry answered = *replies_.oldest(pdu, now - latest_reply());
     const TimePoint due = answered.sent + timeout_;
@@ -195,7 +198,7 @@ OutstandingRequests::Heard OutstandingRequests::on_unsolicited(TimePoint now, By
     if (may_be_duplicate) {
         duplicates_.on_ambiguous(now, pdu);
     } else {
-        replies_.close(pdu, connected_, asked && modbus::exception_of(pdu));
+        close(pdu, asked && modbus::exception_of(pdu));
     }
     heard.settled = !any();
     // Later ones are still to come.
@@ -203,6 +206,29 @@ OutstandingRequests::Heard OutstandingRequests::on_unsolicited(TimePoint now, By
     duplicates_.on_reply(now, answered.pdu, Bytes(pdu.begin(), pdu.end()));
     if (heard.settled) rest_is_over(now + duplicates_.settle_time());
     return heard;
+}
+
+/// An earlier request is answered after a later one.
+OutstandingRequests::Heard OutstandingRequests::on_disorder(TimePoint now, ByteView pdu) {
+    disordered_at_ = now;
+    const auto answered = replies_.take_closed(pdu, now - kClosedMemory * timeout_);
+    Heard heard;
+    heard.claim = Claim::late;
+    heard.lateness = std::max(now - answered.sent - timeout_, Duration::zero());
+    if (heard.lateness > Duration::zero()) late_.on_late(heard.lateness);
+    drained_at_ = now + latest_reply();
+    duplicates_.on_reply(now, answered.pdu, Bytes(pdu.begin(), pdu.end()));
+    return heard;
+}
+
+/// This reply came: closes the request that it answers, and those that left before, if it serves in
+/// order.
+void OutstandingRequests::close(ByteView reply, bool asked) {
+    if (disordered_at_) {
+        replies_.take(reply);
+    } else {
+        replies_.close(reply, connected_, asked);
+    }
 }
 
 void OutstandingRequests::on_damaged_bytes(TimePoint now, std::uint8_t id, ByteView bytes) {

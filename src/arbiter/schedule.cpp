@@ -205,15 +205,13 @@ void Schedule::apply(const Settings& settings) {
 TimePoint Schedule::ready_at(const Stations& stations, const Job& job) const {
     if (job.station == kBroadcast) return {};
     const Station* station = stations.find(job.station);
-    if (station == nullptr)
-        return stations.broadcasts().over(job.request,
-                                          stations.settings(job.station).response_timeout);
+    if (station == nullptr) return stations.broadcasts_over(job.station, job.request);
     // A write that its echo could confirm is preceded by a read, which may be any.
     const bool is_learned = echo_known_ || job.request.is_read();
     const OutstandingRequests& book = station->requests();
     TimePoint clear = is_learned ? book.clear_at(job.request) : book.rested();
     if (can_prove(*station)) clear = std::min(clear, book.clear_at(book.proof()));
-    return std::max({clear, stations.broadcasts().over(job.request, station->broadcast_window()),
+    return std::max({clear, stations.broadcasts_over(job.station, job.request),
                      stations.throttled_until(job.station)});
 }
 
@@ -221,7 +219,7 @@ TimePoint Schedule::ready_at(const Stations& stations, const Job& job) const {
 TimePoint Schedule::repeat_from(const Group& group, const Stations& stations) const {
     const Station& station = *stations.find(group.station);
     return std::max(station.requests().clear_at(group.request, true),
-                    stations.broadcasts().over(group.request, station.broadcast_window()));
+                    stations.broadcasts_over(group.station, group.request));
 }
 
 /// On a connection that may delay outstanding requests, more is sent only while the station is seen

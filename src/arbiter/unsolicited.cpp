@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <optional>
 #include <utility>
 
 #include "panelgate/modbus/function.hpp"
@@ -38,10 +39,11 @@ Part part_of(Claim kind) {
     std::abort();
 }
 
-/// A reply to a recent broadcast, from a panel that should be silent.
-bool answers_broadcast(TimePoint now, ByteView adu, const Stations& stations) {
-    return stations.broadcasts().answered_by(now, modbus::pdu_of(adu),
-                                             stations.latest_reply(adu[0]));
+/// How long after a recent broadcast this reply to it came, from a panel that should be silent;
+/// empty: it is none.
+std::optional<Duration> delay_behind_broadcast(TimePoint now, ByteView adu,
+                                               const Stations& stations) {
+    return stations.broadcasts().delay_of(now, modbus::pdu_of(adu));
 }
 
 }  // namespace
@@ -73,7 +75,8 @@ Part UnsolicitedFrames::judge(TimePoint now, const Unused& part, const Stations&
     const bool explained =
         station != nullptr &&
         station->requests().claim_of(now, modbus::pdu_of(part.bytes)) != Claim::unasked;
-    if (!explained && answers_broadcast(now, part.bytes, stations)) return Part::broadcast_reply;
+    if (!explained && delay_behind_broadcast(now, part.bytes, stations))
+        return Part::broadcast_reply;
     return station == nullptr ? Part::unknown : Part::unasked;
 }
 
@@ -85,7 +88,7 @@ void UnsolicitedFrames::note(TimePoint now, const std::vector<Unused>& parts, bo
         if (what != Part::unasked) {
             outbox.on_unsolicited(now, part, what, quiet.station());
             if (what == Part::damaged) stations.on_damaged(heard_at, part.bytes);
-            if (what == Part::broadcast_reply) stations.on_broadcast_answered(part.station);
+            if (what == Part::broadcast_reply) learn_of_broadcasts(heard_at, part, stations);
             if (what == Part::damaged && idle) stations.on_trail(heard_at, replied_);
             if (what == Part::request) foreign_requests_.on_heard(heard_at, part.bytes);
             if (what == Part::request) let_reply_pass(now, part.bytes, stations, quiet);
@@ -103,6 +106,12 @@ void UnsolicitedFrames::note(TimePoint now, const std::vector<Unused>& parts, bo
         }
         if (heard.settled) quiet.lift(now, part.station);
     }
+}
+
+void UnsolicitedFrames::learn_of_broadcasts(TimePoint now, const Unused& part, Stations& stations) {
+    const bool refused = modbus::exception_of(modbus::pdu_of(part.bytes)).has_value();
+    if (const auto delay = delay_behind_broadcast(now, part.bytes, stations))
+        stations.on_broadcast_answered(part.station, *delay, refused);
 }
 
 bool UnsolicitedFrames::answers_other_master(TimePoint now, ByteView adu) const {
@@ -127,7 +136,7 @@ void UnsolicitedFrames::let_reply_pass(TimePoint now, ByteView request, const St
 bool UnsolicitedFrames::is_wrong_reply(TimePoint now, ByteView adu,
                                        const Stations& stations) const {
     if (std::ranges::equal(adu, last_frame_) || is_request(adu) ||
-        answers_broadcast(now, adu, stations) || answers_other_master(now, adu))
+        delay_behind_broadcast(now, adu, stations) || answers_other_master(now, adu))
         return false;
     const Station* station = stations.find(adu[0]);
     if (station == nullptr) return false;

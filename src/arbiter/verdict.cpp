@@ -220,6 +220,7 @@ Arbiter::Take Arbiter::judge_reply(TimePoint now, const Station& station, bool e
     const Group& group = attempt.group();
     const Bytes& reply = attempt.reply();
     const OutstandingRequests& book = station.requests();
+    const bool slow = attempt.first_sign(now) > station.usual(stations_.slowest());
     const bool refusal = modbus::exception_of(reply).has_value();
     const bool first = !attempt.had_candidate();
     const bool is_early = early && !settings_.paced && pace_.believed();
@@ -236,6 +237,8 @@ Arbiter::Take Arbiter::judge_reply(TimePoint now, const Station& station, bool e
          Take::reject},
         // P1: the request cannot have arrived yet.
         {book.is_duplicate(now, attempt, is_early && attempt.replied_too_early()), Take::reject},
+        // P1: later than the station has ever answered, it may be to an earlier request after all.
+        {slow && book.may_answer_closed(now, reply, group.request), Take::reject},
         // P8: a write's confirmation that is sooner than any answer.
         {attempt.may_be_its_echo() && first &&
              (is_early || station.is_far_too_quick(attempt.first_sign(now), stations_.quickest())),

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -17,7 +18,9 @@ namespace panelgate::arbiter {
 
 /// The requests to one station whose replies may still come (P1), oldest first. Normally they are
 /// identical; on a transport that may stall there may also be the requests that were to prove it.
-/// Panels serve in order: a reply that fits several belongs to the oldest. Pure.
+/// Panels serve in order: a reply that fits several belongs to the oldest, and one to a later
+/// request closes the earlier ones. What was closed so is remembered: its reply may still come from
+/// a panel that does not. Pure.
 class OutstandingReplies {
   public:
     static constexpr std::size_t kMost = 16;  ///< the oldest is forgotten beyond that
@@ -30,6 +33,8 @@ class OutstandingReplies {
     bool empty() const { return entries_.empty(); }
     std::size_t size() const { return entries_.size(); }
     void clear() { entries_.clear(); }
+    /// None can be answered any more, as far as is known of its station.
+    void lapse();
     void add(TimePoint sent, const Bytes& pdu);
     /// Removes the oldest. Must not be empty.
     void pop() { entries_.pop_front(); }
@@ -62,9 +67,17 @@ class OutstandingReplies {
     const Entry* oldest(ByteView reply, TimePoint open) const;
     /// Removes the oldest that this reply may answer and returns its PDU; empty if none fits.
     Bytes take(ByteView reply);
+    /// True if this reply may answer one that was closed by a later request's answer, or that has
+    /// lapsed, and that left later than `open`.
+    bool fits_closed(ByteView reply, TimePoint open) const { return fits_closed(reply, open, {}); }
+    /// ... but for requests that equal `but`.
+    bool fits_closed(ByteView reply, TimePoint open, ByteView but) const;
+    /// Removes and returns the first of those. fits_closed() must be true.
+    Entry take_closed(ByteView reply, TimePoint open);
 
   private:
     PoolDeque<Entry> entries_;
+    PoolDeque<Entry> closed_;  ///< by the order in which stations serve, or by time
 };
 
 /// What is known of a transport that may delay frames and deliver them later (RTU over TCP). An
@@ -135,25 +148,32 @@ class ReconnectState {
 class BroadcastReplies {
   public:
     static constexpr std::size_t kBroadcasts = 16;  ///< that are remembered
+    static constexpr Duration kLongest = 5s;        ///< a later frame is no answer to one
 
     void on_sent(TimePoint sent, ByteView request) {
         Sent& oldest = last_[next_++ % kBroadcasts];
         oldest = {sent, Bytes(request.begin(), request.end()), modbus::normal_write_reply(request)};
     }
-    /// True if this frame may answer one of them; `window`: how long its station may take.
-    bool answered_by(TimePoint now, ByteView reply, Duration window) const {
-        return std::ranges::any_of(last_, [&](const Sent& one) {
-            return !one.request.empty() && now < one.at + window &&
-                   modbus::answers(one.request, reply);
-        });
+    /// How long after the last one that this frame may answer it has come; empty: it answers none.
+    std::optional<Duration> delay_of(TimePoint now, ByteView reply) const {
+        std::optional<Duration> delay;
+        for (const Sent& one : last_) {
+            if (one.request.empty() || now >= one.at + kLongest) continue;
+            if (!modbus::answers(one.request, reply)) continue;
+            delay = std::min(delay.value_or(kLongest), now - one.at);
+        }
+        return delay;
     }
     /// Time from which no reply to a broadcast can be taken for the reply to `request`. `window`:
-    /// how long after a broadcast its station may answer it.
-    TimePoint over(const modbus::Request& request, Duration window) const {
+    /// how long after a broadcast its station may answer it; `refuses`: also by an exception, which
+    /// any request of the same function may have.
+    TimePoint over(const modbus::Request& request, Duration window, bool refuses = false) const {
         TimePoint over{};
         if (request.is_read()) return over;
         for (const Sent& one : last_) {
-            if (!one.reply.empty() && modbus::answers(request.pdu(), one.reply))
+            if (one.reply.empty()) continue;
+            const bool same = refuses && one.request[0] == request.function();
+            if (same || modbus::answers(request.pdu(), one.reply))
                 over = std::max(over, one.at + window);
         }
         return over;

@@ -47,11 +47,12 @@ class OutstandingRequests {
     /// Time from which this request may be sent. One with another function, length or address is
     /// unambiguous and need not wait.
     TimePoint clear_at(const modbus::Request& request, bool again = false) const {
-        if (again && (request.pdu() == damaged_pdu_ || replies_.is_only(request.pdu()))) return {};
-        return is_ambiguous(request, again) ? rested() : not_before_;
+        if (again && (request.pdu() == damaged_pdu_ || replies_.is_only(request.pdu())))
+            return drained_at_;
+        return std::max(drained_at_, is_ambiguous(request, again) ? rested() : not_before_);
     }
     /// Time from which any request may be sent.
-    TimePoint rested() const { return std::max(not_before_, until_); }
+    TimePoint rested() const { return std::max({not_before_, until_, drained_at_}); }
     /// True if only this request is outstanding, or none.
     bool is_only(const modbus::Request& request) const { return replies_.is_only(request.pdu()); }
     /// How long after a request has left its reply may still come.
@@ -60,8 +61,11 @@ class OutstandingRequests {
     /// How long after a broadcast the station may answer it, which is wrong: its longest usual
     /// time; if it has done so, the same window as for any reply.
     Duration broadcast_window(Duration usual) const {
-        return answers_broadcasts_ ? latest_reply() : usual + late_.worst();
+        return answers_broadcasts_ ? std::max(latest_reply(), broadcast_delay_ * 5 / 4 + 100ms)
+                                   : usual + late_.worst();
     }
+    /// True if it has answered one with an exception.
+    bool refuses_broadcasts() const { return refuses_broadcasts_; }
     /// True if it has answered every request since the line was reopened: then no reply is in
     /// transit, even if outstanding ones look the same.
     bool answered_since_reopen() const { return reconnect_.answered(); }
@@ -77,8 +81,8 @@ class OutstandingRequests {
     /// True if sending proof() is quicker than waiting. False after an unanswered proof, until the
     /// station has answered something.
     bool may_prove() const {
-        return any() && replies_.first_sent() >= connected_ && has_answered_reads() &&
-               !proof_unanswered_ && !is_ambiguous(proof());
+        return any() && !disordered_at_ && replies_.first_sent() >= connected_ &&
+               has_answered_reads() && !proof_unanswered_ && !is_ambiguous(proof());
     }
     bool has_answered_reads() const { return cheapest_read_.has_value(); }
     /// Longest read of this table that it has answered, in items.
@@ -110,6 +114,12 @@ class OutstandingRequests {
     /// it has not yet shown that it gives equal answers to different requests, or it came `early`
     /// or `quicker` than ever. A doubted reply that comes again is no duplicate.
     bool may_be_duplicate(TimePoint now, const Attempt& attempt, bool early, bool quicker) const;
+    /// True if this reply may be that to an earlier request, which was closed because a later one
+    /// has been answered, or lapsed. An earlier attempt of the same read may answer it.
+    bool may_answer_closed(TimePoint now, ByteView reply, const modbus::Request& request) const {
+        const ByteView same = request.is_read() ? ByteView(request.pdu()) : ByteView();
+        return replies_.fits_closed(reply, now - kClosedMemory * timeout_, same);
+    }
     /// Time of the latest request that this reply proves to have reached the station: an attempt
     /// started at `started`, or the first outstanding one that the reply fits.
     TimePoint surely_answered(TimePoint started, ByteView reply) const;
@@ -156,13 +166,20 @@ class OutstandingRequests {
     /// Damaged bytes were heard; `id`: the station's own address.
     void on_damaged_bytes(TimePoint now, std::uint8_t id, ByteView bytes);
     /// It has answered a broadcast, which is wrong.
-    void on_broadcast_answered() { answers_broadcasts_ = true; }
+    void on_broadcast_answered(Duration delay, bool refused) {
+        answers_broadcasts_ = true;
+        refuses_broadcasts_ = refuses_broadcasts_ || refused;
+        broadcast_delay_ = std::max(broadcast_delay_, delay);
+    }
     /// The line was reopened, on a transport that may stall. Outstanding requests may be sent, and
     /// answered, only now: the station rests for that. `usual`: its longest usual time.
     void on_opened(TimePoint now, Duration usual);
     /// The transport was proved free now by a request that left at `sent`: earlier outstanding
     /// requests may only now have reached the station.
     void on_proved(TimePoint now, TimePoint sent);
+
+    static constexpr Duration kForgetDisorder = 10min;
+    static constexpr int kClosedMemory = 8;  ///< response timeouts
 
   private:
     /// It has sent this exception unsolicited just before.
@@ -173,6 +190,8 @@ class OutstandingRequests {
     void remember_refusal(TimePoint now, ByteView pdu);
     void rest(TimePoint now);
     void rest_is_over(TimePoint not_before);
+    Heard on_disorder(TimePoint now, ByteView pdu);
+    void close(ByteView reply, bool asked);
     void learn_of_duplicates(TimePoint now, const Attempt& attempt);
     void learn_of_read(const modbus::Request& read, const modbus::Span& span);
     void settle(TimePoint now, const Attempt& attempt);
@@ -183,16 +202,22 @@ class OutstandingRequests {
     OutstandingReplies replies_;
     DuplicateGuard duplicates_;
     ReconnectState reconnect_;
-    TimePoint not_before_{};     ///< duplicates may come, or the line was just opened
-    TimePoint until_{};          ///< outstanding replies may come; {}: none are
-    TimePoint connected_{};      ///< when the line was opened, on a transport that may stall
-    TimePoint again_until_{};    ///< it may resend the damaged reply until then
-    Bytes damaged_pdu_;          ///< the request whose reply has just come damaged
+    TimePoint not_before_{};   ///< duplicates may come, or the line was just opened
+    TimePoint until_{};        ///< outstanding replies may come; {}: none are
+    TimePoint connected_{};    ///< when the line was opened, on a transport that may stall
+    TimePoint again_until_{};  ///< it may resend the damaged reply until then
+    Bytes damaged_pdu_;        ///< the request whose reply has just come damaged
+    /// When it last answered a request after a later one: order closes nothing, and proves nothing,
+    /// for kForgetDisorder after that.
+    std::optional<TimePoint> disordered_at_;
+    TimePoint drained_at_{};  ///< nothing is sent before, behind a disorder: answers are one behind
     Bytes unsolicited_refusal_;  ///< and when it first came
     TimePoint unsolicited_refusal_at_{};
-    bool proof_unanswered_ = false;                 ///< since it was last heard
-    bool proved_ = false;                           ///< no outstanding request is in transit
-    bool answers_broadcasts_ = false;               ///< at least once
+    bool proof_unanswered_ = false;    ///< since it was last heard
+    bool proved_ = false;              ///< no outstanding request is in transit
+    bool answers_broadcasts_ = false;  ///< at least once
+    bool refuses_broadcasts_ = false;
+    Duration broadcast_delay_{};                    ///< the longest
     std::optional<modbus::Request> cheapest_read_;  ///< that it has answered
     std::optional<modbus::Request> largest_read_;   ///< that it has answered; so are parts of it
     std::optional<modbus::Request> last_read_;      ///< probe before it has answered any

@@ -35,10 +35,18 @@ class Stations {
     /// The last bit of a broadcast has left, or the line was lost meanwhile.
     void on_broadcast(TimePoint sent, ByteView request) { broadcasts_.on_sent(sent, request); }
     const BroadcastReplies& broadcasts() const { return broadcasts_; }
-    /// A station has answered a broadcast, which is wrong.
-    void on_broadcast_answered(std::uint8_t id) {
+    /// A station has answered a broadcast, which is wrong, so long after it.
+    void on_broadcast_answered(std::uint8_t id, Duration delay, bool refused) {
         const auto found = stations_.find(id);
-        if (found != stations_.end()) found->second.requests().on_broadcast_answered();
+        if (found != stations_.end())
+            found->second.requests().on_broadcast_answered(delay, refused);
+    }
+    /// Time from which no reply to a broadcast can be taken for the reply to this request.
+    TimePoint broadcasts_over(std::uint8_t id, const modbus::Request& request) const {
+        const Station* station = find(id);
+        if (station == nullptr) return broadcasts_.over(request, settings(id).response_timeout);
+        return broadcasts_.over(request, station->broadcast_window(),
+                                station->requests().refuses_broadcasts());
     }
     /// Damaged bytes were heard.
     void on_damaged(TimePoint now, ByteView bytes) {

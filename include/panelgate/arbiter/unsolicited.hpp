@@ -57,6 +57,7 @@ class UnsolicitedFrames {
   private:
     Outbox::Part judge(TimePoint now, const modbus::Unused& part, const Stations& stations) const;
     bool answers_other_master(TimePoint now, ByteView adu) const;
+    static void learn_of_broadcasts(TimePoint now, const modbus::Unused& part, Stations& stations);
     void let_reply_pass(TimePoint now, ByteView request, const Stations& stations,
                         Quiet& quiet) const;
 

@@ -286,6 +286,41 @@ TEST_F(StationTest, OnlyAnUnheardStationIsForgottenWhenNotWantedForAMinute) {
     EXPECT_FALSE(unheard.forgettable(now_ + 1h)) << "it was heard";
 }
 
+/// Reads go another way than writes inside some panels: one that is answered after a later write
+/// was taken for the answer to the next read, and so on for ever.
+TEST_F(StationTest, P1WhoAnswersOutOfOrderIsBelievedNoOrderAndDrains) {
+    miss(kRead);
+    answer(kWrite, kWrite);
+    EXPECT_FALSE(station_.requests().any()) << "it serves in order, as far as is known";
+    const auto request = test::request_of(kOther);
+    EXPECT_TRUE(station_.requests().may_answer_closed(now_, kReply, request));
+    EXPECT_FALSE(station_.requests().may_answer_closed(now_, kReply, test::request_of(kRead)))
+        << "its own earlier attempt may answer it";
+    now_ += 100ms;
+    EXPECT_EQ(station_.on_unsolicited_frame(now_, kReply, true).claim, Claim::late);
+    EXPECT_FALSE(may_ask(now_, kOther)) << "answers are one behind";
+    EXPECT_FALSE(may_ask(now_, kLong));
+    now_ = station_.requests().rested();
+    EXPECT_TRUE(may_ask(now_, kOther));
+    miss(kRead);
+    answer(kWrite, kWrite);
+    EXPECT_TRUE(station_.requests().any()) << "a later answer proves nothing";
+    EXPECT_FALSE(station_.may_prove());
+}
+
+TEST_F(StationTest, P8ABroadcastIsAwaitedAsLongAsItsAnswerHasTaken) {
+    BroadcastReplies broadcasts;
+    broadcasts.on_sent(now_, kWrite);
+    const auto delay = broadcasts.delay_of(now_ + 1s, kWrite);
+    ASSERT_EQ(delay, Duration(1s));
+    station_.requests().on_broadcast_answered(*delay, true);
+    EXPECT_GT(station_.broadcast_window(), *delay);
+    const auto other = test::request_of("06 00 09 00 07"_hex);
+    EXPECT_EQ(broadcasts.over(other, 1s), TimePoint{});
+    EXPECT_EQ(broadcasts.over(other, 1s, true), now_ + 1s) << "any may have its exception";
+    EXPECT_EQ(broadcasts.delay_of(now_ + BroadcastReplies::kLongest, kWrite), std::nullopt);
+}
+
 /// One silent or damaged transaction, without a retry.
 TEST_F(StationTest, IsInTheWorstConditionThatIsTrueOfIt) {
     const auto fails = [&](Verdict verdict) {
