@@ -36,8 +36,8 @@ DOCS = ROOT / "docs"
 GENERATED = DOCS / "reference"  # not written by hand: its style is its generator's
 PAGES = {str(path.relative_to(DOCS)): Page(path.read_text()) for path in sorted(DOCS.rglob("*.md"))}
 WANTED = tuple(filter(None, os.environ.get("DOCS", "").split(",")))
-WRITTEN = {name: page for name, page in PAGES.items()
-           if DOCS / name not in GENERATED.rglob("*.md") and (not WANTED or name.startswith(WANTED))}
+FOLLOWED = {name: page for name, page in PAGES.items() if not WANTED or name.startswith(WANTED)}
+WRITTEN = {name: page for name, page in FOLLOWED.items() if DOCS / name not in GENERATED.rglob("*.md")}
 
 MARKED = "sh bash shell console yaml yml python py js javascript json".split()
 MARKS = r"demo|program(-\d+)?|config|station|config-part|file|output|python|script|not run|"
@@ -167,7 +167,7 @@ class Reader:
 
 class Blocks(unittest.TestCase):
     def test_each_has_a_mark(self):
-        for name, page in WRITTEN.items():
+        for name, page in FOLLOWED.items():
             for block in page.blocks:
                 with self.subTest(page=name, line=block.line):
                     self.assertTrue(block.kind, "the fence does not say of what kind it is")
@@ -183,7 +183,7 @@ class Blocks(unittest.TestCase):
                     demo.append(running.enter_context(harness.demo()))
                     until_read(demo[0])
                 return demo[0]
-            for name, page in WRITTEN.items():
+            for name, page in FOLLOWED.items():
                 with tempfile.TemporaryDirectory() as folder:
                     reader = Reader(page, folder, beside)
                     for block in page.blocks:
@@ -248,7 +248,7 @@ class Words(unittest.TestCase):
     def test_ways_arrive(self):
         for name, page in PAGES.items():
             for link in page.links():
-                if re.match(r"[a-z]+:", link) or (WANTED and name not in WRITTEN):
+                if re.match(r"[a-z]+:", link) or (WANTED and name not in FOLLOWED):
                     continue
                 with self.subTest(page=name, link=link):
                     path, _, anchor = link.partition("#")
