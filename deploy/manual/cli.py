@@ -23,17 +23,18 @@ def groups(program):
     return found, examples
 
 
-def exit_codes():
-    """Of the manual page: [(code, what it says)]."""
-    part = PAGE_1.read_text().split(".Sh EXIT STATUS\n")[1].split(".El")[0]
+def entries_of(section):
+    """Of a list of the manual page: [(what stands on the left, its text)]."""
+    part = PAGE_1.read_text().split(f".Sh {section}\n")[1].split(".El")[0]
     for entry in part.split(".It ")[1:]:
-        code, *lines = entry.strip().split("\n")
+        left, *lines = entry.strip().split("\n")
         words = []
         for line in lines:
-            if line.startswith(".Cm "):
-                line = re.sub(r"[\w-]+", lambda name: f"`{name[0]}`", line[4:])
-            words.append(re.sub(r" ([,:;])", r"\1", line))
-        yield code, " ".join(words)
+            if line.startswith((".Cm ", ".Ql ")):
+                line = ", ".join(f"`{name}`" for name in re.split(r" , ", re.sub(r" [,:;]$", "", line[4:]))) + \
+                    "".join(re.findall(r" ([,:;])$", line))
+            words.append(line)
+        yield re.sub(r"^Dv | ,", lambda found: "," * ("," in found[0]), left), " ".join(words)
 
 
 def about(command):
@@ -60,5 +61,6 @@ def text(program):
                           for name, what in entries])]
         for name, _ in entries:
             lines += about(commands[name]) if name in commands else []
-    lines += ["## Exit codes", "", *table(("code", "meaning"), exit_codes())]
+    lines += ["## Exit codes", "", *table(("code", "meaning"), entries_of("EXIT STATUS")),
+              "## Signals", "", *table(("signal", "what it does"), entries_of("SIGNALS"))]
     return page(lines)
