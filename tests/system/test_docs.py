@@ -2,7 +2,8 @@
 
 Each block of sh, yaml, python, js or json has a mark on the line before its fence:
 
-test: demo             commands, pasted into a shell beside a running demo (on other ports); print something
+test: demo             commands, pasted into a shell beside a running demo (on other ports); print something.
+                       Commands of panelgate that ask a gateway ask that one, without --http
 test: program          commands of panelgate, in the page's folder, where its last `config` is panelgate.yaml
 test: program-N        the same, with exit code N
 test: config           a whole configuration that `check` takes
@@ -39,6 +40,7 @@ WANTED = tuple(filter(None, os.environ.get("DOCS", "").split(",")))
 FOLLOWED = {name: page for name, page in PAGES.items() if not WANTED or name.startswith(WANTED)}
 WRITTEN = {name: page for name, page in FOLLOWED.items() if DOCS / name not in GENERATED.rglob("*.md")}
 
+ASKING = r"(?m)^(panelgate (?:read|write|watch|status|top|trace|report)\b[^|&;\n]*?)(?=\s*(?:[|&;]|$))"
 MARKED = "sh bash shell console yaml yml python py js javascript json".split()
 MARKS = r"demo|program(-\d+)?|config|station|config-part|file|output|python|script|not run|"
 UNWANTED = r"(?i)\b(whoever|nobody in particular|owed?)\b"
@@ -131,6 +133,7 @@ class Reader:
 
     def by_its_ports(self, text):
         demo = self.beside()
+        text = re.sub(ASKING, r"\1 --http 127.0.0.1:8080", text)
         return re.sub(r"\b1502\b", str(demo.modbus_port()), re.sub(r"\b8080\b", str(demo.http_port()), text))
 
     def shown(self, command, block):
