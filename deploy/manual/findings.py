@@ -55,6 +55,7 @@ def text():
              "itself, from what it counts in the last minute. What it finds is in `findings` of",
              "`/api/v1/lines/{line}`, on the dashboard, in `panelgate status`, in the log as `line finding`, and as",
              "`panelgate_findings{cause=\"...\"}` in `/metrics`. N stands for a number that is measured.", "",
+             "The gateway's own sentences may say more, with the settings and figures of the case.", "",
              "A finding needs some cases to appear, and half of that to stay. Where one cause explains damage,",
              "no other is named for it.", "",
              *table(("cause", "what it is"), [(f"[`{code}`](#{code})", what) for code, what in found]),

@@ -90,7 +90,8 @@ def text(program):
              "A scrape never touches a bus. Which to watch, and how to scrape, is in",
              "[Monitoring](../operate/monitoring.md); what alerts are made of is in [Alerts](alerts.md).", "",
              "Labels come from the configuration only. What could not be read is absent, never 0.",
-             "A histogram has `_bucket`, `_sum` and `_count` behind its name.", "",
+             "A histogram has `_bucket`, `_sum` and `_count` behind its name. A scrape is packed (gzip) for clients",
+             "that accept it, such as Prometheus.", "",
              "<!-- test: demo -->", "```sh", "curl -s http://127.0.0.1:8080/metrics | grep -c '^# HELP'", "```", ""]
     left = dict(known)
     for title, prefixes, when in GROUPS:
