@@ -15,6 +15,12 @@ HEADING = {"reads": "Read", "writes": "Write", "points": "Points", "status": "St
            "pages": "Pages", "simulator": "Simulator"}
 
 
+def wrapped(text):
+    """A paragraph and the empty line behind it; nothing of nothing."""
+    lines = textwrap.wrap(text, 100, break_on_hyphens=False, break_long_words=False)
+    return [*lines, ""] if lines else []
+
+
 class Document:
     def __init__(self, text):
         self.all = json.loads(text)
@@ -102,7 +108,7 @@ def answers(document, call):
 def described(document, path, method, call):
     mark, behind = runs(path, method, call)
     lines = [f"### {method} {path}", "", f"{call['summary']}. Role: {call['x-role']}.".replace("?.", "?"), "",
-             *textwrap.wrap(call.get("description", ""), 100), "",
+             *wrapped(call.get("description", "")),
              f"<!-- {mark} -->", "```sh", command(document, path, method, call) + behind, "```", ""]
     if rows := list(document.parameters(call)):
         lines += table(("parameter", "in", "values", "what it is"), rows)
@@ -135,7 +141,7 @@ def text(program):
     info = document.all["info"]["description"]
     lines = ["# REST", "", "Made from the program by `deploy/manual/reference.py`. A gateway has the same in full, with",
              "the form of each answer, at `/docs` and as OpenAPI 3.1 at `/openapi.json`.", "",
-             *textwrap.wrap(info, 100), "",
+             *wrapped(info),
              "The lines of curl ask `panelgate demo`. With tokens a call wants `-H \"Authorization: Bearer TOKEN\"`",
              "of a token with its role; *none* is free for all. See [Tokens](../tasks/tokens.md).", "",
              "## Contents", ""]
@@ -152,5 +158,5 @@ def text(program):
               "asked of a panel, `transmitted` and `modbus_exception` as well. `type` is `urn:panelgate:problem:` and",
               "a word of a list that only grows.", "",
               *table(("status", "meaning", "such as"), errors(document)),
-              "All words of `type`:", "", *textwrap.wrap(", ".join(f"`{word}`" for word in words(document)), 100)]
+              "All words of `type`:", "", *wrapped(", ".join(f"`{word}`" for word in words(document)))]
     return page(lines)
