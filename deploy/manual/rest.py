@@ -10,7 +10,7 @@ DEMO = "http://127.0.0.1:8080"
 NOT_RUN = {"/api/v1/events": "it goes on for as long as the client listens",
            "/api/v1/lines/{line}/incidents/{incident}": "it wants an incident",
            "/page/{file}": "a browser asks for it"}
-LONG = ("text/html", "x-pcapng", "/openapi.json")  # only its length is shown
+LONG = ("text/html", "x-pcapng", "/openapi.json")  # only their length is shown, and curl fails at a problem
 HEADING = {"reads": "Read", "writes": "Write", "points": "Points", "status": "Status", "probes": "Probes",
            "pages": "Pages", "simulator": "Simulator"}
 
@@ -74,11 +74,11 @@ def example_of(content):
     return content.get("example", next((one["value"] for one in content.get("examples", {}).values()), None))
 
 
-def command(document, path, method, call):
+def command(document, path, method, call, shortened):
     for one in map(document.at, call.get("parameters", [])):
         if one["in"] == "path":
             path = path.replace("{" + one["name"] + "}", one["example"])
-    words = ["curl -s", *([f"-X {method}"] if method != "GET" else [])]
+    words = ["curl -sf" if shortened else "curl -s", *([f"-X {method}"] if method != "GET" else [])]
     if "requestBody" in call:
         [content] = call["requestBody"]["content"].values()
         words.append(f"-d '{json.dumps(content['example'])}'")
@@ -109,7 +109,7 @@ def described(document, path, method, call):
     mark, behind = runs(path, method, call)
     lines = [f"### {method} {path}", "", f"{call['summary']}. Role: {call['x-role']}.".replace("?.", "?"), "",
              *wrapped(call.get("description", "")),
-             f"<!-- {mark} -->", "```sh", command(document, path, method, call) + behind, "```", ""]
+             f"<!-- {mark} -->", "```sh", command(document, path, method, call, bool(behind)) + behind, "```", ""]
     if rows := list(document.parameters(call)):
         lines += table(("parameter", "in", "values", "what it is"), rows)
     if "requestBody" in call:
