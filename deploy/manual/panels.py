@@ -8,6 +8,9 @@ import re
 import subprocess
 import sys
 
+sys.dont_write_bytecode = True
+from tables import table  # noqa: E402
+
 BLOCK = re.compile(r"(?ms)^<!-- generated: (?:profile (\S+)|profiles) -->\n.*?^<!-- end -->$")
 CITED = re.compile(r"^(.*?)(?:  \[(.*)\])?$")
 DIGIT = {"coil": "0", "discrete input": "1", "input register": "3", "holding register": "4"}
@@ -27,12 +30,6 @@ PAGES = {"autonics-gplp-s": "autonics-gp-lp.md", "autonics-gplp-a": "autonics-gp
          "autonics-gp-2005": "autonics-gp-2005.md", "autonics-gp-2005-old": "autonics-gp-2005.md",
          "autonics-arm": "autonics-arm.md", "panasonic-gt": "panasonic-gt.md",
          "omron-cp2e": "omron-cp2e.md", "generic": "any-other.md"}
-
-
-def table(titles, rows):
-    def line(cells):
-        return "| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |"
-    return [line(titles), "|" + "---|" * len(titles), *map(line, rows), ""]
 
 
 def cited(text):

@@ -1,12 +1,23 @@
 #!/usr/bin/env python3
-"""reference.py FOLDER PROGRAM...: what `PROGRAM config keys` knows, as documents, into FOLDER:
-docs/reference/configuration.md and config/panelgate.example.yaml. PROGRAM may have words before it.
+"""reference.py FOLDER PROGRAM...: what PROGRAM and the sources know, as documents, into FOLDER: the pages
+docs/reference/*.md, each made by the module of that name here, and config/panelgate.example.yaml. Those of
+keys are made here. PROGRAM may have words before it; demos of it run meanwhile, on ports that are free.
 """
 import json
 import pathlib
 import subprocess
 import sys
 import textwrap
+
+sys.dont_write_bytecode = True  # beside the sources
+import alerts  # noqa: E402
+import cli  # noqa: E402
+import events  # noqa: E402
+import findings  # noqa: E402
+import metrics  # noqa: E402
+import rest  # noqa: E402
+import unit255  # noqa: E402
+from tables import cell  # noqa: E402
 
 WIDTH = 100
 HEAD = """\
@@ -160,10 +171,6 @@ def said(key):
     return key.get("text", "") + (f" Only {condition.removeprefix('only ')}." if condition else "")
 
 
-def cell(text):
-    return text.replace("|", "\\|")
-
-
 def page(keys):
     out = ["# Configuration: every key", "",
            "Made from the program by `deploy/manual/reference.py`; the program says the same with",
@@ -183,10 +190,18 @@ def page(keys):
     return "\n".join(out).rstrip("\n") + "\n"
 
 
-def main(folder, *program):
+def documents(program):
+    """{path: text}"""
     keys = Keys(program)
-    for path, text in (("docs/reference/configuration.md", page(keys)),
-                       ("config/panelgate.example.yaml", Example(keys).text())):
+    pages = {"cli": cli.text(program), "rest": rest.text(program), "metrics": metrics.text(program),
+             "alerts": alerts.text(), "findings": findings.text(), "log": events.text(),
+             "unit-255": unit255.text(program), "configuration": page(keys)}
+    return {"config/panelgate.example.yaml": Example(keys).text(),
+            **{f"docs/reference/{name}.md": text for name, text in pages.items()}}
+
+
+def main(folder, *program):
+    for path, text in documents(program).items():
         target = pathlib.Path(folder) / path
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(text)

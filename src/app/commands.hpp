@@ -5,7 +5,7 @@
 
 namespace panelgate::app {
 
-/// Exit codes (README, Configuration), after sysexits(3).
+/// Exit codes (docs/reference/cli.md), after sysexits(3).
 enum ExitCode : int {
     kFine = 0,
     kCut = 1,       ///< a second signal came: outstanding requests were not answered

@@ -45,7 +45,7 @@ std::string turn(const Reason& reason) {
            instead;
 }
 
-/// What follows from it (README, Health and budgets).
+/// What follows from it (README here: Health and budgets).
 std::string means(Condition condition) {
     switch (condition) {
         case Condition::well:

@@ -2,7 +2,8 @@
 
 Each block of sh, yaml, python, js or json has a mark on the line before its fence:
 
-test: demo             commands, pasted into a shell beside a running demo (on other ports); print something
+test: demo             commands, pasted into a shell beside a running demo (on other ports); print something.
+                       Commands of panelgate that ask a gateway ask that one, without --http
 test: program          commands of panelgate, in the page's folder, where its last `config` is panelgate.yaml
 test: program-N        the same, with exit code N
 test: config           a whole configuration that `check` takes
@@ -33,12 +34,13 @@ from harness import ROOT
 from markdown import Page
 
 DOCS = ROOT / "docs"
-GENERATED = DOCS / "reference"  # not written by hand: its style is its generator's
 PAGES = {str(path.relative_to(DOCS)): Page(path.read_text()) for path in sorted(DOCS.rglob("*.md"))}
 WANTED = tuple(filter(None, os.environ.get("DOCS", "").split(",")))
-WRITTEN = {name: page for name, page in PAGES.items()
-           if DOCS / name not in GENERATED.rglob("*.md") and (not WANTED or name.startswith(WANTED))}
+FOLLOWED = {name: page for name, page in PAGES.items() if not WANTED or name.startswith(WANTED)}
+# Where a generator has made the page, its style is the generator's.
+WRITTEN = {name: page for name, page in FOLLOWED.items() if "by `deploy/manual/reference.py`" not in page.text}
 
+ASKING = r"(?m)^(panelgate (?:read|write|watch|status|top|trace|report)\b[^|&;\n]*?)(?=\s*(?:[|&;]|$))"
 MARKED = "sh bash shell console yaml yml python py js javascript json".split()
 MARKS = r"demo|program(-\d+)?|config|station|config-part|file|output|python|script|not run|"
 UNWANTED = r"(?i)\b(whoever|nobody in particular|owed?)\b"
@@ -131,6 +133,7 @@ class Reader:
 
     def by_its_ports(self, text):
         demo = self.beside()
+        text = re.sub(ASKING, r"\1 --http 127.0.0.1:8080", text)
         return re.sub(r"\b1502\b", str(demo.modbus_port()), re.sub(r"\b8080\b", str(demo.http_port()), text))
 
     def shown(self, command, block):
@@ -167,7 +170,7 @@ class Reader:
 
 class Blocks(unittest.TestCase):
     def test_each_has_a_mark(self):
-        for name, page in WRITTEN.items():
+        for name, page in FOLLOWED.items():
             for block in page.blocks:
                 with self.subTest(page=name, line=block.line):
                     self.assertTrue(block.kind, "the fence does not say of what kind it is")
@@ -183,7 +186,7 @@ class Blocks(unittest.TestCase):
                     demo.append(running.enter_context(harness.demo()))
                     until_read(demo[0])
                 return demo[0]
-            for name, page in WRITTEN.items():
+            for name, page in FOLLOWED.items():
                 with tempfile.TemporaryDirectory() as folder:
                     reader = Reader(page, folder, beside)
                     for block in page.blocks:
@@ -248,7 +251,7 @@ class Words(unittest.TestCase):
     def test_ways_arrive(self):
         for name, page in PAGES.items():
             for link in page.links():
-                if re.match(r"[a-z]+:", link) or (WANTED and name not in WRITTEN):
+                if re.match(r"[a-z]+:", link) or (WANTED and name not in FOLLOWED):
                     continue
                 with self.subTest(page=name, link=link):
                     path, _, anchor = link.partition("#")

@@ -9,7 +9,7 @@
 
 namespace panelgate::cli {
 
-// The gateway's answers (README, REST) as a person reads them.
+// The gateway's answers (docs/reference/rest.md) as a person reads them.
 
 /// A member's text, "" if it is not there or none.
 std::string text_of(const boost::json::object& object, std::string_view name);

@@ -60,7 +60,8 @@ struct Line {
     friend bool operator==(const Line&, const Line&) = default;
 };
 
-/// A valid configuration (README, Configuration): defaults filled in, references resolved.
+/// A valid configuration (docs/reference/configuration.md): defaults filled in, references
+/// resolved.
 struct Config {
     std::shared_ptr<const profile::Catalogue> profiles;
     std::vector<Line> lines;

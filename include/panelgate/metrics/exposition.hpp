@@ -42,11 +42,11 @@ inline constexpr std::string_view kContentType = "text/plain; version=0.0.4; cha
 /// Receives a piece of the text; returns false if no more is wanted.
 using TextSink = std::function<bool(std::string_view)>;
 
-/// Writes the text of /metrics (README, Metrics), one family at a time. Expected series exist with
-/// 0, so that a rate() sees the first event: requests with outcome ok for the functions the bus
-/// lists before their first use, and with ok, exception and timeout for those used; exceptions with
-/// codes 1-4. Other outcomes appear once they occur. A station's last success is absent until the
-/// first. Reads only the snapshot.
+/// Writes the text of /metrics (docs/reference/metrics.md), one family at a time. Expected series
+/// exist with 0, so that a rate() sees the first event: requests with outcome ok for the functions
+/// the bus lists before their first use, and with ok, exception and timeout for those used;
+/// exceptions with codes 1-4. Other outcomes appear once they occur. A station's last success is
+/// absent until the first. Reads only the snapshot.
 void exposition(const Snapshot& snapshot, const TextSink& take);
 std::string exposition(const Snapshot& snapshot);
 

@@ -16,10 +16,10 @@ class any_io_executor;
 
 namespace panelgate::tcp_server {
 
-/// A Modbus over TCP listener (README, Modbus/TCP) on one port, in the framing of its settings,
-/// with its connections; settings.udp adds datagrams. Single-threaded: everything runs on the given
-/// executor. The clock and the buses in the map must outlive it; answers that arrive after its end
-/// are dropped.
+/// A Modbus over TCP listener (docs/connect/modbus-tcp.md) on one port, in the framing of its
+/// settings, with its connections; settings.udp adds datagrams. Single-threaded: everything runs on
+/// the given executor. The clock and the buses in the map must outlive it; answers that arrive
+/// after its end are dropped.
 class Listener {
   public:
     /// `version` is the program's, for the device identification. Throws std::invalid_argument for

@@ -100,8 +100,10 @@ std::string type_text(const json::object& schema) {
     };
     for (const json::value& one : array_in(schema, "oneOf"))
         add(type_text(one.as_object()), " or ");
-    for (const json::value& word : array_in(schema, "enum"))
-        add(code(escaped(std::string_view(word.as_string()))), ", ");
+    for (const json::value& word : array_in(schema, "enum")) {  // null may be one of them
+        const json::string* words = word.if_string();
+        add(code(words ? escaped(std::string_view(*words)) : json_text(word)), ", ");
+    }
     if (!text.empty()) return text;
     if (const json::value* fixed = schema.if_contains("const")) return code(json_text(*fixed));
     for (const json::value& type : array_in(schema, "type"))

@@ -9,7 +9,7 @@ namespace panelgate::web {
 
 struct Reading;
 
-/// {"name","value","label","unit","quality","age_ms"} (README, REST).
+/// {"name","value","label","unit","quality","age_ms"} (docs/reference/rest.md).
 boost::json::object point_json(const points::Point& point, const points::PointReading& reading);
 /// A point as its items have just been read.
 points::PointReading point_reading(const points::Point& point, const Reading& reading);
