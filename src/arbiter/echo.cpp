@@ -62,7 +62,8 @@ EchoMemory::EchoMemory(EchoMode mode) : mode_(mode), state_(EchoState::unknown) 
 
 void EchoMemory::forget() {
     heard_ = false;
-    missed_ = 0;
+    missed_ = echoes_ = 0;
+    had_none_ = mode_ == EchoMode::off;
     begin();
 }
 
@@ -94,17 +95,27 @@ bool EchoMemory::must_be_learned_before(const modbus::Request& request, bool tri
     return open && !request.is_read();
 }
 
-bool EchoMemory::on_echo(const modbus::Request& request) {
+bool EchoMemory::on_echo(const modbus::Request& request, bool expected) {
     if (!teaches_echo(request)) return false;
+    if (had_none_ && !expected && state_ != EchoState::present && ++echoes_ < kNow) {
+        state_ = EchoState::unknown;
+        return false;
+    }
     heard_ = true;
     missed_ = 0;
     return std::exchange(state_, EchoState::present) != EchoState::present;
 }
 
 void EchoMemory::on_reply_without_echo(const modbus::Request& request, bool fragment) {
-    if (state_ == EchoState::present || state_ == EchoState::absent || !teaches_echo(request))
+    if (state_ == EchoState::present || !teaches_echo(request)) return;
+    if (!fragment) {
+        echoes_ = 0;
+        ++missed_;
+    }
+    if (state_ == EchoState::absent) {
+        had_none_ = had_none_ || missed_ >= kNoMore;
         return;
-    if (!fragment) ++missed_;
+    }
     if (fragment || heard_) state_ = EchoState::unclear;
     if (!fragment && (!heard_ || missed_ >= kNoMore)) state_ = EchoState::absent;
 }

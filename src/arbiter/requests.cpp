@@ -179,8 +179,8 @@ OutstandingRequests::Heard OutstandingRequests::on_unsolicited(TimePoint now, By
     heard.claim = claim_of(now, pdu);
     const bool may_repeat = now < std::exchange(again_until_, TimePoint{});
     const bool may_be_duplicate = may_repeat || duplicates_.is_duplicate(now, pdu);
+    remember_refusal(now, pdu);
     if (heard.claim != Claim::late) {
-        remember_refusal(now, pdu);
         duplicates_.on_unasked(now, pdu);
         not_before_ = std::max(not_before_, duplicates_.rest_until());
         return heard;

@@ -28,6 +28,7 @@ void Station::apply(const StationSettings& settings, const OfflineSettings& offl
 void Station::on_asked(TimePoint now, const Group& group, bool in_transit) {
     requests_.on_asked(now, group, in_transit);
     asked_ = now;
+    writes_in_a_row_ = group.request.is_read() ? 0 : std::min(writes_in_a_row_ + 1, kWritesInARow);
     if (group.request.is_read()) read_turn_ = wants_check_ = woken_by_write_ = false;
 }
 

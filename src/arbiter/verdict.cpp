@@ -447,7 +447,8 @@ Attempt Arbiter::take_active(TimePoint now) {
     outbox_.on_ended(now, attempt, behind);
     quiet_.take_rested(now);  // the attempt's own time
     outbox_.written(attempt.group(), true);
-    if (attempt.echoed() && echo_memory_.on_echo(attempt.group().request))
+    const Group& group = attempt.group();
+    if (attempt.echoed() && echo_memory_.on_echo(group.request, !group.confirms.empty()))
         outbox_.event(Kind::echo, attempt.group().station);
     // Where a reply may come before the request has left, early bytes prove nothing.
     const bool keeps_pace = settings_.paced || pace_.believed();

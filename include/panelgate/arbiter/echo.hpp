@@ -77,8 +77,9 @@ class EchoMemory {
     /// a read was already sent for it; if that was inconclusive, the request goes all the same.
     bool must_be_learned_before(const modbus::Request& request, bool tried) const;
 
-    /// The whole echo of this request came back. Returns true if that is new.
-    bool on_echo(const modbus::Request& request);
+    /// The whole echo of this request came back; `expected`: so had that of a write before. Returns
+    /// true if the line is now known to have an echo.
+    bool on_echo(const modbus::Request& request, bool expected = false);
     /// A good reply to this request came; `fragment`: preceded by a part of the request. Other
     /// bytes in front or behind say nothing about an echo (FRM-07).
     void on_reply_without_echo(const modbus::Request& request, bool fragment);
@@ -100,11 +101,16 @@ class EchoMemory {
     /// Replies in a row without any echo until an echo heard before counts as gone: bytes get lost
     /// now and then, and the next echo would confirm a write.
     static constexpr int kNoMore = 16;
+    /// Echoes in a row until a line that has had none is believed to have one: a panel may repeat
+    /// a request once. Until then a read goes before each write.
+    static constexpr int kNow = 3;
 
     EchoMode mode_;
     EchoState state_;
     bool heard_ = false;  ///< an echo, since the device was opened
     int missed_ = 0;      ///< in a row
+    int echoes_ = 0;      ///< in a row, on a line that has had none
+    bool had_none_ = false;
 };
 
 }  // namespace panelgate::arbiter

@@ -33,8 +33,13 @@ class Station {
 
     // When it may be asked
 
-    /// True if its last request was an unanswered write: a waiting read goes next.
-    bool has_read_turn() const { return read_turn_; }
+    /// True if a waiting read goes before its writes: its last request was an unanswered write, or
+    /// it has had four writes in a row (P9). Where it rests after each reply, other stations have
+    /// the turns between, and its reads would have too few: then every other one.
+    bool has_read_turn() const {
+        const bool rests = requests_.duplicates_until(Duration::max()) != TimePoint{};
+        return read_turn_ || writes_in_a_row_ >= (rests ? 1 : kWritesInARow);
+    }
     /// True if it has answered reads and the last one too: failed writes do not postpone reads.
     bool answers_reads() const { return requests_.has_answered_reads() && !read_missed_; }
     /// True if so many writes in a row failed that a read must check whether it is there.
@@ -176,6 +181,7 @@ class Station {
     static constexpr int kFailing = 2;          ///< failed transactions in a row
     static constexpr int kFlaky = 4;            ///< silent ones of the last 8 attempts
     static constexpr int kUnusualReplies = 16;  ///< replies until an exception is unexpected again
+    static constexpr int kWritesInARow = 4;     ///< while a read waits for it
     static constexpr int kCredit = 2;           ///< whole timeouts of credit
     static constexpr int kBudgetMemory = 3;     ///< whole timeouts that are remembered
     static constexpr Duration kForgetUnheard = 60s;
@@ -223,6 +229,7 @@ class Station {
     bool missed_ = false;  ///< the last attempt was silent, and its retry has not ended
     Bytes ignored_;        ///< the last write that it did not answer
     bool read_turn_ = false;
+    int writes_in_a_row_ = 0;
     bool read_missed_ = false;  ///< the last read was unanswered
     bool wants_check_ = false;
     bool woken_by_write_ = false;  ///< its last probe was a client's write
