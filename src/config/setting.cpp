@@ -103,7 +103,8 @@ void show_servers(const SettingWriter& top, const Config& config) {
     if (config.http) show_http(top, *config.http);
     if (config.mqtt) {
         mqtt_keys().show(top.item("mqtt"), *config.mqtt);
-        top.below("mqtt").put_secret("password", config.mqtt->password);
+        if (!config.mqtt->password.empty())
+            top.below("mqtt").put_secret("password", config.mqtt->password);
     }
 }
 
