@@ -21,9 +21,9 @@ from tables import cell  # noqa: E402
 
 WIDTH = 100
 HEAD = """\
-# Every key of this version. One behind '#' is not set: its value is what it is then, or an example. What
-# is behind '##' belongs to a block that is taken in as a whole; behind '###' stand its keys that need a
-# file, or another value of a neighbour.
+# Every key of this version. One behind '#' is not set: its value is what it is then, or an example; it
+# can be taken in alone. What is behind '##' belongs to a block that is taken in as a whole; what is behind
+# '###' needs a file, or another value of a neighbour.
 # `panelgate check -c FILE` reports what is wrong with a file, and where.
 # Durations are 250us, 20ms, 2s, 5min.
 #
@@ -33,14 +33,16 @@ x-fast: &fast {data_bits: 8, stop_bits: 1}    # serial: {<<: *fast, baud: 38400}
 
 # What many stations share, by name: a station's keys but id and name. A station takes one with
 # `template: meter`; its own keys win, timing key by key, lists whole.
-#templates:
-  #meter:
-    #profile: generic
-    #timing: {response_timeout: 300ms}
+##templates:
+  ##meter:
+    ##profile: generic
+    ##timing: {response_timeout: 300ms}
 """
-# What needs a file, a device, a broker or a right that not every machine has, and a simulation.
-NEEDY = {"mqtt.password_file", "mqtt.ca", "mqtt.certificate", "mqtt.key"}
-OFF = {"http.tokens", "serial_masters", "mqtt", "realtime", "lines.simulate", "lines.stations.simulate"}
+# What needs a file, or a neighbour that the example has not, or has otherwise.
+NEEDY = {"profiles_dir", "lines.stations.template", "lines.stations.points.bit", "http.tokens",
+         "mqtt.password_file", "mqtt.ca", "mqtt.certificate", "mqtt.key"}
+# What needs a device, a broker or a right that not every machine has, and a simulation.
+OFF = {"serial_masters", "mqtt", "realtime", "lines.simulate", "lines.stations.simulate"}
 TITLES = {"": "Top level", "lines": "A line", "lines.stations": "A station",
           "lines.stations.points": "A point", "lines.stations.poll": "A block that is polled",
           "modbus_tcp": "A listener for Modbus/TCP", "serial_masters": "A serial master",
@@ -85,13 +87,13 @@ class Keys:
         """Beside the values of its neighbours in the example it would be refused."""
         if key["path"] in NEEDY:
             return True
-        condition = key.get("condition", "").removeprefix("only with ")
-        if not condition:
+        if "condition" not in key:
             return False
+        way, _, condition = key["condition"].partition(" with ")
         other, words = condition.split(": ")
         path = key["path"].rsplit(".", 1)[0] + "." + other
         beside = next((one for one in self.all if one["path"] == path), None)
-        return beside is None or self.value(beside) not in words.split(" or ")
+        return beside is None or (self.value(beside) in words.split(" or ")) != (way == "only")
 
     def maps(self, path=""):
         """The paths of maps with keys of their own, each before those inside it."""
@@ -140,8 +142,7 @@ class Example:
             if key["path"] == "templates":  # they are in HEAD
                 continue
             # A single '#' taken out of a block that is off would put its key into the map before it.
-            inner = 2 if off or key["path"] in OFF else 0
-            inner += bool(inner) and self.keys.is_needy(key)
+            inner = 3 if off == 3 or self.keys.is_needy(key) else 2 if off or key["path"] in OFF else 0
             # The first key of a list's entry stands behind the dash.
             place, shown = (indent[:-2], "- " + name(key)) if item else (indent, name(key))
             inside = bool(self.keys.below(key["path"]))
@@ -168,7 +169,7 @@ class Example:
 
 def said(key):
     condition = key.get("condition", "")
-    return key.get("text", "") + (f" Only {condition.removeprefix('only ')}." if condition else "")
+    return key.get("text", "") + (f" {condition[0].upper()}{condition[1:]}." if condition else "")
 
 
 def page(keys):

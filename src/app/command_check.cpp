@@ -62,18 +62,22 @@ json::array errors_json(const std::string& file, std::vector<yaml::Problem> prob
 /// The verdict on the lines' loads.
 struct Judged {
     std::vector<Capacity> lines;
-    std::vector<std::string> errors;
+    std::vector<yaml::Problem> errors;
     std::vector<std::string> warnings;
 };
 
-Judged judge(const config::Config& config, bool allow_overload) {
+Judged judge(const std::string& path, const config::Config& config, bool allow_overload) {
     Judged judged{capacities(config), {}, {}};
     for (const Capacity& capacity : judged.lines) {
         std::ranges::copy(capacity.warnings, std::back_inserter(judged.warnings));
         const plan::Verdict verdict = plan::verdict(capacity.plan);
         if (verdict == plan::Verdict::fine) continue;
-        const bool error = verdict == plan::Verdict::overload && !allow_overload;
-        (error ? judged.errors : judged.warnings).push_back(overload_text(capacity));
+        if (verdict == plan::Verdict::overload && !allow_overload) {
+            const yaml::Mark mark = config.line_marks.at(capacity.line.name);
+            judged.errors.push_back({path, mark, overload_text(capacity)});
+        } else {
+            judged.warnings.push_back(overload_text(capacity));
+        }
     }
     return judged;
 }
@@ -96,9 +100,9 @@ void print_changes(const std::string& file, const config::Config& config,
     for (const Change& change : changes)
         std::cout << "  " << to_string(change)
                   << (change.needs.empty() ? "" : " (" + change.needs + ')') << '\n';
-    const std::vector<std::string> cuts = interruptions(*compared.loaded.config, config);
+    const std::vector<Interruption> cuts = interruptions(*compared.loaded.config, config);
     if (!cuts.empty()) std::cout << "what a reload interrupts:\n";
-    for (const std::string& cut : cuts) std::cout << "  " << cut << '\n';
+    for (const Interruption& cut : cuts) std::cout << "  " << cut.path << ": " << cut.what << '\n';
 }
 
 /// For a file with faults `lines` and the like are missing.
@@ -119,15 +123,14 @@ void print_json(const std::string& file, const Loaded& loaded, const Judged& jud
     if (loaded.config && compared.loaded.config) {
         all["changes"] = to_json(differences(*compared.loaded.config, *loaded.config));
         json::array cuts;
-        for (const std::string& cut : interruptions(*compared.loaded.config, *loaded.config))
-            cuts.emplace_back(cut);
+        for (const Interruption& cut : interruptions(*compared.loaded.config, *loaded.config))
+            cuts.push_back(json::object{{"path", cut.path}, {"what", cut.what}});
         all["interruptions"] = std::move(cuts);
     }
     json::array errors = errors_json(file, loaded.problems);
     for (json::value& error : errors_json(compared.file, compared.loaded.problems))
         errors.push_back(std::move(error));
-    for (const std::string& error : judged.errors)
-        errors.push_back(json::object{{"file", file}, {"message", error}});
+    for (json::value& error : errors_json(file, judged.errors)) errors.push_back(std::move(error));
     all["errors"] = std::move(errors);
     all["warnings"] = std::move(warnings);
     std::cout << as_utf8(web::json_text(all)) << '\n';  // file names may contain any bytes
@@ -141,15 +144,15 @@ ExitCode check(const std::string& file, const CheckOptions& options) {
     if (!compared.file.empty()) compared.loaded = load_file(compared.file, "--diff");
     Judged judged;
     if (loaded.config) {
-        judged = judge(*loaded.config, options.allow_overload);
+        judged = judge(path_of(file), *loaded.config, options.allow_overload);
         if (compared.loaded.config)
             std::ranges::copy(moved_units(*compared.loaded.config, *loaded.config),
                               std::back_inserter(judged.warnings));
         print_warnings(*loaded.config);
         for (const std::string& message : judged.warnings)
             std::cerr << path_of(file) << ": warning: " << message << '\n';
-        for (const std::string& message : judged.errors)
-            std::cerr << path_of(file) << ": " << message << " (--allow-overload takes it)\n";
+        for (const yaml::Problem& error : judged.errors)
+            std::cerr << yaml::format(error) << " (--allow-overload takes it)\n";
     }
     if (options.json) {
         print_json(file, loaded, judged, compared);

@@ -15,6 +15,7 @@
 #include "panelgate/config/describe.hpp"
 #include "panelgate/config/setting.hpp"
 #include "panelgate/web/http/json_text.hpp"
+#include "panelgate/yaml/document.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::app {
@@ -33,15 +34,112 @@ std::string shown_path(std::string path) {
     return path;
 }
 
-/// Returns "; did you mean 'lines.floor1.retries'?", or the names that come next.
-std::string hint(const std::vector<Setting>& all, const std::string& path) {
-    if (config::describe().is_key(path))
-        return ": what it names is read when the file is, and only that is kept";
+bool is_below(std::string_view path, std::string_view above) {
+    return path.size() > above.size() && path.starts_with(above) && path[above.size()] == '/';
+}
+
+bool is_at_or_below(std::string_view path, std::string_view above) {
+    return path == above || is_below(path, above);
+}
+
+/// A path whose entries of lists are looked up by their names.
+class Walk {
+  public:
+    Walk(const std::vector<Setting>& all, const std::string& path) : all_(all), left_(path) {
+        while (!left_.empty()) {
+            if (names_) take_name();
+            if (!left_.empty() && !names_) take_key();
+        }
+    }
+
+    /// True if it ends in a key, and its entries are there.
+    bool is_key() const { return is_key_ && list_.empty(); }
+    /// "; write lines.NAME.retries, NAME being one of a, b"; "" where no name is missing.
+    std::string hint() const {
+        if (!is_key_ || list_.empty()) return "";
+        std::string names;
+        for (const Setting& setting : all_) {
+            if (!is_below(setting.path, list_)) continue;
+            const std::string name = setting.path.substr(list_.size() + 1);
+            if (name.find('/') == name.npos) names += (names.empty() ? "" : ", ") + name;
+        }
+        return "; write " + shown_path(made_) + (names.empty() ? "" : ", with one of: " + names);
+    }
+
+  private:
+    const yaml::KeyShape* key_named(std::string_view name) const {
+        const std::string path = (key_ == nullptr ? "" : key_->path + '/') + std::string(name);
+        const std::vector<yaml::KeyShape>& keys = config::describe().keys;
+        const auto found = std::ranges::find(keys, path, &yaml::KeyShape::path);
+        return found == keys.end() ? nullptr : &*found;
+    }
+    std::string_view next() const { return std::string_view(left_).substr(0, left_.find('/')); }
+    void take(std::size_t size) { left_.erase(0, std::min(size + 1, left_.size())); }
+
+    void take_name() {
+        names_ = false;
+        for (const Setting& setting : all_) {
+            const std::string entry = path_typed(setting.path);
+            if (!is_below(entry, made_)) continue;
+            const std::string name = entry.substr(made_.size() + 1);
+            if (!is_at_or_below(left_, name)) continue;
+            made_ = entry;
+            return take(name.size());
+        }
+        if (list_.empty()) list_ = made_;
+        if (key_named(next()) == nullptr) take(next().size());
+        made_ += "/NAME";
+    }
+    void take_key() {
+        const yaml::KeyShape* found = key_named(next());
+        is_key_ = found != nullptr || (key_ != nullptr && !key_->keys.empty());
+        if (!is_key_) return left_.clear();
+        made_ += (made_.empty() ? "" : "/") + std::string(next());
+        take(next().size());
+        key_ = found;
+        names_ = key_ != nullptr && key_->kind == yaml::KeyShape::Kind::list && !left_.empty() &&
+                 std::ranges::any_of(config::describe().keys, [&](const yaml::KeyShape& one) {
+                     return is_below(one.path, key_->path);
+                 });
+    }
+
+    const std::vector<Setting>& all_;
+    std::string left_;
+    std::string made_;
+    std::string list_;  ///< the first one without an entry of that name
+    const yaml::KeyShape* key_ = nullptr;
+    bool names_ = false;
+    bool is_key_ = false;
+};
+
+/// Says why there is no value, and returns the exit code.
+ExitCode explain(const std::vector<Setting>& all, const std::string& typed) {
+    const std::string path = path_typed(typed);
+    const Walk walk(all, path);
+    const std::string key = path.substr(path.rfind('/') + 1);
+    if (walk.is_key() && (key == "template" || key == "templates")) {
+        std::cerr << "panelgate: " << typed
+                  << " is taken in when the file is read; its keys are shown at each station\n";
+        return kNotSet;
+    }
+    if (walk.is_key()) {
+        const config::Described& keys = config::describe();
+        const yaml::KeyShape* shape = keys.find(path);
+        const auto at = std::ranges::find(
+            all, path, [](const Setting& setting) { return path_typed(setting.path); });
+        const bool idle = shape != nullptr && at != all.end() && !at->applies;
+        std::cerr << "panelgate: " << typed << " is not set"
+                  << (idle ? ": " + keys.condition_of(shape->path) : "") << '\n';
+        return kNotSet;
+    }
     std::vector<std::string_view> paths;
     for (const Setting& setting : all) paths.push_back(setting.path);
-    const std::string near = nearest(path, paths);
-    return near.empty() ? "; `panelgate config get` lists all"
-                        : "; did you mean '" + shown_path(near) + "'?";
+    std::string hint = walk.hint();
+    if (const std::string near = hint.empty() ? nearest(path, paths) : ""; !near.empty())
+        hint = "; did you mean '" + shown_path(near) + "'?";
+    std::cerr << "panelgate: there is no setting '" << typed << '\''
+              << (hint.empty() ? "; `panelgate config get` lists all" : hint) << '\n';
+    return kUsage;
 }
 
 /// A file may hold any bytes; a terminal would obey some of them.
@@ -49,6 +147,14 @@ std::string printable(const std::string& value) {
     std::string text = as_utf8(value);
     std::ranges::replace_if(text, [](unsigned char c) { return c < ' ' || c == 0x7F; }, '?');
     return text;
+}
+
+/// As it is typed in a file: a text may need quotes.
+std::string listed_value(const Setting& setting) {
+    using Kind = yaml::KeyShape::Kind;
+    const yaml::KeyShape* key = config::describe().find(setting.path);
+    const bool is_text = key != nullptr && (key->kind == Kind::text || key->kind == Kind::map);
+    return printable(is_text ? yaml::written(setting.value) : setting.value);
 }
 
 std::string words_text(const std::vector<std::string>& words) {
@@ -133,23 +239,20 @@ ExitCode config_get(const std::string& file, const std::string& typed) {
     if (!loaded.config) return loaded.code;
     const std::vector<Setting> all = config::all_settings(*loaded.config);
     const std::string path = path_typed(typed);
-    const auto value = [](const Setting& setting) {
-        return setting.secret ? std::string("(secret)") : printable(setting.value);
-    };
     bool found = false;
     for (const Setting& setting : all) {
         // An entry of a list has settings of its own, and no value.
-        if (setting.value.empty() && !setting.secret) continue;
-        const bool is_it = path_typed(setting.path) == path;
-        const bool is_below = path.empty() || path_typed(setting.path).starts_with(path + '/');
-        if (is_it) std::cout << value(setting) << '\n';
-        if (!is_it && is_below)
-            std::cout << printable(shown_path(setting.path)) << ": " << value(setting) << '\n';
-        found = found || is_it || is_below;
+        if (!setting.applies || (setting.value.empty() && !setting.secret)) continue;
+        const std::string at = path_typed(setting.path);
+        const bool is_it = at == path;
+        const bool is_listed = !setting.secret && (path.empty() || is_below(at, path));
+        if (is_it) std::cout << (setting.secret ? "(secret)" : printable(setting.value)) << '\n';
+        if (is_listed)
+            std::cout << printable(shown_path(setting.path)) << ": " << listed_value(setting)
+                      << '\n';
+        found = found || is_it || is_listed;
     }
-    if (found) return kFine;
-    std::cerr << "panelgate: there is no setting '" << typed << '\'' << hint(all, path) << '\n';
-    return kUsage;
+    return found ? kFine : explain(all, typed);
 }
 
 }  // namespace panelgate::app

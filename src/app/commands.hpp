@@ -10,6 +10,7 @@ enum ExitCode : int {
     kFine = 0,
     kCut = 1,       ///< a second signal came: outstanding requests were not answered
     kNotReady = 1,  ///< health: /readyz is not 200
+    kNotSet = 1,    ///< config get: the key is not set
     kUsage = 64,
     kNoInput = 66,
     kUnavailable = 69,

@@ -12,6 +12,7 @@
 
 #include "northbound.hpp"
 #include "panelgate/config/describe.hpp"
+#include "panelgate/config/endpoint.hpp"
 #include "panelgate/config/setting.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "running_line.hpp"
@@ -85,7 +86,7 @@ Change change_of(const std::string& path, const Difference& difference) {
     if (difference.before == nullptr) change.kind = Kind::added;
     if (difference.after == nullptr) change.kind = Kind::removed;
     const auto shown = [](const Setting* setting) {
-        return setting == nullptr || setting->secret ? "" : setting->value;
+        return setting == nullptr || setting->secret || !setting->applies ? "" : setting->value;
     };
     change.before = shown(difference.before);
     change.after = shown(difference.after);
@@ -116,6 +117,15 @@ const T* named(const std::vector<T>& all, std::string_view name) {
     return found == all.end() ? nullptr : &*found;
 }
 
+/// By the names that they have in Setting::path.
+std::map<std::string, const tcp_server::Settings*> listeners_of(const config::Config& config) {
+    std::map<std::string, const tcp_server::Settings*> all;
+    Distinct names;
+    for (const tcp_server::Settings& listener : config.modbus_tcp)
+        all.emplace(names.name(listener.name()), &listener);
+    return all;
+}
+
 bool is_reopened(const config::Line& before, const config::Config& after) {
     const config::Line* now = named(after.lines, before.name);
     return now != nullptr && !is_same_wire(before, *now, false);
@@ -131,32 +141,61 @@ bool is_taken_over(const config::Config& before, const config::Config& after,
     return line != nullptr && !is_reopened(*line, after);
 }
 
+constexpr std::string_view kPortCloses = "the port is closed";
+constexpr std::string_view kClientsClose = "its clients are closed";
+
+/// True if clients that were let in may be outside now.
+bool may_close(const std::vector<Network>& before, const std::vector<Network>& after) {
+    static const std::vector<Network> kAll{{"0.0.0.0", 0}, {"::", 0}};
+    const auto is_inside = [&](const Network& network) {
+        return std::ranges::any_of(
+            after, [&](const Network& wide) { return config::covers(wide, network); });
+    };
+    return !after.empty() && !std::ranges::all_of(before.empty() ? kAll : before, is_inside);
+}
+
+/// What happens to the clients of a listener; `after` is null where it is gone.
+template <class Settings>
+std::string_view cut_of(const Settings& before, const Settings* after) {
+    if (after == nullptr) return kClientsClose;
+    if (!before.is_same_listener(*after)) return config::kListensAnew;
+    return may_close(before.allow, after->allow) ? config::kAllowCloses : std::string_view();
+}
+
+std::string_view cut_of(const config::Line& before, const config::Config& after) {
+    if (named(after.lines, before.name) == nullptr) return kPortCloses;
+    return is_reopened(before, after) ? config::kOpensPort : std::string_view();
+}
+
+std::string_view cut_of(const serial_server::Settings& before, const config::Config& after) {
+    const auto* now = named(after.serial_masters, before.name);
+    if (now == nullptr) return kPortCloses;
+    return before.is_same_port(*now) ? std::string_view() : config::kOpensPort;
+}
+
+std::string_view cut_of_session(const config::Config& before, const config::Config& after) {
+    if (!before.mqtt || is_same_session(before, after)) return {};
+    return after.mqtt ? config::kConnectsAnew : "the session ends";
+}
+
 }  // namespace
 
-std::vector<std::string> interruptions(const config::Config& before, const config::Config& after) {
-    std::vector<std::string> all;
-    const auto add = [&](const std::string& part, std::string_view what) {
-        all.push_back(part + ": " + std::string(what));
+std::vector<Interruption> interruptions(const config::Config& before, const config::Config& after) {
+    std::vector<Interruption> all;
+    const auto add = [&](const std::string& path, std::string_view what) {
+        if (!what.empty()) all.push_back({path, std::string(what)});
     };
-    for (const config::Line& line : before.lines)
-        if (is_reopened(line, after)) add("lines/" + line.name, config::kOpensPort);
-    for (const serial_server::Settings& master : before.serial_masters) {
-        const auto* now = named(after.serial_masters, master.name);
-        if (now != nullptr && !master.is_same_port(*now))
-            add("serial_masters/" + master.name, config::kOpensPort);
+    for (const config::Line& line : before.lines) add("lines/" + line.name, cut_of(line, after));
+    for (const serial_server::Settings& master : before.serial_masters)
+        add("serial_masters/" + master.name, cut_of(master, after));
+    const auto listeners = listeners_of(after);
+    for (const auto& [name, listener] : listeners_of(before)) {
+        const auto now = listeners.find(name);
+        add("modbus_tcp/" + name,
+            cut_of(*listener, now == listeners.end() ? nullptr : now->second));
     }
-    for (const tcp_server::Settings& listener : before.modbus_tcp) {
-        const auto is_anew = [&](const tcp_server::Settings& now) {
-            return now.name() == listener.name() && !now.is_same_listener(listener);
-        };
-        if (std::ranges::any_of(after.modbus_tcp, is_anew))
-            add("modbus_tcp/" + listener.name(), config::kListensAnew);
-    }
-    if (before.http && after.http && !before.http->is_same_listener(*after.http))
-        add("http", config::kListensAnew);
-    if (before.mqtt && after.mqtt && !is_same_session(before, after))
-        add("mqtt", config::kConnectsAnew);
-    if (before.realtime != after.realtime) add("realtime", config::kNextStart);
+    if (before.http) add("http", cut_of(*before.http, after.http ? &*after.http : nullptr));
+    add("mqtt", cut_of_session(before, after));
     return all;
 }
 
@@ -187,12 +226,14 @@ std::string to_string(const Change& change) {
     if (change.before.empty() && change.after.empty() && change.kind != Kind::changed)
         return change.path + ": " + word;
     const std::size_t cut = change.path.rfind('/');
-    if (cut == change.path.npos) return change.path + ": " + word;
-    const std::string place = change.path.substr(0, cut) + ": " + change.path.substr(cut + 1);
+    const std::string place = cut == change.path.npos
+                                  ? change.path + ':'
+                                  : change.path.substr(0, cut) + ": " + change.path.substr(cut + 1);
     if (change.kind == Kind::added) return place + " added, " + change.after;
     if (change.kind == Kind::removed) return place + " removed, was " + change.before;
     if (change.before.empty() && change.after.empty()) return place + ' ' + word;
-    return place + ' ' + change.before + " -> " + change.after;
+    const auto shown = [](const std::string& value) { return value.empty() ? "not set" : value; };
+    return place + ' ' + shown(change.before) + " -> " + shown(change.after);
 }
 
 boost::json::array to_json(const std::vector<Change>& changes) {
@@ -389,9 +430,8 @@ void add_moved_units(const std::string& listener, const UnitRoutes& before, cons
 /// By the names of listeners and serial masters.
 std::map<std::string, UnitAccess> accesses_of(const config::Config& config) {
     std::map<std::string, UnitAccess> all;
-    Distinct names;
-    for (const tcp_server::Settings& listener : config.modbus_tcp)
-        all.emplace(names.name(listener.name()), UnitAccess{&listener, true});
+    for (const auto& [name, listener] : listeners_of(config))
+        all.emplace(name, UnitAccess{listener, true});
     for (const serial_server::Settings& master : config.serial_masters)
         all.emplace("serial master " + master.name, UnitAccess{&master.access, false});
     return all;

@@ -36,9 +36,14 @@ std::string to_string(const Change& change);
 /// {"path", "kind", "before", "after", "needs"} each; the last three unless they are empty.
 boost::json::array to_json(const std::vector<Change>& changes);
 
-/// What a reload interrupts, one text each: "lines/floor1: the port is opened anew". Lines, masters
-/// and listeners that come or go are not listed. Judged as the running parts judge it. Pure.
-std::vector<std::string> interruptions(const config::Config& before, const config::Config& after);
+/// What is cut when another configuration is taken over.
+struct Interruption {
+    std::string path;  ///< as Change::path: "lines/floor1"
+    std::string what;  ///< "the port is opened anew"
+};
+/// What a reload interrupts, also by what is removed or renamed. Judged as the running parts judge
+/// it. Pure.
+std::vector<Interruption> interruptions(const config::Config& before, const config::Config& after);
 
 /// Units of a listener or serial master by which a client would now reach another panel: the line
 /// of their station was taken away, its id or its alias has changed, stations are swapped. One

@@ -31,16 +31,33 @@ mqtt::Settings completed(mqtt::Settings settings) {
     return settings;
 }
 
+template <class One>
+void sort_by_name(std::vector<const One*>& all) {
+    std::ranges::sort(all, {}, [](const One* one) -> const std::string& { return one->name; });
+}
+
+/// They outlive the result.
+template <class List>
+auto by_name(const List& list) {
+    std::vector<const typename List::value_type*> sorted;
+    for (const auto& one : list) sorted.push_back(&one);
+    sort_by_name(sorted);
+    return sorted;
+}
+
 }  // namespace
 
 mqtt::Subjects subjects_of(const config::Config& config) {
     mqtt::Subjects subjects;
-    for (const config::Line& line : config.lines) subjects.add_line(line.name);
-    for (const config::Line& line : config.lines) {
-        for (const config::Station& station : line.stations) {
-            subjects.add_station(station.name);
-            for (const points::Point& point : station.points) subjects.add_point(point);
-        }
+    std::vector<const config::Station*> stations;
+    for (const config::Line* line : by_name(config.lines)) {
+        subjects.add_line(line->name);
+        for (const config::Station& station : line->stations) stations.push_back(&station);
+    }
+    sort_by_name(stations);
+    for (const config::Station* station : stations) {
+        subjects.add_station(station->name);
+        for (const points::Point* point : by_name(station->points)) subjects.add_point(*point);
     }
     return subjects;
 }
@@ -80,14 +97,19 @@ bool BrokerSession::fits(const Snapshot& snapshot) const {
 
 void BrokerSession::show(std::shared_ptr<const Snapshot> snapshot) {
     snapshot_ = std::move(snapshot);
-    first_points_.clear();
+    numbers_.clear();
     places_.assign(snapshot_->plant.lines().size(), {});
-    for (const Station& station : snapshot_->plant.stations()) {
-        places_.push_back({&station, nullptr});
-        if (!station.points) continue;
-        first_points_[&station] = places_.size();
-        for (const points::Point& point : station.points->points())
-            places_.push_back({&station, &point});
+    for (const Station* station : by_name(snapshot_->plant.stations())) {
+        Numbers& numbers = numbers_[station];
+        numbers.station = places_.size();
+        places_.push_back({station, nullptr});
+        if (!station->points) continue;
+        const std::vector<points::Point>& points = station->points->points();
+        numbers.points.resize(points.size());
+        for (const points::Point* point : by_name(points)) {
+            numbers.points[static_cast<std::size_t>(point - points.data())] = places_.size();
+            places_.push_back({station, point});
+        }
     }
 }
 
@@ -189,11 +211,11 @@ void BrokerSession::on_bus_event(const std::string& line, const bus::BusEvent& e
 }
 
 void BrokerSession::on_points(const Station& station, const std::vector<std::size_t>& wants) {
-    const auto first = first_points_.find(&station);
-    if (first == first_points_.end()) return;
+    const auto numbers = numbers_.find(&station);
+    if (numbers == numbers_.end() || !station.points) return;
     for (const std::size_t want : wants)
-        if (station.points->point_of(want) != nullptr) look(first->second + want);
-    look(first->second - 1);  // the station: it may have answered for the first time
+        if (want < numbers->second.points.size()) look(numbers->second.points[want]);
+    look(numbers->second.station);  // it may have answered for the first time
 }
 
 void BrokerSession::on_command(const mqtt::Command& command) {

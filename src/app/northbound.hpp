@@ -21,7 +21,8 @@
 
 namespace panelgate::app {
 
-/// What a session publishes: lines, then stations with their points.
+/// What a session publishes: lines, then stations with their points, each in the order of their
+/// names: that in which they are written costs no session.
 mqtt::Subjects subjects_of(const config::Config& config);
 /// True if a session at the broker can go on: its settings and what it publishes are the same.
 bool is_same_session(const config::Config& before, const config::Config& now);
@@ -68,6 +69,12 @@ class BrokerSession {
         std::size_t open = 0;
     };
 
+    /// The subjects of a station; its points in the order of the configuration.
+    struct Numbers {
+        std::size_t station = 0;
+        std::vector<std::size_t> points;
+    };
+
     std::optional<mqtt::State> seen(std::size_t subject) const;
     void look(std::size_t subject);
     void sweep();
@@ -83,8 +90,7 @@ class BrokerSession {
     std::shared_ptr<const Snapshot> snapshot_;  ///< what the places refer to
     mqtt::Settings settings_;
     std::vector<Place> places_;  ///< by subject
-    /// The index of a station's first point; its points are consecutive.
-    std::map<const Station*, std::size_t> first_points_;
+    std::map<const Station*, Numbers> numbers_;
     mqtt::Publisher publisher_;
     std::unique_ptr<rt::Alarm> alarm_;  ///< of the sweep
     std::size_t swept_ = 0;

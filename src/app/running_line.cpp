@@ -193,14 +193,16 @@ bool is_remote(const config::Line& line, bool simulate) {
     return line.kind == config::Line::Kind::tcp && !simulate;
 }
 
-/// True if both lines simulate the same panels.
+/// True if both lines simulate the same panels, in whatever order they are written.
 bool plays_alike(const config::Line& before, const config::Line& now) {
+    const auto is_there = [&](const config::Station& one) {
+        const auto other = std::ranges::find(before.stations, one.id, &config::Station::id);
+        return other != before.stations.end() && *one.profile == *other->profile &&
+               one.faults == other->faults;
+    };
     return before.simulated_echo == now.simulated_echo &&
-           std::ranges::equal(before.stations, now.stations,
-                              [](const config::Station& one, const config::Station& other) {
-                                  return one.id == other.id && *one.profile == *other.profile &&
-                                         one.faults == other.faults;
-                              });
+           before.stations.size() == now.stations.size() &&
+           std::ranges::all_of(now.stations, is_there);
 }
 
 constexpr std::size_t kWires = 64;

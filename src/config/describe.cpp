@@ -136,18 +136,22 @@ std::string_view Described::change_of(std::string_view setting) const {
     return key == nullptr ? std::string_view() : key->change;
 }
 
-bool Described::is_key(std::string_view setting) const {
-    const yaml::KeyShape* key = find(setting);
-    const std::string_view last = setting.substr(setting.rfind('/') + 1);
-    return key != nullptr && ('/' + key->path).ends_with('/' + std::string(last));
-}
-
 std::string Described::condition_of(std::string_view key) const {
     for (const yaml::KeyRule& rule : rules) {
         if (rule.needs || rule.map + '/' + rule.key != key) continue;
+        const auto is_allowed = [&](const std::string& word) {
+            return std::ranges::find(rule.words, word) != rule.words.end();
+        };
+        std::vector<std::string> others;
+        const auto other =
+            std::ranges::find(keys, rule.map + '/' + rule.other, &yaml::KeyShape::path);
+        if (other != keys.end()) others = other->words;
+        std::erase_if(others, is_allowed);
+        const bool shorter = rule.absent_will_do && others.size() < rule.words.size();
         std::string words;
-        for (const std::string& word : rule.words) words += (words.empty() ? "" : " or ") + word;
-        return "only with " + rule.other + ": " + words;
+        for (const std::string& word : shorter ? others : rule.words)
+            words += (words.empty() ? "" : " or ") + word;
+        return (shorter ? "not with " : "only with ") + rule.other + ": " + words;
     }
     return "";
 }

@@ -87,6 +87,13 @@ bool is_in(const std::string& address, const std::string& network, unsigned pref
     return one && other && same_prefix(*one, *other, bits);
 }
 
+bool covers(const Network& wide, const Network& narrow) {
+    const auto bits = [](const Network& network) {
+        return is_ipv6(network.address) ? network.prefix : 96 + network.prefix;
+    };
+    return bits(wide) <= bits(narrow) && is_in(narrow.address, wide.address, wide.prefix);
+}
+
 bool is_loopback(const std::string& address) {
     return is_in(address, "127.0.0.0", 8) || is_in(address, "::1", 128);
 }

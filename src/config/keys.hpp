@@ -112,9 +112,10 @@ class Keys {
     Keys other(std::string_view key, std::string_view text, Shown shown = {}) && {
         return std::move(*this).add(key, text, {}, std::move(shown));
     }
-    /// Replaces how the key before this is shown.
-    Keys shown_as(Shown shown) && {
-        rows_.back().shown = std::move(shown);
+    /// The key before this is not set where this is false.
+    Keys shown_if(std::function<bool(const V&)> is_set) && {
+        rows_.back().shown = [shown = std::move(rows_.back().shown), is_set = std::move(is_set)](
+                                 const V& of) { return is_set(of) ? shown(of) : std::string(); };
         return std::move(*this);
     }
     /// Replaces what leaving out the key before this means.

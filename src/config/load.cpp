@@ -256,6 +256,7 @@ std::shared_ptr<const profile::Catalogue> load_profiles(Loading& loading, MapRea
     auto catalogue = std::make_shared<profile::Catalogue>(profile::Catalogue::shipped());
     const auto dir = root.text("profiles_dir");
     if (!dir) return catalogue;
+    loading.config.profiles_dir = *dir;
     for (const std::string& fault :
          add_profiles(*dir, loading.files, *catalogue, loading.problems)) {
         root.problem("profiles_dir", "profiles_dir: " + fault);
@@ -405,6 +406,7 @@ std::string did_you_mean(std::string_view typed, std::span<const std::string_vie
                          std::string_view noun) {
     const std::string near = nearest(typed, known);
     if (!near.empty()) return "; did you mean '" + near + "'?";
+    if (known.empty()) return "; there are none";
     std::string list;
     constexpr std::size_t kMost = 30;
     for (const std::string_view word : known.first(std::min(kMost, known.size())))

@@ -80,10 +80,11 @@ std::string path_of(const Node* file) {
 
 /// Reads a token's secret: the file's text without surrounding blanks and byte order mark.
 /// `elsewhere`: the secret is in the configuration, which is already a problem.
-std::string load_secret(Loading& loading, MapReader& in, bool elsewhere) {
+std::string load_secret(Loading& loading, MapReader& in, bool elsewhere, web::Token& token) {
     constexpr std::string_view kBlanks = " \t\r\n";
     const auto file = elsewhere ? in.text("file") : in.required_text("file");
     if (!file) return "";
+    token.file = *file;
     if (loading.files.is_special(*file)) {
         in.problem("file", "the token file must be a file, not a pipe, a socket or a device");
         return "";
@@ -134,7 +135,7 @@ web::Token load_token(Loading& loading, const Node& node) {
         {{"viewer", web::Role::viewer}, {"operator", web::Role::operator_}}};
     if (in.required_text("role"))
         token.role = in.choice<web::Role>("role", kRoles).value_or(web::Role::viewer);
-    token.secret = load_secret(loading, in, elsewhere);
+    token.secret = load_secret(loading, in, elsewhere, token);
     token_keys().read(in, token);
     in.finish();
     return token;

@@ -123,10 +123,12 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
     line.device.device = in.required_text("device").value_or("");
     in.looks_like("device", "^(/|tcp://.+:[0-9]+$|sim$)");
     if (check_comment(in, line.device.device)) return;
+    const std::string first =
+        loading.firsts.again("device " + line.device.device, in.mark("device"));
     for (const Line& other : loading.config.lines) {
         if (line.device.device == "sim" || line.device.device.empty()) break;
         if (other.device.device != line.device.device) continue;
-        in.problem("device", "line '" + other.name + "' has this device already");
+        in.problem("device", "line '" + other.name + "' has this device already" + first);
         break;
     }
     if (line.device.device == "sim") {
@@ -219,8 +221,11 @@ Line load_line(Loading& loading, const Node& node) {
     in.elsewhere(kElsewhere);
     Line line;
     line.name = load_name(in, true).value_or("");
-    if (!line.name.empty() && std::ranges::count(loading.config.lines, line.name, &Line::name) > 0)
-        in.problem("name", "there are two lines '" + line.name + '\'');
+    if (!line.name.empty()) {
+        loading.firsts.once(in, "name", "line " + line.name,
+                            "there are two lines '" + line.name + '\'');
+        loading.config.line_marks.emplace(line.name, in.mark("name"));
+    }
     load_device(loading, in, line);
     load_mode(in, line);
     const bool serial_known =

@@ -51,6 +51,19 @@ bool parse_broker(std::string_view text, mqtt::Settings& settings) {
     return true;
 }
 
+/// Suggests mqtt://localhost:1883 for localhost:1883 and http://localhost:1883/.
+std::string broker_hint(std::string_view typed) {
+    const std::size_t scheme = typed.find("://");
+    constexpr std::array<std::string_view, 4> kSafe{"mqtts", "https", "ssl", "tls"};
+    const bool safe =
+        scheme != typed.npos && std::ranges::find(kSafe, typed.substr(0, scheme)) != kSafe.end();
+    std::string rest(scheme == typed.npos ? typed : typed.substr(scheme + 3));
+    if (rest.ends_with('/')) rest.pop_back();
+    const std::string broker = (safe ? "mqtts://" : "mqtt://") + rest;
+    mqtt::Settings unused;
+    return parse_broker(broker, unused) ? "; write " + broker : "";
+}
+
 void load_broker(MapReader& in, mqtt::Settings& settings) {
     const auto text = in.required_text("broker");
     in.looks_like("broker", "^mqtts?://.");
@@ -65,7 +78,7 @@ void load_broker(MapReader& in, mqtt::Settings& settings) {
     in.problem("broker",
                "broker must be mqtt://HOST:PORT, or mqtts://HOST:PORT with TLS, such as "
                "mqtt://broker.plant:1883, not " +
-                   yaml::quote(*text));
+                   yaml::quote(*text) + broker_hint(*text));
 }
 
 /// Reads a part of topics; `kind` says in messages what it must be.
@@ -158,6 +171,7 @@ void load_session(Loading& loading, MapReader& in, mqtt::Settings& settings) {
     if (settings.client_id.size() > kLongest)
         in.problem("client_id", "client_id must have at most 128 characters");
     settings.username = in.text("username").value_or("");
+    settings.password_file = in.text("password_file").value_or("");
     settings.password = load_password(loading, in);
 }
 

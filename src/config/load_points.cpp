@@ -19,10 +19,27 @@ using points::Type;
 using yaml::MapReader;
 using yaml::Node;
 
-std::vector<std::string_view> type_words() {
+template <class Fits>
+std::vector<std::string_view> words_of(const Fits& fits) {
     std::vector<std::string_view> words;
-    for (const Type type : points::kTypes) words.push_back(label(type));
+    for (const Type type : points::kTypes)
+        if (fits(type)) words.push_back(label(type));
     return words;
+}
+
+bool is_number(Type type) { return type != Type::boolean && type != Type::string; }
+bool is_of_registers(Type type) { return type != Type::boolean; }
+
+/// Reports keys that are not for the point's type; `what` is what they are for: "numbers".
+template <class Fits>
+void check_type(MapReader& in, const Point& point, std::initializer_list<std::string_view> keys,
+                const Fits& fits, const std::string& what) {
+    for (const std::string_view key : keys) {
+        in.belongs(key, "type", words_of(fits), true);
+        if (in.has(key) && !fits(point.type))
+            in.problem(key, std::string(key) + (key.ends_with('s') ? " are for " : " is for ") +
+                                what + ", not for type " + std::string(label(point.type)));
+    }
 }
 
 /// float32be, uint32_le
@@ -38,7 +55,7 @@ void load_type(MapReader& in, Point& point) {
     if (bit && bits) in.problem("bit", point.at + " is a bit already; remove bit");
     if (bit && !bits) point.bit = static_cast<unsigned>(*bit);
     point.type = bits || point.bit ? Type::boolean : Type::u16;
-    const auto words = type_words();
+    const auto words = words_of([](Type) { return true; });
     if (const auto chosen = in.choice_index("type", words, order_hint)) {
         const Type type = points::kTypes[*chosen];
         if (point.type == Type::boolean && type != Type::boolean) {
@@ -59,8 +76,9 @@ void load_type(MapReader& in, Point& point) {
         in.problem("length", "length is for type: string only");
     if (point.type == Type::string) point.length = static_cast<unsigned>(length.value_or(1));
     point_keys().read(in, point);
-    if (point.type == Type::boolean && in.has("word_order"))
-        in.problem("word_order", "word_order is for values of registers, not for type bool");
+    check_type(in, point, {"word_order"}, is_of_registers, "values of registers");
+    check_type(in, point, {"scale", "offset", "min", "max", "no_value"}, is_number, "numbers");
+    check_type(in, point, {"labels"}, points::is_integer, "integers");
 }
 
 /// Reads a number; more digits than a double holds are a problem.
@@ -79,12 +97,6 @@ void load_scale(MapReader& in, Point& point) {
     point.scale = exact_number(in, "scale", 1);
     in.never("scale", 0);
     point.offset = exact_number(in, "offset", 0);
-    const bool number = point.type != Type::boolean && point.type != Type::string;
-    for (const std::string_view key : {"scale", "offset", "min", "max"}) {
-        if (in.has(key) && !number)
-            in.problem(key, std::string(key) + " is for numbers, not for type " +
-                                std::string(label(point.type)));
-    }
     if (point.scale == 0) {
         in.problem("scale", "scale must not be 0");
         point.scale = 1;
@@ -141,12 +153,7 @@ std::string labels_example(const Node* typed) {
 void load_labels(MapReader& in, Point& point) {
     const Node* labels = in.map("labels", labels_example(in.child("labels")));
     in.keyed_by("labels", yaml::kIntegerPattern);
-    if (labels == nullptr) return;
-    if (!is_integer(point.type)) {
-        in.problem("labels",
-                   "labels are for integers, not for type " + std::string(label(point.type)));
-        return;
-    }
+    if (labels == nullptr || !is_integer(point.type)) return;
     if (labels->entries.size() > points::kMaxLabels) {
         in.problem("labels", "at most " + std::to_string(points::kMaxLabels) +
                                  " labels of one point, not " +
@@ -160,12 +167,7 @@ void load_no_value(MapReader& in, Point& point) {
     const Node* list = in.sequence("no_value");
     in.holds_integers("no_value");
     in.entries("no_value", 0, points::kMaxNoValues);
-    if (list == nullptr) return;
-    if (point.type == Type::boolean || point.type == Type::string) {
-        in.problem("no_value",
-                   "no_value is for numbers, not for type " + std::string(label(point.type)));
-        return;
-    }
+    if (list == nullptr || !is_number(point.type)) return;
     if (list->items.size() > points::kMaxNoValues) {
         in.problem("no_value", "at most " + std::to_string(points::kMaxNoValues) +
                                    " values that mean none, not " +
@@ -242,7 +244,7 @@ bool refuse_short_form(Loading& loading, const Node& node) {
 constexpr const char* kListens =
     "the line is only listened to (mode: listen): nothing can be written there; leave writable out";
 
-void load_point(Loading& loading, const Node& node, Station& station) {
+void load_point(Loading& loading, const Node& node, Station& station, Firsts& names) {
     if (refuse_short_form(loading, node)) return;
     MapReader in(node, loading.problems, "a point", "{name: temperature, at: UW100}");
     Point point;
@@ -252,10 +254,9 @@ void load_point(Loading& loading, const Node& node, Station& station) {
     if (!point.name.empty() && !is_point_name(point.name))
         in.problem("name", "name must be of a-z, 0-9, '-' and '_', not " + yaml::quote(point.name) +
                                name_hint(point.name));
-    if (!point.name.empty() &&
-        std::ranges::find(station.points, point.name, &Point::name) != station.points.end()) {
-        in.problem("name", "there are two points '" + point.name + "' of this station");
-    }
+    if (!point.name.empty())
+        names.once(in, "name", point.name,
+                   "there are two points '" + point.name + "' of this station");
     const auto item = load_notation(in, "at", *station.profile);
     point.at = in.text("at").value_or("");
     if (item) {
@@ -266,7 +267,9 @@ void load_point(Loading& loading, const Node& node, Station& station) {
     load_scale(in, point);
     point.unit = load_unit(in);
     if (point.writable && station.read_only)
-        in.problem("writable", "station '" + station.name + "' is read_only");
+        in.problem("writable", "station '" + station.name +
+                                   "' is read_only; give it access: read_write, or leave writable "
+                                   "out");
     if (point.writable && station.listens) in.problem("writable", kListens);
     load_labels(in, point);
     load_no_value(in, point);
@@ -341,8 +344,9 @@ void load_points(Loading& loading, MapReader& in, Station& station) {
     }
     load_list(loading, in, "poll", "[{read: UW100, count: 8, every: 1s}]", points::kMaxPolls,
               [&](Loading& l, const Node& node) { load_poll(l, node, station); });
+    Firsts names;
     load_list(loading, in, "points", "[{name: temperature, at: UW100}]", points::kMaxPoints,
-              [&](Loading& l, const Node& node) { load_point(l, node, station); });
+              [&](Loading& l, const Node& node) { load_point(l, node, station, names); });
 }
 
 }  // namespace panelgate::config

@@ -155,6 +155,19 @@ const Station* find_station(const Config& config, std::string_view name) {
     return nullptr;
 }
 
+/// Suggests press/UW100 for floor1/press/UW100 and press.UW100.
+std::string end_hint(const Config& config, std::string_view typed) {
+    for (std::string_view rest = typed; !rest.empty();) {
+        const std::size_t end = rest.find_first_of("./");
+        if (end == rest.npos || end + 1 == rest.size()) return "";
+        const std::string name(rest.substr(0, end));
+        if (find_station(config, name) != nullptr)
+            return "; write " + name + '/' + std::string(rest.substr(end + 1));
+        rest.remove_prefix(end + 1);
+    }
+    return "";
+}
+
 /// STATION/NOTATION
 std::optional<End> load_end(Loading& loading, MapReader& in, std::string_view key) {
     const auto text = in.required_text(key);
@@ -163,7 +176,7 @@ std::optional<End> load_end(Loading& loading, MapReader& in, std::string_view ke
     const std::size_t slash = text->find('/');
     if (slash == text->npos || slash == 0 || slash + 1 == text->size()) {
         in.problem(key, std::string(key) + " must be STATION/NOTATION such as press/UW100, not " +
-                            yaml::quote(*text));
+                            yaml::quote(*text) + end_hint(loading.config, *text));
         return std::nullopt;
     }
     End end;
@@ -174,8 +187,10 @@ std::optional<End> load_end(Loading& loading, MapReader& in, std::string_view ke
     if (end.station == nullptr) {
         std::vector<std::string_view> names(loading.station_names.begin(),
                                             loading.station_names.end());
-        in.problem(key, "there is no station " + yaml::quote(end.end.station) +
-                            did_you_mean(end.end.station, names, "stations"));
+        const std::string hint = end_hint(loading.config, *text);
+        in.problem(key,
+                   "there is no station " + yaml::quote(end.end.station) +
+                       (hint.empty() ? did_you_mean(end.end.station, names, "stations") : hint));
         return std::nullopt;
     }
     if (end.station->listens) {
@@ -211,7 +226,9 @@ void check_target(MapReader& in, const End& to, std::uint32_t count) {
                              to.area->source + ')');
         return;
     }
-    if (to.station->read_only) in.problem("to", "station '" + to.station->name + "' is read_only");
+    if (to.station->read_only)
+        in.problem("to", "station '" + to.station->name +
+                             "' is read_only; give it access: read_write, or leave the relay out");
     const profile::PanelProfile& profile = *to.station->profile;
     const auto one = bits ? modbus::kWriteSingleCoil : modbus::kWriteSingleRegister;
     const auto several = bits ? modbus::kWriteMultipleCoils : modbus::kWriteMultipleRegisters;

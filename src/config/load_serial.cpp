@@ -26,8 +26,11 @@ using yaml::Node;
 /// RTU has 8, ASCII normally 7, and 8 on some panels (serial line V1.02, 2.5.1, 2.5.2).
 void load_data_bits(MapReader& in, SerialFormat& format) {
     const bool ascii = format.mode == SerialMode::ascii;
-    const auto bits = in.integer("data_bits", 0, 999'999'999).value_or(ascii ? 7 : 8);
-    in.within("data_bits", 7, 8);
+    const Node* typed = in.child("data_bits");
+    const bool plain = typed != nullptr && typed->kind == Node::Kind::scalar && !typed->is_text();
+    const auto number = plain ? yaml::parse_integer(typed->scalar) : std::nullopt;
+    const bool outside = number && (*number < 7 || *number > 8);  // it has a text of its own
+    const auto bits = outside ? *number : in.integer("data_bits", 7, 8).value_or(ascii ? 7 : 8);
     format.data_bits = bits == 7 && ascii ? 7 : 8;
     if (bits == format.data_bits) return;
     in.problem("data_bits", bits == 7 ? "RTU needs 8 data bits; 7 is for ASCII mode"
@@ -92,23 +95,25 @@ constexpr std::string_view kMasterListExample =
     "[{name: plc, device: /dev/ttyUSB1, lines: [floor1]}]";
 
 void check_name(Loading& loading, MapReader& in, const Settings& settings) {
-    const auto same = [&](const Settings& other) { return other.name == settings.name; };
-    if (!settings.name.empty() && std::ranges::any_of(loading.config.serial_masters, same))
-        in.problem("name", "there are two serial masters '" + settings.name + '\'');
+    if (settings.name.empty()) return;
+    loading.firsts.once(in, "name", "master " + settings.name,
+                        "there are two serial masters '" + settings.name + '\'');
 }
 
 /// Two users of one device would take each other's bytes. An invalid device is a problem already.
 void check_device(Loading& loading, MapReader& in, const line::Settings& port) {
     if (!port.device.starts_with('/')) return;
+    const std::string first = loading.firsts.again("device " + port.device, in.mark("device"));
     for (const Line& line : loading.config.lines) {
         if (line.device.device != port.device) continue;
         in.problem("device", "line '" + line.name +
-                                 "' has this device already; a master needs a port of its own");
+                                 "' has this device already; a master needs a port of its own" +
+                                 first);
         return;
     }
     for (const Settings& other : loading.config.serial_masters) {
         if (other.device.device != port.device) continue;
-        in.problem("device", "serial master '" + other.name + "' has this device already");
+        in.problem("device", "serial master '" + other.name + "' has this device already" + first);
         return;
     }
 }

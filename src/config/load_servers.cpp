@@ -367,11 +367,10 @@ void load_modbus_tcp(Loading& loading, MapReader& root) {
     if (list == nullptr) return;
     for (const Node& node : list->items) {
         tcp_server::Settings settings = load_listener(loading, node);
-        for (const tcp_server::Settings& other : loading.config.modbus_tcp) {
-            if (settings.port == 0 || other.name() != settings.name()) continue;
-            loading.problems.add(node.mark, "there are two listeners on " + settings.name());
-            break;
-        }
+        const std::string name = settings.name();
+        const std::string first = loading.firsts.again("listener " + name, node.mark);
+        if (settings.port != 0 && !first.empty())
+            loading.problems.add(node.mark, "there are two listeners on " + name + first);
         loading.config.modbus_tcp.push_back(std::move(settings));
     }
 }
@@ -391,11 +390,9 @@ void load_http(Loading& loading, MapReader& root) {
     refuse_empty(in, "allow", kNoNetwork);
     refuse_empty(in, "tokens", "give at least one token, or leave it out");
     in.finish();
-    for (const tcp_server::Settings& other : loading.config.modbus_tcp) {
-        if (settings.port == 0 || other.name() != settings.name()) continue;
-        in.problem("listen", settings.name() + " is a modbus_tcp listener already");
-        break;
-    }
+    if (settings.port != 0)
+        loading.firsts.once(in, "listen", "listener " + settings.name(),
+                            settings.name() + " is a modbus_tcp listener already");
     loading.config.http = std::move(settings);
 }
 

@@ -71,7 +71,7 @@ const PanelProfile* load_profile_name(Loading& loading, MapReader& in) {
 }
 
 /// Returns 0 and adds a problem if there is none.
-std::uint8_t load_id(MapReader& in, const Line& line) {
+std::uint8_t load_id(Loading& loading, MapReader& in) {
     const Node* node = in.child("id");
     const bool plain = node != nullptr && node->kind == Node::Kind::scalar && !node->is_text();
     const auto number = plain ? yaml::parse_integer(node->scalar) : std::nullopt;
@@ -83,9 +83,10 @@ std::uint8_t load_id(MapReader& in, const Line& line) {
     }
     const auto id =
         static_cast<std::uint8_t>(in.required_integer("id", 1, modbus::kMaxStation).value_or(0));
-    if (id != 0 && std::ranges::find(line.stations, id, &Station::id) != line.stations.end()) {
-        in.problem("id", "there are two stations " + node->scalar + " on this line");
-    }
+    if (id == 0) return id;
+    const std::string on = std::to_string(loading.config.lines.size());  // this line's index
+    loading.firsts.once(in, "id", "id " + on + '/' + node->scalar,
+                        "there are two stations " + node->scalar + " on this line");
     return id;
 }
 
@@ -93,9 +94,10 @@ std::string load_station_name(Loading& loading, MapReader& in, const Line& line,
     const std::string number = std::to_string(id);
     std::string automatic = line.name + '-' + number;
     if (!in.has("name")) {
-        const bool complete = id != 0 && !line.name.empty();
-        if (complete && !loading.station_names.insert(automatic).second)
-            in.problem("name", "there is a station '" + automatic + "' already; give this a name");
+        if (id == 0 || line.name.empty()) return automatic;
+        loading.station_names.insert(automatic);
+        loading.firsts.once(in, "name", "station " + automatic,
+                            "there is a station '" + automatic + "' already; give this a name");
         return automatic;
     }
     const std::string reserved = std::string(kAllStations) + '|' + std::string(kOtherStations);
@@ -106,10 +108,9 @@ std::string load_station_name(Loading& loading, MapReader& in, const Line& line,
                                "': metrics and findings call by it what has no name of its own");
         return automatic;
     }
-    if (!loading.station_names.insert(*name).second) {
-        in.problem("name",
-                   "there are two stations '" + *name + "'; names are unique over all lines");
-    }
+    loading.station_names.insert(*name);
+    loading.firsts.once(in, "name", "station " + *name,
+                        "there are two stations '" + *name + "'; names are unique over all lines");
     if (yaml::parse_integer(*name) && *name != number) {
         in.problem("name", "name '" + *name + "' would be taken for a station id");
     }
@@ -207,7 +208,7 @@ Station load_station(Loading& loading, const Node& node, const LineContext& work
     in.elsewhere(kStationKeysElsewhere);
     in.has("template");  // known, though apply_templates() has removed it
     Station station;
-    station.id = load_id(in, work.line);
+    station.id = load_id(loading, in);
     station.name = load_station_name(loading, in, work.line, station.id);
     station.profile = load_profile_name(loading, in);
     check_range(in, *station.profile, station.id);
@@ -418,9 +419,11 @@ Duration automatic_hole(const Line& line) {
     return 60ms + wire_time(line.device.serial, kChunk);
 }
 
-void load_reply_hole(MapReader& in, Duration& hole) {
+void load_reply_hole(MapReader& in, Line& line) {
     if (in.is_word("reply_hole", "auto")) return;
-    hole = in.duration("reply_hole", 1ms, 10s).value_or(hole);
+    const auto hole = in.duration("reply_hole", 1ms, 10s);
+    line.automatic_hole = !hole;
+    line.arbiter.reply_hole = hole.value_or(line.arbiter.reply_hole);
 }
 
 void load_late_window(Loading& loading, MapReader& in, StationSettings& settings) {
@@ -453,8 +456,8 @@ void load_line_timing(Loading& loading, MapReader& in, LineContext& work) {
         MapReader timing(*node, loading.problems, "timing");
         load_common(loading, timing, work, work.timing);
         timing_keys().read(timing, work.timing.settings);
-        load_reply_hole(timing, work.line.arbiter.reply_hole);
-        line_timing_keys().read(timing, work.line.arbiter);
+        load_reply_hole(timing, work.line);
+        line_timing_keys().read(timing, work.line);
         timing.finish();
         work.line.think_time = work.timing.think_time;
         const Duration gap = work.timing.frame_gap.value_or(silent_interval(serial));
@@ -464,6 +467,7 @@ void load_line_timing(Loading& loading, MapReader& in, LineContext& work) {
                         standard(serial));
     }
     StationSettings& settings = work.timing.settings;
+    work.line.automatic_gap = !work.timing.frame_gap;
     settings.frame_gap = work.timing.frame_gap.value_or(silent_interval(serial));
 }
 

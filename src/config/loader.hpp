@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <map>
 #include <optional>
 #include <set>
 #include <span>
@@ -14,6 +15,25 @@
 
 namespace panelgate::config {
 
+/// Where what may be there once was written first.
+class Firsts {
+  public:
+    /// "; the first one is in line 5" where it has been there before, else "".
+    std::string again(const std::string& name, yaml::Mark mark) {
+        const auto [first, added] = lines_.emplace(name, mark.line);
+        return added ? "" : "; the first one is in line " + std::to_string(first->second);
+    }
+    /// Reports at `key` what has been there before.
+    void once(yaml::MapReader& in, std::string_view key, const std::string& name,
+              const std::string& message) {
+        const std::string first = again(name, in.mark(key));
+        if (!first.empty()) in.problem(key, message + first);
+    }
+
+  private:
+    std::map<std::string, int> lines_;
+};
+
 /// What the parts of the loader share while one file is read.
 struct Loading {
     const Files& files;
@@ -22,6 +42,7 @@ struct Loading {
     std::set<std::string> station_names;
     /// `lines`, or a line's `stations`, was no list: names that are not known may be right.
     bool names_missing = false;
+    Firsts firsts{};  ///< "line floor1", "device /dev/ttyS1"
 
     void warn(yaml::Mark mark, const std::string& message) {
         std::string text = yaml::format({problems.file(), mark, "warning: " + message});

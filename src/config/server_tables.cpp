@@ -1,10 +1,9 @@
-#include <array>
-#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "panelgate/base/serial_format.hpp"
+#include "panelgate/yaml/document.hpp"
 #include "tables.hpp"
 
 namespace panelgate::config {
@@ -13,13 +12,12 @@ namespace {
 using yaml::format_duration;
 
 std::string names_text(const std::vector<std::string>& names) {
-    return listed(names, [](const std::string& name) { return name; });
+    return listed(names, [](const std::string& name) { return yaml::written(name); });
 }
 
 std::string networks_text(const std::vector<Network>& allow) {
-    if (allow.empty()) return "all";
     return listed(allow, [](const Network& network) {
-        return network.address + '/' + std::to_string(network.prefix);
+        return yaml::written(network.address + '/' + std::to_string(network.prefix));
     });
 }
 
@@ -53,7 +51,8 @@ const Keys<tcp_server::Settings>& listener_keys() {
         {{"join", Retransmissions::join}, {"pass", Retransmissions::pass}}};
     static const auto kKeys =
         Keys<Settings>()
-            .other("listen", "ADDR:PORT or [ADDR]:PORT; port 0: a free one.")
+            .other("listen", "ADDR:PORT or [ADDR]:PORT; port 0: a free one.",
+                   [](const Settings& settings) { return settings.name(); })
             .initially("127.0.0.1:502")
             .change_needs(kListensAnew)
             .other("framing", "Framing of its clients' requests, over TCP.",
@@ -62,24 +61,25 @@ const Keys<tcp_server::Settings>& listener_keys() {
                    })
             .initially("tcp")
             .change_needs(kListensAnew)
-            .boolean("udp", &Settings::udp, "Takes datagrams on the same port as well.")
+            .boolean("udp", &Settings::udp,
+                     "Takes datagrams on the same port as well, with framing tcp.")
             .change_needs(kListensAnew)
             .word("ascii_lower_case", &Settings::ascii_digits, kLowerCase,
                   "Whether hex digits a-f are taken.")
             .change_needs(kListensAnew)
             .word("broadcast", &Settings::broadcast, kBroadcasts,
-                  "Answer to a write to unit 0: reply (once it is sent), silent, or deny "
-                  "(exception 01). Without it reply with framing tcp, else silent.")
+                  "Answer to a write to unit 0: reply (once it is sent; with framing tcp), "
+                  "silent, or deny (exception 01). Without it reply with framing tcp, else silent.")
             .initially("")
+            .shown_if([](const Settings& settings) {
+                return settings.framing == modbus::Framing::tcp ||
+                       settings.broadcast != BroadcastMode::reply;
+            })
             .word("retransmissions", &Settings::retransmissions, kRetransmissions,
-                  "A request that comes again (same transaction id, unit and bytes) "
-                  "before its answer: join has one frame and one answer, pass takes it "
+                  "With framing tcp, a request that comes again (same transaction id, unit and "
+                  "bytes) before its answer: join has one frame and one answer, pass takes it "
                   "for another one. Without it writes are joined.")
             .initially("")
-            .shown_as([](const Settings& settings) {
-                constexpr std::array<const char*, 3> kWords{"join writes", "join", "pass"};
-                return kWords[static_cast<std::size_t>(settings.retransmissions)];
-            })
             .other("diagnostics_unit", "Unit id of the gateway's own registers; null: none.",
                    [](const Settings& settings) {
                        const auto& unit = settings.diagnostics_unit;
@@ -89,6 +89,7 @@ const Keys<tcp_server::Settings>& listener_keys() {
             .other("allow",
                    "Networks whose clients may connect, such as 192.168.1.0/24. Without it any.",
                    [](const Settings& settings) { return networks_text(settings.allow); })
+            .change_needs(kAllowCloses)
             .integer("max_connections", &Settings::max_connections, 1, 65535,
                      "Most connections of all clients.")
             .integer("max_connections_per_address", &Settings::max_connections_per_address, 1,
@@ -138,7 +139,7 @@ const Keys<serial_server::Settings>& master_keys() {
                    "Without it no limit but the deadline.",
                    [](const Settings& settings) {
                        const auto& timeout = settings.response_timeout;
-                       return timeout ? format_duration(*timeout) : "none";
+                       return timeout ? format_duration(*timeout) : "";
                    })
             .change_needs(kOpensPort);
     return kKeys;
@@ -160,12 +161,11 @@ const Keys<web::Settings>& http_keys() {
             .other("hosts",
                    "Its names in URLs, besides its addresses and localhost; another name "
                    "is answered 421. Without it the machine's name.",
-                   [](const Settings& settings) {
-                       return settings.hosts.empty() ? "the machine's" : names_text(settings.hosts);
-                   })
+                   [](const Settings& settings) { return names_text(settings.hosts); })
             .other("allow",
                    "Networks whose clients may connect, such as 192.168.1.0/24. Without it any.",
                    [](const Settings& settings) { return networks_text(settings.allow); })
+            .change_needs(kAllowCloses)
             .other("tokens", "Tokens of clients (Authorization: Bearer TOKEN).")
             .integer("max_connections_per_address", &Settings::max_connections_per_address, 1,
                      static_cast<std::int64_t>(Settings().max_connections),
@@ -181,16 +181,20 @@ const Keys<web::Token>& token_keys() {
                    [](const web::Token& token) { return token.name; })
             .other("role", "viewer reads, operator reads and writes.",
                    [](const web::Token& token) { return std::string(label(token.role)); })
-            .other("file", "File that holds the token, and nothing else.");
+            .other("file", "File that holds the token, and nothing else.",
+                   [](const web::Token& token) { return token.file; });
     return kKeys;
 }
 
 const Keys<points::Relay>& relay_keys() {
     using points::Relay;
+    const auto text = [](const points::RelayEnd& end) { return end.station + '/' + end.at; };
     static const auto kKeys =
         Keys<Relay>()
-            .other("from", "Source: STATION/NOTATION, such as press/UW100.")
-            .other("to", "Target: STATION/NOTATION.")
+            .other("from", "Source: STATION/NOTATION, such as press/UW100.",
+                   [=](const Relay& relay) { return text(relay.from); })
+            .other("to", "Target: STATION/NOTATION.",
+                   [=](const Relay& relay) { return text(relay.to); })
             .integer("count", &Relay::count, 1, 2040, "Number of registers or bits.")
             .duration("every", &Relay::every, 1ms, points::kSlowest, "Interval between two reads.")
             .boolean("on_change", &Relay::on_change, "Writes only what has changed.")
@@ -205,10 +209,8 @@ const Keys<mqtt::Settings>& mqtt_keys() {
     static constexpr Words<mqtt::Format, 2> kFormats{
         {{"json", mqtt::Format::json}, {"sparkplug", mqtt::Format::sparkplug}}};
     static constexpr Words<bool, 2> kWrites{{{"none", false}, {"points", true}}};
-    const auto text = [](std::string Settings::* member, const char* otherwise = "none") {
-        return [member, otherwise](const Settings& settings) {
-            return (settings.*member).empty() ? std::string(otherwise) : settings.*member;
-        };
+    const auto text = [](std::string Settings::* member) {
+        return [member](const Settings& settings) { return settings.*member; };
     };
     static const auto kKeys =
         Keys<Settings>()
@@ -221,15 +223,15 @@ const Keys<mqtt::Settings>& mqtt_keys() {
                    text(&Settings::topic))
             .initially("panelgate")
             .other("group", "Group id. Without it the topic, with '-' for '/'.",
-                   text(&Settings::group, "automatic"))
-            .other("node", "Edge node id. Without it the machine's name.",
-                   text(&Settings::node, "automatic"))
+                   text(&Settings::group))
+            .other("node", "Edge node id. Without it the machine's name.", text(&Settings::node))
             .integer("qos", &Settings::qos, 0, 1,
                      "Quality of service; 0: what is on its way may be lost.")
             .other("client_id", "Client id. Without it panelgate- and the machine's name.",
-                   text(&Settings::client_id, "automatic"))
+                   text(&Settings::client_id))
             .other("username", "User at the broker. Without it none.", text(&Settings::username))
-            .other("password_file", "File that holds the password of `username`.")
+            .other("password_file", "File that holds the password of `username`.",
+                   text(&Settings::password_file))
             .duration("keep_alive", &Settings::keep_alive, 5s, 1h,
                       "Keep-alive interval, in whole seconds.")
             .integer("store", &Settings::store, 100, 1'000'000,
@@ -237,7 +239,7 @@ const Keys<mqtt::Settings>& mqtt_keys() {
             .word("write", &Settings::write, kWrites,
                   "points: who may publish TOPIC/+/+/set, or DCMD, writes points.")
             .other("ca", "PEM file of the CA, with mqtts://. Without it the system's trusted CAs.",
-                   text(&Settings::ca, "the system's"))
+                   text(&Settings::ca))
             .other("certificate",
                    "PEM file of the gateway's own certificate, with mqtts:// and key.",
                    text(&Settings::certificate))

@@ -1,7 +1,11 @@
 #include "panelgate/config/setting.hpp"
 
+#include <algorithm>
+#include <ranges>
+#include <span>
 #include <string>
 
+#include "panelgate/config/describe.hpp"
 #include "setting_writer.hpp"
 #include "tables.hpp"
 
@@ -10,8 +14,6 @@ namespace {
 
 void show_port(const SettingWriter& port, const line::Settings& settings) {
     port_keys().show(port, settings);
-    const bool is_ascii = settings.serial.mode == SerialMode::ascii;
-    port.below("serial").put("mode", is_ascii ? "ascii" : "rtu");
     serial_keys().show(port.below("serial"), settings.serial);
     rs485_keys().show(port.below("rs485"), settings.rs485);
 }
@@ -23,12 +25,26 @@ void show_point(const SettingWriter& station, const points::Point& point) {
         section.below("labels").put(std::to_string(raw), text);
 }
 
+/// As written: what was reckoned is `auto`.
+void show_timing(const SettingWriter& section, arbiter::StationSettings settings,
+                 bool automatic_gap, Duration think_time, const SettingWriter* owner) {
+    if (automatic_gap) settings.frame_gap.reset();
+    const std::string think = yaml::format_duration(think_time);
+    if (owner != nullptr) {
+        timing_keys().show(section, settings, *owner);
+        section.put("think_time", think, *owner);
+    } else {
+        timing_keys().show(section, settings);
+        section.put("think_time", think);
+    }
+}
+
 void show_station(const SettingWriter& line, const StationView& of) {
     const SettingWriter section = line.item("stations", of.station.name);
     station_keys().show(section, of, line);
-    timing_keys().show(section.below("timing"), of.settings, line.below("timing"));
-    section.below("timing").put("think_time", yaml::format_duration(of.station.think_time),
-                                line.below("timing"));
+    const SettingWriter owner = line.below("timing");
+    show_timing(section.below("timing"), of.settings, of.station.automatic_gap,
+                of.station.think_time, &owner);
     fault_keys().show(section.below("simulate"), of.station.faults);
     for (const points::Point& point : of.station.points) show_point(section, point);
     Distinct reads;
@@ -39,17 +55,19 @@ void show_station(const SettingWriter& line, const StationView& of) {
 void show_line(const SettingWriter& top, const Line& line) {
     const SettingWriter section = top.item("lines", line.name);
     show_port(section, line.device);
-    line_keys().show(section, line);
+    const bool is_ascii = line.device.serial.mode == SerialMode::ascii;
     const bool any_case = line.arbiter.ascii_digits == modbus::HexDigits::any_case;
+    section.below("serial").put("mode", is_ascii ? "ascii" : "rtu");
     section.below("serial").put("ascii_lower_case", any_case ? "take" : "refuse");
-    timing_keys().show(section.below("timing"), line.arbiter.unlisted);
-    line_timing_keys().show(section.below("timing"), line.arbiter);
-    section.below("timing").put("think_time", yaml::format_duration(line.think_time));
+    line_keys().show(section, line);
+    show_timing(section.below("timing"), line.arbiter.unlisted, line.automatic_gap, line.think_time,
+                nullptr);
+    line_timing_keys().show(section.below("timing"), line);
     queue_keys().show(section.below("queue"), line.arbiter.queue);
     offline_keys().show(section.below("offline"), line.arbiter.offline);
     section.below("simulate").put("echo", line.simulated_echo ? "true" : "false");
     for (std::size_t i = 0; i < line.stations.size(); ++i)
-        show_station(section, {line.stations[i], line.arbiter.stations[i]});
+        show_station(section, {line.stations[i], line.arbiter.stations[i], is_ascii});
 }
 
 void show_access(const SettingWriter& section, const tcp_server::Settings& settings) {
@@ -85,7 +103,39 @@ void show_servers(const SettingWriter& top, const Config& config) {
     if (config.http) show_http(top, *config.http);
     if (config.mqtt) {
         mqtt_keys().show(top.item("mqtt"), *config.mqtt);
-        top.below("mqtt").put_secret("password", config.mqtt->password);
+        if (!config.mqtt->password.empty())
+            top.below("mqtt").put_secret("password", config.mqtt->password);
+    }
+}
+
+/// The value of a key of the same map, which is shown before.
+const Setting* neighbour(std::span<const Setting> before, const std::string& path) {
+    const auto back = std::ranges::find(before | std::views::reverse, path, &Setting::path);
+    return back == std::ranges::rend(before) ? nullptr : &*back;
+}
+
+/// Finds what a file cannot have beside the values of its neighbours. The settings of a map follow
+/// each other.
+void find_idle(std::vector<Setting>& all) {
+    const Described& keys = describe();
+    std::string map;
+    const yaml::KeyShape* shape = nullptr;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        const std::size_t cut = all[i].path.rfind('/');
+        if (cut == all[i].path.npos) continue;
+        if (all[i].path.compare(0, cut, map) != 0 || map.size() != cut) {
+            map = all[i].path.substr(0, cut);
+            shape = keys.find(map);
+        }
+        const std::string_view key = std::string_view(all[i].path).substr(cut + 1);
+        for (const yaml::KeyRule& rule : keys.rules) {
+            if (rule.needs || shape == nullptr || rule.key != key || rule.map != shape->path)
+                continue;
+            const Setting* other = neighbour(std::span(all).first(i), map + '/' + rule.other);
+            all[i].applies =
+                all[i].applies && (other == nullptr ||
+                                   std::ranges::find(rule.words, other->value) != rule.words.end());
+        }
     }
 }
 
@@ -99,12 +149,14 @@ std::string Distinct::name(const std::string& known_by) {
 std::vector<Setting> all_settings(const Config& config) {
     std::vector<Setting> all;
     const SettingWriter top(all, "");
+    root_keys().show(top, config);
     for (const Line& line : config.lines) show_line(top, line);
     show_servers(top, config);
     for (const points::Relay& relay : config.relays)
         relay_keys().show(top.item("relays", relay.name()), relay);
     log_keys().show(top.below("log"), config.log);
     realtime_keys().show(top.below("realtime"), config.realtime);
+    find_idle(all);
     return all;
 }
 

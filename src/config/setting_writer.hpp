@@ -21,14 +21,14 @@ class SettingWriter {
         add(key, std::move(value), owner.at(key));
     }
     void put_secret(std::string_view key, std::string value) const {
-        settings_->push_back({at(key), std::move(value), true, ""});
+        settings_->push_back({at(key), std::move(value), true, {}, true});
     }
 
     /// A writer for a map of keys; the map itself is no setting.
     SettingWriter below(std::string_view key) const { return {*settings_, at(key)}; }
     /// A writer for an entry that may exist or not, such as one of a list; adds the entry itself.
     SettingWriter item(std::string_view key) const {
-        settings_->push_back({at(key), "", false, ""});
+        settings_->push_back({at(key), "", false, {}, true});
         return below(key);
     }
     SettingWriter item(std::string_view list, std::string_view name) const {
@@ -40,7 +40,7 @@ class SettingWriter {
         return path_.empty() ? std::string(key) : path_ + '/' + std::string(key);
     }
     void add(std::string_view key, std::string value, std::string otherwise) const {
-        settings_->push_back({at(key), std::move(value), false, std::move(otherwise)});
+        settings_->push_back({at(key), std::move(value), false, std::move(otherwise), true});
     }
 
     std::vector<Setting>* settings_;

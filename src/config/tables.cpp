@@ -12,13 +12,8 @@ namespace {
 
 using yaml::format_duration;
 
-/// What was reckoned has more digits than anybody writes.
-std::string whole_microseconds(Duration duration) {
-    return format_duration(std::chrono::ceil<std::chrono::microseconds>(duration));
-}
-
 std::string or_auto(const std::optional<Duration>& duration) {
-    return duration ? whole_microseconds(*duration) : "auto";
+    return duration ? format_duration(*duration) : "auto";
 }
 
 }  // namespace
@@ -28,7 +23,8 @@ const Keys<Config>& root_keys() {
         Keys<Config>()
             .other("profiles_dir",
                    "Folder of further panel profiles; its *.yaml add to the shipped ones "
-                   "or replace them.")
+                   "or replace them.",
+                   [](const Config& config) { return config.profiles_dir; })
             .other("templates",
                    "Keys that many stations share, by the template's name: all of a "
                    "station's but id and name.")
@@ -205,16 +201,21 @@ const Keys<arbiter::StationSettings>& timing_keys() {
     return kKeys;
 }
 
-const Keys<LineTiming>& line_timing_keys() {
+const Keys<Line>& line_timing_keys() {
     static const auto kKeys =
-        Keys<LineTiming>()
+        Keys<Line>()
             .other("reply_hole",
                    "Longest silence inside a reply; auto: 60 ms and 32 characters, on "
                    "tcp:// 700 ms, in ASCII 1 s.",
-                   [](const LineTiming& line) { return whole_microseconds(line.reply_hole); })
+                   [](const Line& line) {
+                       return line.automatic_hole ? "auto"
+                                                  : format_duration(line.arbiter.reply_hole);
+                   })
             .initially("auto")
-            .duration("broadcast_turnaround", &LineTiming::broadcast_turnaround, 1ms, 1min,
-                      "Pause after a broadcast, in which the panels execute it.");
+            .duration(
+                "broadcast_turnaround",
+                [](auto& line) -> auto& { return line.arbiter.broadcast_turnaround; }, 1ms, 1min,
+                "Pause after a broadcast, in which the panels execute it.");
     return kKeys;
 }
 
@@ -270,8 +271,9 @@ const Keys<StationBody, StationView>& station_keys() {
             .word(
                 "crc_order", [](auto& of) -> auto& { return of.settings.crc_order; },
                 modbus::kCrcOrders,
-                "Order of the CRC's bytes. Without it the profile's; high_first: "
+                "Order of the CRC's bytes, on RTU lines. Without it the profile's; high_first: "
                 "Autonics GP with firmware from before June 2005.")
+            .shown_if([](const StationView& of) { return !of.in_ascii; })
             .change_needs(kOpensPort)
             .duration(
                 "max_age", [](auto& of) -> auto& { return of.settings.max_age; }, 0ms, 24h,
@@ -319,7 +321,8 @@ const Keys<points::Poll>& poll_keys() {
     constexpr std::int64_t kLargest = 2040;  // the largest read of any panel: GT, ARCT1F501E 1.3.1
     static const auto kKeys =
         Keys<Poll>()
-            .other("read", "First register or bit, in the panel's notation.")
+            .other("read", "First register or bit, in the panel's notation.",
+                   [](const Poll& poll) { return poll.read; })
             .integer("count", &Poll::count, 1, kLargest, "Number of registers or bits.")
             .duration("every", &Poll::every, 1ms, points::kSlowest, "Interval between two reads.");
     return kKeys;
@@ -331,7 +334,7 @@ const Keys<points::Point>& point_keys() {
                                                           {"BADC", points::kOrders[1]},
                                                           {"CDAB", points::kOrders[2]},
                                                           {"DCBA", points::kOrders[3]}}};
-    const auto or_none = [](const auto& number) { return number ? number->text() : "none"; };
+    const auto text = [](const auto& number) { return number ? number->text() : ""; };
     static const auto kKeys =
         Keys<Point>()
             .other("name", "Name of a-z, 0-9, '-' and '_', unique in its station.",
@@ -340,7 +343,7 @@ const Keys<points::Point>& point_keys() {
                    [](const Point& point) { return point.at; })
             .other("bit", "One bit of a register; the type is bool then.",
                    [](const Point& point) {
-                       return point.bit ? std::to_string(*point.bit) : std::string("none");
+                       return point.bit ? std::to_string(*point.bit) : std::string();
                    })
             .other("type", "Type of the value. Without it u16; of a bit bool.",
                    [](const Point& point) { return std::string(label(point.type)); })
@@ -355,11 +358,11 @@ const Keys<points::Point>& point_keys() {
                    [](const Point& point) { return number_text(point.offset); })
             .initially("0")
             .other("unit", "Unit, as people write it.",
-                   [](const Point& point) { return point.unit.empty() ? "none" : point.unit; })
+                   [](const Point& point) { return point.unit; })
             .other("min", "Of numbers: smallest value that may be written.",
-                   [=](const Point& point) { return or_none(point.min); })
+                   [=](const Point& point) { return text(point.min); })
             .other("max", "Of numbers: largest value that may be written.",
-                   [=](const Point& point) { return or_none(point.max); })
+                   [=](const Point& point) { return text(point.max); })
             .boolean("writable", &Point::writable, "Clients may write it.")
             .other("labels", "Of integers: texts of raw numbers, such as {0: off, 1: on}.")
             .other("no_value", "Of numbers: raw ones that mean that there is no value.",

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <string>
+#include <vector>
 
 #include "keys.hpp"
 #include "load_stations.hpp"
@@ -14,12 +16,10 @@ template <class Of, class Settings>
 struct StationParts {
     Of& station;
     Settings& settings;
+    bool in_ascii = false;  ///< its line is
 };
 using StationBody = StationParts<Station, arbiter::StationSettings>;
 using StationView = StationParts<const Station, const arbiter::StationSettings>;
-
-/// A pause inside frames and a rest, which only lines have.
-using LineTiming = arbiter::Settings;
 
 inline constexpr Words<EchoMode, 3> kEchoes{
     {{"auto", EchoMode::automatic}, {"on", EchoMode::on}, {"off", EchoMode::off}}};
@@ -28,12 +28,15 @@ inline constexpr Words<modbus::HexDigits, 2> kLowerCase{
 
 inline std::string access_text(bool read_only) { return read_only ? "read_only" : "read_write"; }
 
-/// "[a, b]"
+/// "[a, b]", in the order of the alphabet, as theirs means nothing; "" of an empty list.
 template <class List, class Word>
 std::string listed(const List& list, const Word& word) {
+    std::vector<std::string> words;
+    for (const auto& one : list) words.push_back(word(one));
+    std::ranges::sort(words);
     std::string text;
-    for (const auto& one : list) text += (text.empty() ? "" : ", ") + word(one);
-    return '[' + text + ']';
+    for (const std::string& one : words) text += (text.empty() ? "" : ", ") + one;
+    return words.empty() ? "" : '[' + text + ']';
 }
 
 // The keys of the configuration: a table a map, in the order in which they are described. Keys that
@@ -49,7 +52,8 @@ const Keys<SerialFormat>& serial_keys();
 const Keys<line::Rs485>& rs485_keys();
 /// Of lines and stations.
 const Keys<arbiter::StationSettings>& timing_keys();
-const Keys<LineTiming>& line_timing_keys();
+/// A pause inside frames and a rest, which only lines have.
+const Keys<Line>& line_timing_keys();
 const Keys<arbiter::QueueSettings>& queue_keys();
 const Keys<arbiter::OfflineSettings>& offline_keys();
 

@@ -15,16 +15,8 @@ namespace {
 
 using Lines = std::vector<std::string>;
 
-unsigned bits_of(const Network& network) {
-    return is_ipv6(network.address) ? network.prefix : 96 + network.prefix;
-}
-
 std::string text_of(const Network& network) {
     return network.address + '/' + std::to_string(network.prefix);
-}
-
-bool covers(const Network& wide, const Network& narrow) {
-    return bits_of(wide) <= bits_of(narrow) && is_in(narrow.address, wide.address, wide.prefix);
 }
 
 /// Lists what a listener newly allows. An empty list allows all.

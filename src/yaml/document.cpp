@@ -45,6 +45,19 @@ std::string quote(std::string_view text) {
     return mark + shown + (is_cut ? "..." : "") + mark;
 }
 
+std::string written(std::string_view text) {
+    constexpr std::array<std::string_view, 5> kNull{"", "~", "null", "Null", "NULL"};
+    constexpr std::string_view kIndicators = "-?:,[]{}#&*!|>'\"%@` ";
+    const bool plain = std::ranges::find(kNull, text) == kNull.end() &&
+                       kIndicators.find(text.front()) == kIndicators.npos && text.back() != ':' &&
+                       text.back() != ' ' && text.find(": ") == text.npos &&
+                       text.find(" #") == text.npos && text.find_first_of(",[]{}$") == text.npos;
+    if (plain) return std::string(text);
+    std::string made = "'";
+    for (const char c : text) made += c == '\'' ? "''" : c == '$' ? "$$" : std::string(1, c);
+    return made + '\'';
+}
+
 namespace {
 
 const std::string kTooDeep = "nested deeper than " + std::to_string(kMaxDepth) + " levels";

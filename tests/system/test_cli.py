@@ -309,6 +309,8 @@ class Files(unittest.TestCase):
         self.file.write_text(good().replace("device: sim", "device: /dev/ttyUSB7"))
         text = run("check", "-c", str(self.file), "--diff", str(old)).stdout
         self.assertIn("what a reload interrupts:\n  lines/floor1: the port is opened anew\n", text)
+        told = json.loads(run("check", "-c", str(self.file), "--diff", str(old), "--format", "json").stdout)
+        self.assertEqual(told["interruptions"], [{"path": "lines/floor1", "what": "the port is opened anew"}])
 
     def test_a_comparison_tells_the_faults_of_both_files(self):
         old = self.file.with_name("old.yaml")

@@ -56,6 +56,25 @@ class Reload(unittest.TestCase):
                 self.assertEqual(program.rest("POST", "/api/v1/reload")[0], 200)
                 self.assertEqual(self.kept(broker, "yard/press/ramp"), set())
 
+    def test_another_order_of_points_and_stations_keeps_the_session(self):
+        swapped = PRESS.replace("{name: level", "{name: ramp, at: UW201, every: 20ms},\n      {name: level", 1)
+        swapped = swapped.replace(",\n      {name: ramp, at: UW201, every: 20ms}]", "]")
+        with Broker() as broker, Listener(broker) as listener, tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            file.write_text(plant(broker, PRESS, LOCKED))
+            with harness.Program("run", "-c", str(file)) as program:
+                ramps = lambda: listener.of(f"{TOPIC}/press/ramp")
+                until(lambda: len(ramps()) > 3)
+                program.rest("PUT", "/api/v1/simulator/press", {"late": 1, "late_by_ms": 1})
+                file.write_text(plant(broker, LOCKED, swapped) + "log: {level: debug}\n")
+                self.assertEqual(program.rest("POST", "/api/v1/reload")[1]["changes"], ["log: level info -> debug"])
+                before = len(ramps())
+                until(lambda: len(ramps()) > before + 3)  # its values still go to its topic
+                self.assertEqual(program.log.text().count(" mqtt connected"), 1)
+                self.assertEqual(program.get("/api/v1/simulator/press")[1]["faults"]["late"], 1, "another panel")
+                self.assertEqual(listener.of(f"{TOPIC}/press/level")[-1]["value"],
+                                 program.get("/api/v1/stations/press/points/level")[1]["value"])
+
     def kept(self, broker, known):
         """What is retained below TOPIC once this is known there."""
         with Listener(broker) as listener:

@@ -156,12 +156,14 @@ class Check(unittest.TestCase):
     def test_more_than_there_is_is_an_error_unless_it_is_wanted(self):
         text = config.gateway(config.line(baud=9600, stations=press("press", 31, "50ms")))
         told = self.check(text, code=BAD_CONFIG)
-        self.assertIn(f"{self.file}: line floor1 is planned to be busy for ", told.stderr)
+        self.assertIn(f"{self.file}:2:11: line floor1 is planned to be busy for ", told.stderr)
         self.assertIn("--allow-overload", told.stderr)
         self.assertIn("plan of line floor1", told.stdout)
         plan = self.plan(text, code=BAD_CONFIG)
         self.assertFalse(plan["valid"])
-        self.assertIn("line floor1", plan["errors"][0]["message"])
+        [error] = plan["errors"]
+        self.assertIn("line floor1", error["message"])
+        self.assertEqual((error["file"], error["line"], error["column"]), (str(self.file), 2, 11))
         self.assertIn("warning: line floor1", self.check(text, "--allow-overload").stderr)
         self.assertEqual(self.plan(text, "--allow-overload")["errors"], [])
 

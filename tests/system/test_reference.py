@@ -78,6 +78,18 @@ class Reference(unittest.TestCase):
                                   cwd=folder, capture_output=True, text=True)
             self.assertEqual(said.returncode, 0, said.stderr)
 
+    def test_each_key_behind_one_sign_can_be_taken_in_alone(self):
+        example = (ROOT / "config/panelgate.example.yaml").read_text()
+        off = re.findall(r"(?m)^ *(?:- )?#(?![# ]).*$", example)
+        self.assertGreater(len(off), 40)
+        with tempfile.TemporaryDirectory() as folder:
+            whole = pathlib.Path(folder) / "whole.yaml"
+            for line in off:
+                whole.write_text(example.replace("\n" + line + "\n", "\n" + line.replace("#", "", 1) + "\n", 1))
+                said = subprocess.run([harness.PANELGATE, "check", "-c", whole], capture_output=True, text=True)
+                with self.subTest(line):
+                    self.assertEqual(said.returncode, 0, said.stderr)
+
     def test_the_example_says_what_is_left_out(self):
         """A commented key has the value that it has when it is left out: typed in, nothing changes."""
         example = (ROOT / "config/panelgate.example.yaml").read_text()

@@ -65,8 +65,8 @@ ONLY_CHECK = {
         "lines/queue/per_client", "lines/rs485/mode", "lines/serial/data_bits",
         "lines/serial/parity", "lines/serial/stop_bits", "lines/stations/access",
         "lines/stations/points/labels", "lines/stations/points/max",
-        "lines/stations/points/min", "lines/stations/points/type",
-        "lines/stations/timing/adaptive_ceiling", "lines/timing/frame_gap",
+        "lines/stations/points/min", "lines/stations/timing/adaptive_ceiling",
+        "lines/timing/frame_gap",
         "modbus_tcp/framing", "serial_masters/framing"},
     "1e-3 is a name, and a number for YAML, which 0.5 is, too": {
         "lines/stations/points/name", "serial_masters/name", "http/hosts"},

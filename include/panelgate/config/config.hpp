@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -55,6 +56,8 @@ struct Line {
     bool listens = false;       ///< another master polls it: the gateway never sends
     bool refuse_unlisted = false;
     Duration think_time = 1ms;    ///< of stations without their own
+    bool automatic_gap = true;    ///< `frame_gap` is not set, or auto
+    bool automatic_hole = true;   ///< likewise `reply_hole`
     bool simulated_echo = false;  ///< the simulated adapter echoes what is sent
     std::vector<Station> stations;
     friend bool operator==(const Line&, const Line&) = default;
@@ -64,6 +67,7 @@ struct Line {
 /// resolved.
 struct Config {
     std::shared_ptr<const profile::Catalogue> profiles;
+    std::string profiles_dir;  ///< of those that are not shipped; "" none
     std::vector<Line> lines;
     std::vector<points::Relay> relays;
     std::vector<tcp_server::Settings> modbus_tcp;
@@ -72,6 +76,8 @@ struct Config {
     std::optional<mqtt::Settings> mqtt;  ///< empty: values go to no broker
     rt::LogSettings log;
     rt::RealtimeSettings realtime;
+    /// Where each line's name stands, by that name.
+    std::map<std::string, yaml::Mark> line_marks;
     /// Warnings of legal but questionable settings ("8N1 is outside the standard"), as
     /// FILE:LINE:COLUMN text.
     std::vector<std::string> warnings;

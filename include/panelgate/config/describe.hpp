@@ -13,6 +13,7 @@ namespace panelgate::config {
 inline constexpr std::string_view kOpensPort = "the port is opened anew";
 inline constexpr std::string_view kListensAnew = "it listens anew, and its clients connect again";
 inline constexpr std::string_view kConnectsAnew = "it connects to the broker anew";
+inline constexpr std::string_view kAllowCloses = "clients outside `allow` are closed";
 /// The change of a key that a reload cannot take over (KeyShape::change).
 inline constexpr std::string_view kNextStart = "takes effect at the next start";
 
@@ -27,9 +28,8 @@ struct Described {
 
     /// What a change of a setting (Setting::path) needs beside a reload; "" nothing.
     std::string_view change_of(std::string_view setting) const;
-    /// True for a setting's path that ends in a key.
-    bool is_key(std::string_view setting) const;
-    /// "only with mode: kernel or rts", of a key whose presence depends on a neighbour; "" none.
+    /// "only with mode: kernel or rts", "not with type: bool", of a key whose presence depends on a
+    /// neighbour; "" none.
     std::string condition_of(std::string_view key) const;
 };
 /// Made once, at the first call.

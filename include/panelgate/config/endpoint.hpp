@@ -40,6 +40,9 @@ std::string network_of(const Cidr& cidr);
 /// text.
 bool is_in(const std::string& address, const std::string& network, unsigned prefix);
 
+/// True if all addresses of `narrow` are in `wide`.
+bool covers(const Network& wide, const Network& narrow);
+
 /// True if more than known networks reach a listener on this address: it is not on loopback, and
 /// `allow` is empty or has more public addresses than one /8 of IPv4 or one /16 of IPv6, its
 /// networks taken together.

@@ -13,10 +13,12 @@ struct Setting {
     /// The keys of the file, list entries by their names, joined by '/':
     /// "lines/floor1/stations/press/guard".
     std::string path;
-    std::string value;    ///< as written in the file; "" for an entry that only has settings
+    std::string value;    ///< as written in the file; "": not set, or an entry that has settings
     bool secret = false;  ///< never shown
     /// The path of the setting that this one inherits from if it is not given itself, or "".
     std::string otherwise = {};
+    /// False: a file cannot have it beside the value of a neighbour; it has its default then.
+    bool applies = true;
 };
 
 /// All settings of a configuration, with the defaults filled in: every difference between two files

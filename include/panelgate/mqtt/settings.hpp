@@ -24,6 +24,7 @@ struct Settings {
     std::string node;                 ///< Sparkplug; empty: the host name
     std::string client_id;            ///< empty: "panelgate-" and the host name
     std::string username;             ///< empty: none
+    std::string password_file;        ///< empty: none
     std::string password;             ///< read from its file at load
     bool write = false;               ///< clients that may publish at the broker may write points
     int qos = 1;                      ///< `json` only: 0 or 1; Sparkplug defines its own

@@ -10,6 +10,8 @@ namespace panelgate::yaml {
 /// Returns text for a one-line message: in quotes, cut after 80 bytes, control characters as
 /// blanks.
 std::string quote(std::string_view text);
+/// Returns text as it is typed for the value of a key: in quotes only where it needs them.
+std::string written(std::string_view text);
 
 class Description;
 

@@ -89,6 +89,34 @@ TEST(Difference, OfAUnitOrALabelIsAddedOrRemovedWithItsValue) {
                             "modbus_tcp/127.0.0.1:502/units: 103 added, a/1"));
 }
 
+TEST(Difference, KnowsWhatIsNotSetFromEveryWordThatCouldBe) {
+    const auto point = [](const std::string& more) {
+        return plant("", "{id: 1, name: x, points: [{name: p, at: '400001'" + more + "}]}") +
+               "mqtt: {broker: 'mqtt://b:1883', format: sparkplug" +
+               (more.empty() ? "" : ", username: none, group: automatic, node: automatic") + "}\n";
+    };
+    EXPECT_THAT(told(point(""), point(", unit: none, min: 1")),
+                ElementsAre("lines/floor1/stations/x/points/p: min not set -> 1",
+                            "lines/floor1/stations/x/points/p: unit not set -> none",
+                            "mqtt: group not set -> automatic", "mqtt: node not set -> automatic",
+                            "mqtt: username not set -> none"));
+    const auto changes = differences(load(point(", unit: none")), load(point(", min: 1")));
+    ASSERT_EQ(changes.size(), 2U);
+    EXPECT_EQ(
+        boost::json::serialize(to_json(changes)[1].as_object()),
+        R"({"path":"lines/floor1/stations/x/points/p/unit","kind":"changed","before":"none"})");
+}
+
+TEST(Difference, OfAKeyThatANeighbourRulesOutIsNotTold) {
+    const auto mqtt = [](const std::string& more) {
+        return plant("", kPress) + "mqtt: {broker: 'mqtt://b:1883', " + more + "}\n";
+    };
+    EXPECT_THAT(told(mqtt("qos: 0"), mqtt("format: sparkplug")),
+                ElementsAre("mqtt: format json -> sparkplug", "mqtt: qos 0 -> not set"));
+    EXPECT_THAT(told(mqtt("qos: 1"), mqtt("format: sparkplug")),
+                ElementsAre("mqtt: format json -> sparkplug"));
+}
+
 TEST(Difference, OfASecretIsToldAndNeverShown) {
     const std::string text =
         "lines: [{name: a, device: sim}]\nhttp: {tokens: [{name: ops, role: viewer, file: /t}]}\n";
@@ -132,10 +160,14 @@ TEST(Difference, AsJsonHasPathKindAndBothValues) {
               R"([{"path":"lines/floor1/retries","kind":"changed","before":"1","after":"2"}])");
 }
 
+std::vector<std::string> cut(const std::string& before, const std::string& after) {
+    std::vector<std::string> texts;
+    for (const Interruption& one : interruptions(load(before), load(after)))
+        texts.push_back(one.path + ": " + one.what);
+    return texts;
+}
+
 TEST(Difference, NamesWhatIsInterruptedAlsoByWhatComesOrGoesOnALine) {
-    const auto cut = [](const std::string& before, const std::string& after) {
-        return interruptions(load(before), load(after));
-    };
     EXPECT_THAT(cut(plant("", kPress), plant("queue: {deadline: 3s}, ", kPress)), IsEmpty());
     const std::string two = kPress + ", {id: 5, name: mixer}";
     const std::string mqtt = "mqtt: {broker: 'mqtt://b:1883'}\n";
@@ -153,6 +185,56 @@ TEST(Difference, NamesWhatIsInterruptedAlsoByWhatComesOrGoesOnALine) {
     EXPECT_THAT(cut(real(two), real(two, ", units: {7: floor1/5}, broadcast: deny")), IsEmpty());
     EXPECT_THAT(cut(real(two), real(two, ", echo: on")),
                 ElementsAre("serial_masters/plc: the port is opened anew"));
+}
+
+TEST(Difference, NamesWhatIsInterruptedByWhatIsRemovedRenamedOrElsewhere) {
+    const std::string line = "lines: [{name: a, device: /dev/ttyS1, stations: [{id: 1}]}]\n";
+    const std::string other = "lines: [{name: b, device: /dev/ttyS1, stations: [{id: 1}]}]\n";
+    const std::string modbus = "modbus_tcp: [{listen: '127.0.0.1:502'}]\n";
+    const std::string http = "http: {listen: '127.0.0.1:8080'}\n";
+    const std::string all = line + "serial_masters: [{name: plc, device: /dev/ttyS2}]\n" + modbus +
+                            http + "mqtt: {broker: 'mqtt://b:1883'}\n";
+    EXPECT_THAT(
+        cut(all, line + http + "realtime: {priority: 1}\n"),
+        ElementsAre("serial_masters/plc: the port is closed",
+                    "modbus_tcp/127.0.0.1:502: its clients are closed", "mqtt: the session ends"));
+    EXPECT_THAT(cut(line + modbus + http, other + "modbus_tcp: [{listen: '127.0.0.1:503'}]\n"),
+                ElementsAre("lines/a: the port is closed",
+                            "modbus_tcp/127.0.0.1:502: its clients are closed",
+                            "http: its clients are closed"));
+    EXPECT_THAT(cut(line + modbus, all), IsEmpty()) << "what is added interrupts nobody";
+    EXPECT_THAT(cut(line + http, line + http + "realtime: {priority: 1}\n"), IsEmpty());
+}
+
+TEST(Difference, NamesAnAllowThatMayCloseClients) {
+    const auto with = [](const std::string& allow) {
+        return "lines: [{name: a, device: /dev/ttyS1, stations: [{id: 1}]}]\n"
+               "modbus_tcp: [{listen: '127.0.0.1:502'" +
+               allow + "}]\nhttp: {listen: '127.0.0.1:8080'" + allow + "}\n";
+    };
+    EXPECT_THAT(cut(with(""), with(", allow: [10.0.0.0/8]")),
+                ElementsAre("modbus_tcp/127.0.0.1:502: clients outside `allow` are closed",
+                            "http: clients outside `allow` are closed"));
+    EXPECT_THAT(cut(with(", allow: [10.0.0.0/8]"), with(", allow: [10.1.0.0/16, 10.2.0.0/16]")),
+                testing::SizeIs(2));
+    EXPECT_THAT(cut(with(", allow: [10.1.0.0/16]"), with(", allow: [10.0.0.0/8]")), IsEmpty());
+    EXPECT_THAT(cut(with(", allow: [10.1.0.0/16]"), with("")), IsEmpty());
+}
+
+TEST(Difference, OfTheOrderIsNoneAndInterruptsNothing) {
+    const std::string a =
+        "  - {name: a, device: sim, stations: [{id: 1, name: x, simulate: {slow: 1ms}, points: "
+        "[{name: p, at: '400001'}, {name: q, at: '400002'}]}, {id: 2, name: y}]}\n";
+    const std::string turned =
+        "  - {name: a, device: sim, stations: [{id: 2, name: y}, {id: 1, name: x, simulate: "
+        "{slow: 1ms}, points: [{name: q, at: '400002'}, {name: p, at: '400001'}]}]}\n";
+    const std::string b = "  - {name: b, device: sim, stations: [{id: 3, name: a-3}]}\n";
+    const std::string rest =
+        "mqtt: {broker: 'mqtt://b:1883'}\nmodbus_tcp: [{listen: '127.0.0.1:502'}]\n";
+    const std::string before = "lines:\n" + a + b + rest;
+    const std::string after = "lines:\n" + b + turned + rest;
+    EXPECT_THAT(told(before, after), IsEmpty());
+    EXPECT_THAT(cut(before, after), IsEmpty());
 }
 
 }  // namespace

@@ -135,21 +135,18 @@ void find_leaves(yaml::Node& node, const std::string& key, std::vector<Leaf>& le
     }
 }
 
-/// What an interruption does: "the port is opened anew".
-std::set<std::string> done_by_reload(const config::Config& before, const config::Config& after) {
-    std::set<std::string> done;
-    for (const std::string& text : interruptions(before, after))
-        done.insert(text.substr(text.find(": ") + 2));
-    return done;
-}
-
 /// Each change says what is done for it. What a session at the broker publishes has many keys.
 void expect_needs(const config::Config& before, const config::Config& after,
                   const std::string& key) {
     std::set<std::string> said;
-    for (const Change& change : differences(before, after))
-        if (!change.needs.empty()) said.insert(change.needs);
-    std::set<std::string> done = done_by_reload(before, after);
+    std::set<std::string> removed;
+    for (const Change& change : differences(before, after)) {
+        if (!change.needs.empty() && change.needs != config::kNextStart) said.insert(change.needs);
+        if (change.kind == Change::Kind::removed) removed.insert(change.path);
+    }
+    std::set<std::string> done;
+    for (const Interruption& one : interruptions(before, after))
+        if (!removed.contains(one.path)) done.insert(one.what);
     const bool publishes = key.starts_with("lines/");
     if (publishes) done.erase(std::string(config::kConnectsAnew));
     EXPECT_EQ(said, done) << key;

@@ -22,6 +22,7 @@ inline std::string_view label(Role role) {
 struct Token {
     std::string name;
     Role role = Role::viewer;
+    std::string file;
     std::string secret;  ///< read from its file at load
     friend bool operator==(const Token&, const Token&) = default;
 };
