@@ -22,7 +22,7 @@ auto may_be_answered_by(ByteView reply) {
 }  // namespace
 
 void OutstandingReplies::add(TimePoint sent, const Bytes& pdu) {
-    entries_.push_back({sent, pdu});
+    entries_.push_back({sent, pdu, false});
     if (entries_.size() > kMost) entries_.pop_front();
 }
 
@@ -57,14 +57,21 @@ void OutstandingReplies::close_before(TimePoint sent, TimePoint connected) {
 }
 
 void OutstandingReplies::lapse() {
+    for (Entry& one : entries_) one.lapsed = true;
     std::ranges::move(entries_, std::back_inserter(closed_));
     entries_.clear();
     while (closed_.size() > kMost) closed_.pop_front();
 }
 
-bool OutstandingReplies::fits_closed(ByteView reply, TimePoint open, ByteView but) const {
+bool OutstandingReplies::fits_closed(ByteView reply, TimePoint open) const {
     return std::ranges::any_of(closed_, [&](const Entry& one) {
-        return one.sent > open && !std::ranges::equal(one.pdu, but) &&
+        return one.sent > open && modbus::answers(one.pdu, reply);
+    });
+}
+
+bool OutstandingReplies::fits_closed_by_order(ByteView reply, TimePoint open, ByteView but) const {
+    return std::ranges::any_of(closed_, [&](const Entry& one) {
+        return !one.lapsed && one.sent > open && !std::ranges::equal(one.pdu, but) &&
                modbus::answers(one.pdu, reply);
     });
 }

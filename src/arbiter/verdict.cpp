@@ -411,7 +411,8 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
 
 void Arbiter::explain_condition(TimePoint now, std::uint8_t station, Condition before) {
     const Condition is = stations_.condition(station);
-    if (is != before) outbox_.decide(now, [&] { return explain::condition(station, is); });
+    if (is != before && before != Condition::unheard)
+        outbox_.decide(now, [&] { return explain::condition(station, is); });
 }
 
 /// The parts of a joined read are sent again, except for clients that have left.

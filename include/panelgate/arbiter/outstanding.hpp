@@ -28,6 +28,7 @@ class OutstandingReplies {
     struct Entry {
         TimePoint sent{};
         Bytes pdu;
+        bool lapsed = false;
     };
 
     bool empty() const { return entries_.empty(); }
@@ -69,9 +70,9 @@ class OutstandingReplies {
     Bytes take(ByteView reply);
     /// True if this reply may answer one that was closed by a later request's answer, or that has
     /// lapsed, and that left later than `open`.
-    bool fits_closed(ByteView reply, TimePoint open) const { return fits_closed(reply, open, {}); }
-    /// ... but for requests that equal `but`.
-    bool fits_closed(ByteView reply, TimePoint open, ByteView but) const;
+    bool fits_closed(ByteView reply, TimePoint open) const;
+    /// ... one that was closed so, and that is not the request `but`.
+    bool fits_closed_by_order(ByteView reply, TimePoint open, ByteView but) const;
     /// Removes and returns the first of those. fits_closed() must be true.
     Entry take_closed(ByteView reply, TimePoint open);
 

@@ -115,10 +115,11 @@ class OutstandingRequests {
     /// or `quicker` than ever. A doubted reply that comes again is no duplicate.
     bool may_be_duplicate(TimePoint now, const Attempt& attempt, bool early, bool quicker) const;
     /// True if this reply may be that to an earlier request, which was closed because a later one
-    /// has been answered, or lapsed. An earlier attempt of the same read may answer it.
+    /// has been answered, and which can still come. An earlier attempt of the same read may
+    /// answer it.
     bool may_answer_closed(TimePoint now, ByteView reply, const modbus::Request& request) const {
         const ByteView same = request.is_read() ? ByteView(request.pdu()) : ByteView();
-        return replies_.fits_closed(reply, now - kClosedMemory * timeout_, same);
+        return replies_.fits_closed_by_order(reply, now - latest_reply(), same);
     }
     /// Time of the latest request that this reply proves to have reached the station: an attempt
     /// started at `started`, or the first outstanding one that the reply fits.
