@@ -153,12 +153,12 @@ struct HeardCounts {
 struct StationStatus {
     /// `unknown` while the line is down.
     Health state = Health::unknown;
-    std::optional<Condition> condition{};  ///< not in listen mode, where nothing is asked
     std::optional<Duration> last_success;  ///< time since then; late replies do not count
     /// How often the station or its line came back: each may have been a restart.
     std::uint64_t returns = 0;
     std::optional<Duration> last_reply{};  ///< time since then, late replies included
     std::optional<HeardCounts> heard{};    ///< in listen mode only
+    std::optional<Condition> condition{};  ///< not in listen mode, where nothing is asked
 };
 
 /// A line as its clients ask it: servers, REST, the poller, relays, a discovery. Single-threaded.

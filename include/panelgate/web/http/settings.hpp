@@ -22,8 +22,8 @@ inline std::string_view label(Role role) {
 struct Token {
     std::string name;
     Role role = Role::viewer;
-    std::string file;
     std::string secret;  ///< read from its file at load
+    std::string file{};
     friend bool operator==(const Token&, const Token&) = default;
 };
 

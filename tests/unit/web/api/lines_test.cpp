@@ -65,7 +65,8 @@ TEST_F(ApiLines, P9ShowsWhatEachClientHasUsedOfALine) {
 
 TEST_F(ApiLines, P10ShowsStationsWithoutTouchingTheBus) {
     add_meter();
-    bus.stations[31] = {Health::online, Condition::well, 1500ms};
+    bus.stations[31] = {Health::online, 1500ms};
+    bus.stations[31].condition = Condition::well;
     const auto stations = get("/api/v1/stations").at("stations").as_array();
     ASSERT_EQ(stations.size(), 2u);
     EXPECT_EQ(stations[0],
