@@ -290,7 +290,9 @@ TEST_F(StationTest, OnlyAnUnheardStationIsForgottenWhenNotWantedForAMinute) {
 /// was taken for the answer to the next read, and so on for ever.
 TEST_F(StationTest, P1WhoAnswersOutOfOrderIsBelievedNoOrderAndDrains) {
     miss(kRead);
-    answer(kWrite, kWrite);
+    now_ += 100ms;
+    const auto write = test::answered(now_ - 30ms, now_, group_of(kId, kWrite), kWrite);
+    station_.on_reply(now_, write, 30ms, 25ms);
     EXPECT_FALSE(station_.requests().any()) << "it serves in order, as far as is known";
     const auto request = test::request_of(kOther);
     EXPECT_TRUE(station_.requests().may_answer_closed(now_, kReply, request));
