@@ -26,18 +26,6 @@ bool is_coloured() {
                               std::getenv("TERM"));
 }
 
-/// Asks for what must be there; false, with a message on stderr and `code` set, if it is not.
-bool ask_for(const GatewayClient& gateway, const std::string& path, boost::json::object& into,
-             ExitCode& code) {
-    GatewayAnswer answer = gateway.get(path);
-    if (!answer.is_ok()) {
-        code = gateway.explain(answer);
-        return false;
-    }
-    into = std::move(answer.json);
-    return true;
-}
-
 std::optional<cli::Overview> look(const GatewayClient& gateway, ExitCode& code) {
     cli::Overview overview;
     overview.url = gateway.url();

@@ -36,13 +36,10 @@ struct TracedLine {
 };
 
 std::optional<std::vector<std::string>> line_names(const GatewayClient& gateway, ExitCode& code) {
-    const GatewayAnswer answer = gateway.get("/api/v1/lines");
-    if (!answer.is_ok()) {
-        code = gateway.explain(answer);
-        return std::nullopt;
-    }
+    boost::json::object answer;
+    if (!ask_for(gateway, "/api/v1/lines", answer, code)) return std::nullopt;
     std::vector<std::string> names;
-    for (const auto* line : cli::objects_of(answer.json, "lines"))
+    for (const auto* line : cli::objects_of(answer, "lines"))
         names.push_back(cli::text_of(*line, "name"));
     return names;
 }
@@ -100,15 +97,13 @@ std::optional<std::vector<cli::TraceLine>> read_page(const GatewayClient& gatewa
                                                      ExitCode& code) {
     std::vector<cli::TraceLine> all;
     for (TracedLine& line : lines) {
-        const GatewayAnswer answer = gateway.get(
-            line.path + (line.next.empty() ? "?last=" : "?since=" + line.next + "&last=") +
-            std::to_string(kMostEntries));
-        if (!answer.is_ok()) {
-            code = gateway.explain(answer);
-            return std::nullopt;
-        }
-        if (const auto* next = answer.json.if_contains("next")) line.next = cli::value_text(*next);
-        for (auto& one : cli::trace_lines(answer.json, line.filter, line.names))
+        const std::string query =
+            (line.next.empty() ? "?last=" : "?since=" + line.next + "&last=") +
+            std::to_string(kMostEntries);
+        boost::json::object answer;
+        if (!ask_for(gateway, line.path + query, answer, code)) return std::nullopt;
+        if (const auto* next = answer.if_contains("next")) line.next = cli::value_text(*next);
+        for (auto& one : cli::trace_lines(answer, line.filter, line.names))
             all.push_back(std::move(one));
     }
     std::ranges::sort(all, {}, [](const cli::TraceLine& line) { return line.time; });

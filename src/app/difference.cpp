@@ -213,8 +213,9 @@ std::vector<Change> differences(const config::Config& before, const config::Conf
     for (const auto& [path, difference] : all) {
         if (is_within(all, path) || follows(all, difference)) continue;
         changes.push_back(change_of(path, difference));
-        if (!is_one_sided(difference) && !is_taken_over(before, after, path))
-            changes.back().needs = keys.change_of(path);
+        if (is_one_sided(difference)) continue;
+        const std::string_view needs = keys.change_of(path);
+        if (!needs.empty() && !is_taken_over(before, after, path)) changes.back().needs = needs;
     }
     add_profiles(before, after, changes);
     std::ranges::sort(changes, {}, &Change::path);

@@ -173,15 +173,23 @@ ExitCode GatewayClient::explain(const GatewayAnswer& answer, const std::string& 
     return kUnavailable;
 }
 
-std::optional<std::vector<cli::Station>> all_stations(const GatewayClient& gateway,
-                                                      ExitCode& code) {
-    const GatewayAnswer answer = gateway.get("/api/v1/stations");
+bool ask_for(const GatewayClient& gateway, const std::string& path, boost::json::object& into,
+             ExitCode& code) {
+    GatewayAnswer answer = gateway.get(path);
     if (!answer.is_ok()) {
         code = gateway.explain(answer);
-        return std::nullopt;
+        return false;
     }
+    into = std::move(answer.json);
+    return true;
+}
+
+std::optional<std::vector<cli::Station>> all_stations(const GatewayClient& gateway,
+                                                      ExitCode& code) {
+    boost::json::object answer;
+    if (!ask_for(gateway, "/api/v1/stations", answer, code)) return std::nullopt;
     std::vector<cli::Station> all;
-    for (const auto* one : cli::objects_of(answer.json, "stations"))
+    for (const auto* one : cli::objects_of(answer, "stations"))
         all.push_back({cli::text_of(*one, "name"), cli::text_of(*one, "line"),
                        static_cast<unsigned>(cli::number_of(*one, "id").value_or(0))});
     return all;

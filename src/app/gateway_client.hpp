@@ -80,6 +80,9 @@ std::optional<GatewayPlace> find_place(const GatewayClient& gateway, const cli::
 /// Prints why a place could not be read or written; returns the exit code.
 ExitCode explain_place(const GatewayClient& gateway, const GatewayPlace& place,
                        const GatewayAnswer& answer, const std::string& verb);
+/// Asks for what must be there; false, with a message on stderr and `code` set, if it is not.
+bool ask_for(const GatewayClient& gateway, const std::string& path, boost::json::object& into,
+             ExitCode& code);
 /// All stations; nothing, with a message on stderr and `code` set, if they cannot be had.
 std::optional<std::vector<cli::Station>> all_stations(const GatewayClient& gateway, ExitCode& code);
 /// From now on SIGINT and SIGTERM end the process with 0, for commands that print until then: each

@@ -1,7 +1,6 @@
 #include "panelgate/arbiter/outstanding.hpp"
 
 #include <algorithm>
-#include <iterator>
 #include <utility>
 
 #include "panelgate/modbus/function.hpp"
@@ -17,6 +16,13 @@ namespace {
 auto may_be_answered_by(ByteView reply) {
     return
         [reply](const OutstandingReplies::Entry& one) { return modbus::answers(one.pdu, reply); };
+}
+
+/// ... and left later than `open`.
+auto may_be_answered_since(TimePoint open, ByteView reply) {
+    return [open, fits = may_be_answered_by(reply)](const OutstandingReplies::Entry& one) {
+        return one.sent > open && fits(one);
+    };
 }
 
 }  // namespace
@@ -50,36 +56,37 @@ bool OutstandingReplies::has_other_function(std::uint8_t function) const {
 void OutstandingReplies::close_before(TimePoint sent, TimePoint connected) {
     std::erase_if(entries_, [&](Entry& one) {
         const bool is_before = one.sent < sent && one.sent >= connected;
-        if (is_before) closed_.push_back(std::move(one));
+        if (is_before) remember_closed(std::move(one));
         return is_before;
     });
-    while (closed_.size() > kMost) closed_.pop_front();
+}
+
+void OutstandingReplies::remember_closed(Entry entry) {
+    closed_.push_back(std::move(entry));
+    if (closed_.size() > kMost) closed_.pop_front();
 }
 
 void OutstandingReplies::lapse() {
-    for (Entry& one : entries_) one.lapsed = true;
-    std::ranges::move(entries_, std::back_inserter(closed_));
+    for (Entry& one : entries_) {
+        one.lapsed = true;
+        remember_closed(std::move(one));
+    }
     entries_.clear();
-    while (closed_.size() > kMost) closed_.pop_front();
 }
 
 bool OutstandingReplies::fits_closed(ByteView reply, TimePoint open) const {
-    return std::ranges::any_of(closed_, [&](const Entry& one) {
-        return one.sent > open && modbus::answers(one.pdu, reply);
-    });
+    return std::ranges::any_of(closed_, may_be_answered_since(open, reply));
 }
 
 bool OutstandingReplies::fits_closed_by_order(ByteView reply, TimePoint open, ByteView but) const {
+    const auto fits = may_be_answered_since(open, reply);
     return std::ranges::any_of(closed_, [&](const Entry& one) {
-        return !one.lapsed && one.sent > open && !std::ranges::equal(one.pdu, but) &&
-               modbus::answers(one.pdu, reply);
+        return !one.lapsed && !std::ranges::equal(one.pdu, but) && fits(one);
     });
 }
 
 OutstandingReplies::Entry OutstandingReplies::take_closed(ByteView reply, TimePoint open) {
-    const auto found = std::ranges::find_if(closed_, [&](const Entry& one) {
-        return one.sent > open && modbus::answers(one.pdu, reply);
-    });
+    const auto found = std::ranges::find_if(closed_, may_be_answered_since(open, reply));
     Entry taken = std::move(*found);
     closed_.erase(found);
     return taken;

@@ -346,28 +346,24 @@ OutcomeCounts RequestCounters::outcomes(std::uint8_t station) const {
 
 std::vector<StationReport> RequestCounters::report(const arbiter::Arbiter& arbiter) const {
     // One that has never been heard is not up, and nobody knows yet that it is down.
-    auto reports = report(arbiter.station_counters(), [&](std::uint8_t id) {
+    return report(arbiter.station_counters(), [&](std::uint8_t id) -> State {
         const arbiter::StationHealth& health = arbiter.health(id);
         const bool is_open = health.state() == Health::suspect && !health.last_heard();
-        return is_open ? Health::unknown : health.state();
+        return {is_open ? Health::unknown : health.state(), arbiter.condition(id)};
     });
-    std::size_t next = 0;  // the reports are in the order of the stations
-    for (const auto& [id, counted] : stations_) {
-        StationReport& made = reports[next++];
-        if (made.up) made.condition = arbiter.condition(id);
-    }
-    return reports;
 }
 
 std::vector<StationReport> RequestCounters::report(
     const std::map<std::uint8_t, arbiter::StationCounters>& wire_counters,
-    const std::function<Health(std::uint8_t)>& health) const {
+    const std::function<State(std::uint8_t)>& state) const {
     std::vector<StationReport> reports;
     for (const auto& [id, counted] : stations_) {
         StationReport report = counted;
         const auto wire = wire_counters.find(id);
         if (wire != wire_counters.end()) report.wire = wire->second;
-        report.up = is_up(health(id));
+        const State now = state(id);
+        report.up = is_up(now.health);
+        if (report.up) report.condition = now.condition;
         reports.push_back(std::move(report));
     }
     return reports;

@@ -154,9 +154,14 @@ class RequestCounters {
     OutcomeCounts outcomes(std::uint8_t station) const;
     /// Returns the reports, joined with the arbiter's counters.
     std::vector<StationReport> report(const arbiter::Arbiter& arbiter) const;
-    /// The same with counters and health from listening.
+    /// How a station is: its health, and its condition where something is asked.
+    struct State {
+        Health health = Health::unknown;
+        std::optional<Condition> condition{};
+    };
+    /// The same with counters and states from listening.
     std::vector<StationReport> report(const std::map<std::uint8_t, arbiter::StationCounters>& wire,
-                                      const std::function<Health(std::uint8_t)>& health) const;
+                                      const std::function<State(std::uint8_t)>& state) const;
 
   private:
     StationReport& of(std::uint8_t station);

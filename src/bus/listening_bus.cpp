@@ -453,8 +453,9 @@ LineReport ListeningBus::report() const {
     report.wire = state_->heard.line();
     report.device = state_->line->counters();
     report.stations = state_->account.counters().report(
-        state_->heard.wire(),
-        [this](std::uint8_t station) { return station_status(station).state; });
+        state_->heard.wire(), [this](std::uint8_t station) -> RequestCounters::State {
+            return {station_status(station).state};
+        });
     return report;
 }
 

@@ -15,8 +15,7 @@ REFUSED, USAGE, NO_INPUT, UNAVAILABLE = 1, 64, 66, 69
 class Asking(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.gateway = harness.demo()
-        cls.addClassCleanup(cls.gateway.__exit__, None, None, None)
+        cls.gateway = cls.enterClassContext(harness.demo())
         cls.http = f"127.0.0.1:{cls.gateway.http_port()}"
 
     def ask(self, code, *arguments):

@@ -18,8 +18,7 @@ REFUSED, USAGE, UNAVAILABLE, INTERNAL = 1, 64, 69, 70
 class State(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.gateway = harness.demo()
-        cls.addClassCleanup(cls.gateway.__exit__, None, None, None)
+        cls.gateway = cls.enterClassContext(harness.demo())
         cls.http = f"127.0.0.1:{cls.gateway.http_port()}"
         cls.gateway.values("/api/v1/stations/press/devices/UW0")
 

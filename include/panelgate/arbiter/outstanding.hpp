@@ -28,7 +28,7 @@ class OutstandingReplies {
     struct Entry {
         TimePoint sent{};
         Bytes pdu;
-        bool lapsed = false;
+        bool lapsed = false;  ///< closed by time, not by order
     };
 
     bool empty() const { return entries_.empty(); }
@@ -73,10 +73,12 @@ class OutstandingReplies {
     bool fits_closed(ByteView reply, TimePoint open) const;
     /// ... one that was closed so, and that is not the request `but`.
     bool fits_closed_by_order(ByteView reply, TimePoint open, ByteView but) const;
-    /// Removes and returns the first of those. fits_closed() must be true.
+    /// Removes and returns the first of those that fits_closed(); it must be true.
     Entry take_closed(ByteView reply, TimePoint open);
 
   private:
+    void remember_closed(Entry entry);
+
     PoolDeque<Entry> entries_;
     PoolDeque<Entry> closed_;  ///< by the order in which stations serve, or by time
 };

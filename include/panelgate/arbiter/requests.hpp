@@ -59,10 +59,10 @@ class OutstandingRequests {
     Duration latest_reply() const { return timeout_ + late_.value(); }
     Duration worst_lateness() const { return late_.worst(); }
     /// How long after a broadcast the station may answer it, which is wrong: its longest usual
-    /// time; if it has done so, the same window as for any reply.
+    /// time; if it has done so, the window of any reply, or somewhat longer than that took.
     Duration broadcast_window(Duration usual) const {
-        return answers_broadcasts_ ? std::max(latest_reply(), broadcast_delay_ * 5 / 4 + 100ms)
-                                   : usual + late_.worst();
+        return broadcast_delay_ ? std::max(latest_reply(), *broadcast_delay_ * 5 / 4 + 100ms)
+                                : usual + late_.worst();
     }
     /// True if it has answered one with an exception.
     bool refuses_broadcasts() const { return refuses_broadcasts_; }
@@ -166,11 +166,10 @@ class OutstandingRequests {
     Heard on_unsolicited(TimePoint now, ByteView pdu, bool asked);
     /// Damaged bytes were heard; `id`: the station's own address.
     void on_damaged_bytes(TimePoint now, std::uint8_t id, ByteView bytes);
-    /// It has answered a broadcast, which is wrong.
+    /// It has answered a broadcast, which is wrong, so long after it.
     void on_broadcast_answered(Duration delay, bool refused) {
-        answers_broadcasts_ = true;
         refuses_broadcasts_ = refuses_broadcasts_ || refused;
-        broadcast_delay_ = std::max(broadcast_delay_, delay);
+        broadcast_delay_ = std::max(broadcast_delay_.value_or(delay), delay);
     }
     /// The line was reopened, on a transport that may stall. Outstanding requests may be sent, and
     /// answered, only now: the station rests for that. `usual`: its longest usual time.
@@ -214,11 +213,10 @@ class OutstandingRequests {
     TimePoint drained_at_{};  ///< nothing is sent before, behind a disorder: answers are one behind
     Bytes unsolicited_refusal_;  ///< and when it first came
     TimePoint unsolicited_refusal_at_{};
-    bool proof_unanswered_ = false;    ///< since it was last heard
-    bool proved_ = false;              ///< no outstanding request is in transit
-    bool answers_broadcasts_ = false;  ///< at least once
+    bool proof_unanswered_ = false;  ///< since it was last heard
+    bool proved_ = false;            ///< no outstanding request is in transit
     bool refuses_broadcasts_ = false;
-    Duration broadcast_delay_{};                    ///< the longest
+    std::optional<Duration> broadcast_delay_;       ///< the longest, of its answers to broadcasts
     std::optional<modbus::Request> cheapest_read_;  ///< that it has answered
     std::optional<modbus::Request> largest_read_;   ///< that it has answered; so are parts of it
     std::optional<modbus::Request> last_read_;      ///< probe before it has answered any
