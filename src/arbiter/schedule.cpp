@@ -263,6 +263,7 @@ std::optional<Group> Schedule::next_retry(TimePoint now, const Stations& station
 /// Reserves turns for other stations before the next retry.
 void Schedule::let_others_go_first(TimePoint now) {
     others_.clear();
+    wrote_.clear();
     turns_ = 0;
     if (!backlog_.has_retries()) patience_ = {};
     others_until_ = now + std::max<Duration>(patience_, 20ms);
@@ -275,11 +276,26 @@ void Schedule::let_others_go_first(TimePoint now) {
     turns_ = patience_ > kDear ? others_.size() : 1;
 }
 
+/// While a retry waits, each of the others has one turn; after a write another one for its reads
+/// (P9).
+bool Schedule::has_turn(const Job& job) const {
+    return others_.contains(job.station) || (job.request.is_read() && wrote_.contains(job.station));
+}
+
+void Schedule::take_turn(const Job& job) {
+    if (turns_ > 0) --turns_;
+    if (others_.erase(job.station) > 0 && !job.request.is_read()) {
+        wrote_.insert(job.station);
+    } else if (job.request.is_read()) {
+        wrote_.erase(job.station);
+    }
+}
+
 bool Schedule::others_go_first(TimePoint now, const Stations& stations, const Quiet& quiet) const {
     if (turns_ == 0 || now >= others_until_) return false;
     const JobQueue::Test may = runnable(now, stations, quiet);
     return backlog_.queue().peek([&](const Job& job) {
-        return others_.contains(job.station) && may(job) && stations.may_spend(now, job);
+        return has_turn(job) && may(job) && stations.may_spend(now, job);
     }) != nullptr;
 }
 
@@ -323,7 +339,6 @@ std::optional<Schedule::Next> Schedule::proof_before(TimePoint now, const Job& j
 
 Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quiet,
                                   const EchoMemory& echo) {
-    // While a retry lets others go first, each of them has one turn.
     const bool others = others_go_first(now, stations, quiet);
     const JobQueue::Test may_run = runnable(now, stations, quiet);
     PoolSet<std::uint8_t> reads;  // stations whose reads go before their writes
@@ -333,7 +348,7 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
         return false;
     });
     const JobQueue::Test may = [&](const Job& job) {
-        return (!others || others_.contains(job.station)) && may_run(job) &&
+        return (!others || has_turn(job)) && may_run(job) &&
                (job.request.is_read() || !reads.contains(job.station));
     };
     const JobQueue::Test in_budget = [&](const Job& job) {
@@ -351,8 +366,7 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
         return {learning_for(*next, stations.of(next->station)), false};
     }
     Job job = *backlog_.queue().pop(test);
-    others_.erase(job.station);
-    if (turns_ > 0) --turns_;
+    take_turn(job);
     if (broadcast) {
         Group group{.request = job.request};
         group.jobs.push_back(std::move(job));

@@ -118,6 +118,7 @@ class Checker : public Witness {
     bool waits_in_order(TimePoint since, arbiter::Ticket ticket, const Open& open) const;
     bool is_noisy(TimePoint now) const;
     Duration least_wait() const;
+    const arbiter::StationSettings& settings_of(std::uint8_t station) const;
     TimePoint owed_until() const;
     // Who waits, and whose turn it is (checker_queue.cpp)
     void mark_sent(std::uint8_t station, ByteView pdu, FrameKind what);

@@ -50,6 +50,7 @@ void Checker::on_answered(TimePoint now) {
     on_heard(now, 1);
     if (attempt_.answered) return;
     attempt_.answered = true;
+    attempt_.first = !watch_.has_answered(attempt_.station);
     watch_.on_answered(now, attempt_.station, now - attempt_.sent);
     // Of two attempts nobody knows which one the reply was for.
     if (attempt_.owed) watch_.on_owed(attempt_.station, owed_until());
@@ -106,6 +107,7 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     attempt_.sent = sent_until_ = now + frame_time(settings_.serial, adu.size());
     attempt_.dead = dead;
     attempt_.answered = station == kBroadcast;
+    attempt_.first = false;
     attempt_.heard = false;
     attempt_.span = test::read_span(station, pdu);
     attempt_.again = what == FrameKind::retry;
@@ -165,12 +167,15 @@ void Checker::close_attempt(TimePoint now) {
     watch_.on_owed(attempt_.station, owed_until());
 }
 
+const arbiter::StationSettings& Checker::settings_of(std::uint8_t station) const {
+    const auto listed =
+        std::ranges::find(settings_.stations, station, &arbiter::StationSettings::id);
+    return listed == settings_.stations.end() ? settings_.unlisted : *listed;
+}
+
 /// P1: until when a reply to the request that was sent last may come, at most.
 TimePoint Checker::owed_until() const {
-    const auto station =
-        std::ranges::find(settings_.stations, attempt_.station, &arbiter::StationSettings::id);
-    const arbiter::StationSettings& s =
-        station == settings_.stations.end() ? settings_.unlisted : *station;
+    const arbiter::StationSettings& s = settings_of(attempt_.station);
     constexpr int kMostTimeouts = 8;  // that an automatic window grows to
     const Duration window = s.late_window.value_or(kMostTimeouts * s.response_timeout);
     // An attempt that hears something goes on until that has ended.
@@ -184,9 +189,14 @@ void Checker::check_idling(TimePoint now) {
     constexpr std::size_t kReply = 45;
     const Duration slack = 100ms + frame_time(settings_.serial, kReply);
     // An answer that repeats another one may be held back for as long as its station needs: it
-    // could be a copy of that, with its own still to come (P1).
-    const TimePoint held = heard_until_ + watch_.own_slowest(attempt_.station) + 20ms;
-    const TimePoint over = std::max({sent_until_, heard_until_, std::min(told_, held)});
+    // could be a copy of that, with its own still to come (P1). So may a station's very first that
+    // equals its request, for a timeout: it could be the echo (P8).
+    const bool is_echo = attempt_.first && told_ < heard_until_;
+    const Duration needs = is_echo ? settings_of(attempt_.station).response_timeout
+                                   : watch_.own_slowest(attempt_.station);
+    const TimePoint held = heard_until_ + needs + 20ms;
+    const TimePoint over =
+        std::max({sent_until_, heard_until_, is_echo ? held : std::min(told_, held)});
     const auto waited = good_work_since(over);
     if (!waited || now <= *waited + slack) return;
     const Duration idle = now - *waited;

@@ -19,6 +19,7 @@ struct Attempt {
     bool was_silent = false;  ///< the station was silent before
     bool trusted = false;     ///< it answered the last time
     bool answered = true;
+    bool first = false;  ///< by the first answer of its station
     bool heard = false;  ///< anything
     bool again = false;  ///< it was on the wire before
     bool same = false;   ///< its station was asked the very same before

@@ -139,6 +139,8 @@ class Schedule {
     std::optional<Group> next_retry(TimePoint now, const Stations& stations, Quiet& quiet);
     bool others_go_first(TimePoint now, const Stations& stations, const Quiet& quiet) const;
     void let_others_go_first(TimePoint now);
+    bool has_turn(const Job& job) const;
+    void take_turn(const Job& job);
     std::optional<Group> next_probe(TimePoint now, Stations& stations, Quiet& quiet) const;
     Next next_job(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo);
     std::optional<Next> proof_before(TimePoint now, const Job& job, const Stations& stations) const;
@@ -155,6 +157,7 @@ class Schedule {
     Sharing sharing_;
     Ticket learned_for_ = 0;        ///< a read was sent for it to detect the echo (P8)
     PoolSet<std::uint8_t> others_;  ///< stations that waited when a retry was due
+    PoolSet<std::uint8_t> wrote_;   ///< those of them whose turn was a write
     std::size_t turns_ = 0;         ///< turns that the retry leaves to them, at most
     Duration patience_{};           ///< time that a retry may cost them
     TimePoint others_until_{};      ///< end of the time that the retry leaves to them

@@ -139,6 +139,21 @@ TEST_F(ScheduleTest, P4ADearRetryLeavesTheOthersNoMoreTimeThanItMayTake) {
     EXPECT_EQ(order(), "r1 3") << "what the others took counts";
 }
 
+/// Each station has one turn while a retry waits; a write that takes it counts for the reads that
+/// it passes over.
+TEST_F(ScheduleTest, P9AReaderWaitsForFourWritesAlsoBesideARetry) {
+    wait(2);
+    for (const std::uint8_t station : Bytes{2, 3, 2, 2, 2, 2, 2}) wait(station, true);
+    schedule.retry(now, failed(1), kDear);
+    int writes = 0;
+    while (const auto group = next().group) {
+        if (group->attempts > 0) continue;
+        if (group->request.is_read()) break;
+        ++writes;
+    }
+    EXPECT_EQ(writes, 4);
+}
+
 TEST_F(ScheduleTest, NothingElseGoesToAStationBeforeItsRetry) {
     wait(1, true);
     wait(1);
