@@ -348,6 +348,7 @@ void Arbiter::start(TimePoint now, Group group) {
                                   !stations_.flaky_beside_others(now, station);
         timing.patience = stations_.patience(now, group) + latency_;
         timing.usual = std::min(station.usual(stations_.slowest()) + latency_, timing.patience);
+        timing.allow_hole(station.reply_hole());
         timing.wake_latency = wake_latency_.early();
         timing.drift = station.clock_drift();
         timing.echoes = echo_memory_.expects_one();

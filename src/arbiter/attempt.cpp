@@ -132,6 +132,9 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     // The bytes buffered as an echo were the beginning, where only we delay the rest.
     if (!heard_ && timing_.steady && echo_since_ && !echo_.complete())
         first_byte_ = std::min(now, std::max(*echo_since_, timing_.sent));
+    if (heard_)
+        longest_pause_ =
+            std::max(longest_pause_, now - wire_time(timing_.serial, rest.size()) - last_byte_);
     heard_ = true;
     last_byte_ = now;
     return feed(rest, ends);

@@ -70,6 +70,7 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     if (trail_.settle_time() > Duration::zero() && !std::exchange(trail_reported_, true))
         result.trail = trail_.settle_time();
     const bool exception = modbus::exception_of(attempt.reply()).has_value();
+    hole_.on_reply(now, attempt.longest_pause());
     if (const auto& look = attempt.end_look()) clock_drift_.on_look(look->reply, look->whole);
     unusual_ = exception ? kUnusualReplies : std::max(unusual_ - 1, 0);
     return result;

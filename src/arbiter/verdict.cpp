@@ -381,6 +381,9 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     } else {
         station.requests().on_unanswered(now, group.request.pdu(), sent);
     }
+    const bool cut_off = verdict == Verdict::damaged && attempt.was_cut_off();
+    if (settings_.learns_holes && cut_off)
+        station.on_broken_reply(now, std::max(attempt.longest_pause(), attempt.timing().hole));
     if (verdict == Verdict::silent && attempt.echoed()) echo_memory_.on_unanswered(group.request);
     const bool affordable = stations_.affords_retry(now, station);
     const Condition before = station.condition();
@@ -393,7 +396,6 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     group.silent_after = verdict == Verdict::silent
                              ? std::min(now - sent, attempt.timing().patience) - latency_
                              : Duration::zero();
-    const bool cut_off = verdict == Verdict::damaged && attempt.was_cut_off();
     group.cut_after = cut_off ? now - sent : Duration::zero();
     if (!group.confirms.empty()) {
         give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);

@@ -422,7 +422,7 @@ Duration automatic_hole(const Line& line) {
 void load_reply_hole(MapReader& in, Line& line) {
     if (in.is_word("reply_hole", "auto")) return;
     const auto hole = in.duration("reply_hole", 1ms, 10s);
-    line.automatic_hole = !hole;
+    line.arbiter.learns_holes = !hole;
     line.arbiter.reply_hole = hole.value_or(line.arbiter.reply_hole);
 }
 
@@ -452,6 +452,7 @@ void load_common(Loading& loading, MapReader& in, const LineContext& work, Timin
 void load_line_timing(Loading& loading, MapReader& in, LineContext& work) {
     const SerialFormat& serial = work.line.device.serial;
     work.line.arbiter.reply_hole = automatic_hole(work.line);
+    work.line.arbiter.learns_holes = true;
     if (const Node* node = in.map("timing", "{response_timeout: 500ms}")) {
         MapReader timing(*node, loading.problems, "timing");
         load_common(loading, timing, work, work.timing);

@@ -206,10 +206,10 @@ const Keys<Line>& line_timing_keys() {
         Keys<Line>()
             .other("reply_hole",
                    "Longest silence inside a reply; auto: 60 ms and 32 characters, on "
-                   "tcp:// 700 ms, in ASCII 1 s.",
+                   "tcp:// 700 ms, in ASCII 1 s, longer for a station that pauses so.",
                    [](const Line& line) {
-                       return line.automatic_hole ? "auto"
-                                                  : format_duration(line.arbiter.reply_hole);
+                       return line.arbiter.learns_holes ? "auto"
+                                                        : format_duration(line.arbiter.reply_hole);
                    })
             .initially("auto")
             .duration(

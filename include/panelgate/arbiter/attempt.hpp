@@ -122,6 +122,13 @@ class Attempt {
         bool as_asked = false;     ///< the station usually answers as asked
         bool echoes = false;       ///< the line usually echoes what is sent
         bool confirm_end = false;  ///< the driver will report when the last bit has left
+
+        /// The station is known to pause for so long inside its replies.
+        void allow_hole(Duration longer) {
+            if (longer <= hole) return;
+            longest_reply += longer - hole;
+            hole = longer;
+        }
     };
     /// True if this good frame of the station, which does not answer the request, was sent instead
     /// of the reply: not the echo, a duplicate, or a late reply to an earlier request.
@@ -261,6 +268,8 @@ class Attempt {
     /// True if bytes were heard that are not part of the reply.
     bool disturbed() const { return disturbed_; }
     TimePoint last_byte() const { return last_byte_; }
+    /// The longest silence between two bytes of what was heard.
+    Duration longest_pause() const { return longest_pause_; }
     /// When the presumed reply began: by the line's rate where the line keeps it, because bytes are
     /// read late. Requires heard() or a reply.
     TimePoint first_byte() const;
@@ -329,6 +338,7 @@ class Attempt {
     std::optional<TimePoint> echo_since_;  ///< when the echo filter buffered its first byte
     std::optional<TimePoint> early_;
     TimePoint last_byte_;
+    Duration longest_pause_{};
     /// When the input began, if the line has kept its rate since; empty: the next byte decides.
     std::optional<TimePoint> began_;
     std::size_t since_ = 0;  ///< bytes since then

@@ -148,6 +148,37 @@ class Quickest {
     int count_ = 0;
 };
 
+/// Learns how long a station pauses inside its replies where that is longer than the line's
+/// `reply_hole`. Two attempts in a row whose reply broke off show it (one may be noise); where they
+/// have ended before it goes on, the next ones wait a quarter longer each. Never longer than the
+/// response timeout; forgotten when it has not paused for kForget. Pure.
+class ReplyHole {
+  public:
+    static constexpr Duration kForget = 10min;
+
+    /// An attempt failed whose reply broke off: after `pause` it went on, or was given up.
+    void on_broken(TimePoint now, Duration pause, Duration most) {
+        seen_ = std::max(seen_, pause);
+        used_ = now;
+        if (++broken_ >= 2) learned_ = std::min(std::max(learned_, seen_ * 5 / 4 + 10ms), most);
+    }
+    /// A reply came whole; the longest pause inside it.
+    void on_reply(TimePoint now, Duration pause) {
+        broken_ = 0;
+        seen_ = {};
+        if (2 * pause >= learned_) used_ = now;
+        if (now >= used_ + kForget) learned_ = {};
+    }
+    /// 0: it does not pause for longer than the line.
+    Duration learned() const { return learned_; }
+
+  private:
+    Duration learned_{};
+    Duration seen_{};  ///< since the last whole reply
+    int broken_ = 0;   ///< likewise
+    TimePoint used_{};
+};
+
 /// Learns what regularly follows the replies of one station (glitches of a transceiver that
 /// releases the line, a duplicate) and how long it lasts: it would damage a request sent meanwhile.
 /// Considers the last kReplies replies, so that it is soon unlearned. Pure.

@@ -85,6 +85,9 @@ struct Settings {
     EchoMode echo = EchoMode::off;
     /// Report why each request is sent now and why one is refused.
     bool explain = false;
+    /// A station that pauses for longer than `reply_hole` inside its replies is waited for: its
+    /// pause is learned.
+    bool learns_holes = false;
     friend bool operator==(const Settings&, const Settings&) = default;
 };
 

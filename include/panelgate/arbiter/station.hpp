@@ -84,6 +84,12 @@ class Station {
     /// An attempt was answered. `waited`: from the end of the request to the first sign of the
     /// reply; `think`: without the silence by which the panel detects the end of the request.
     Replied on_reply(TimePoint now, const Attempt& attempt, Duration waited, Duration think);
+    /// The reply to a failed attempt broke off for so long.
+    void on_broken_reply(TimePoint now, Duration pause) {
+        hole_.on_broken(now, pause, settings_.response_timeout);
+    }
+    /// The silence inside its replies that is to be waited for; 0: as long as on the line.
+    Duration reply_hole() const { return hole_.learned(); }
     /// An attempt that occupied the line for `cost` failed.
     void on_failed(TimePoint now, Verdict verdict, Duration cost,
                    const modbus::Request* write = nullptr);
@@ -224,6 +230,7 @@ class Station {
     Quickest quickest_;  ///< the same
     TimePoint failed_{};
     Drift clock_drift_;
+    ReplyHole hole_;
     int failed_in_a_row_ = 0;
     int unusual_ = 0;      ///< replies left until answers_as_asked()
     bool missed_ = false;  ///< the last attempt was silent, and its retry has not ended

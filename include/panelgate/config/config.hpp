@@ -57,7 +57,6 @@ struct Line {
     bool refuse_unlisted = false;
     Duration think_time = 1ms;    ///< of stations without their own
     bool automatic_gap = true;    ///< `frame_gap` is not set, or auto
-    bool automatic_hole = true;   ///< likewise `reply_hole`
     bool simulated_echo = false;  ///< the simulated adapter echoes what is sent
     std::vector<Station> stations;
     friend bool operator==(const Line&, const Line&) = default;

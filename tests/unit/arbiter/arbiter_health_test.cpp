@@ -210,5 +210,63 @@ TEST_F(ArbiterTest, P4APanelThatAlwaysAnswersLateTakesAtMostAFifthOfTheLine) {
     }
 }
 
+/// The panel answers each read that is sent in two halves, until this one is answered.
+void serve_in_halves(BusScript& bus, Ticket asked, Duration pause) {
+    for (std::size_t served = bus.sent.size() - 1; !bus.answered(asked); bus.run_for(1ms)) {
+        if (served == bus.sent.size()) continue;
+        served = bus.sent.size();
+        const Bytes& request = bus.sent.back().adu;
+        Writer reply;
+        reply.u8(request[1]).u8(2u * request[5]);
+        for (unsigned i = 0; i < request[5]; ++i) reply.u16(i);
+        const Bytes adu = modbus::encode_adu(request[0], reply.take());
+        bus.run_to_end_of_request();
+        bus.run_for(3ms);
+        bus.hear(ByteView(adu).first(6));
+        bus.run_for(pause);
+        bus.hear(ByteView(adu).subspan(6));
+    }
+}
+
+TEST_F(ArbiterTest, P4APanelThatPausesInsideItsRepliesIsWaitedForFromTheThirdOn) {
+    settings.learns_holes = true;
+    settings.stations[0].retries = 0;
+    for (const bool is_known : {false, true}) {
+        BusScript line{settings};
+        if (is_known) {
+            const Ticket quick = line.submit(17, kRead);
+            answer(line, 17, kReply);
+            EXPECT_TRUE(line.answered(quick));
+        }
+        for (std::size_t i = 1; i < 10; ++i) {
+            const Ticket asked = line.submit(17, read_at(static_cast<unsigned>(i)));
+            serve_in_halves(line, asked, 80ms);
+            if (i != 2) EXPECT_EQ(line.answer(asked).pdu.has_value(), i > 2) << i << is_known;
+        }
+    }
+}
+
+TEST(ReplyHole, IsLearnedFromTwoInARowAndForgottenWhenItDoesNotPauseAnyMore) {
+    ReplyHole hole;
+    TimePoint now{1h};
+    hole.on_broken(now, 80ms, 500ms);
+    EXPECT_EQ(hole.learned(), 0ms) << "one may be noise";
+    hole.on_reply(now, 1ms);
+    hole.on_broken(now, 80ms, 500ms);
+    EXPECT_EQ(hole.learned(), 0ms) << "not in a row";
+    hole.on_broken(now, 60ms, 500ms);
+    EXPECT_EQ(hole.learned(), 110ms);
+    now += ReplyHole::kForget - 1s;
+    hole.on_reply(now, 80ms);
+    now += ReplyHole::kForget - 1s;
+    hole.on_reply(now, 1ms);
+    EXPECT_EQ(hole.learned(), 110ms);
+    now += 1s;
+    hole.on_reply(now, 1ms);
+    EXPECT_EQ(hole.learned(), 0ms);
+    for (int i = 0; i < 9; ++i) hole.on_broken(now, 400ms, 500ms);
+    EXPECT_EQ(hole.learned(), 500ms) << "no longer than its timeout";
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter::arbiter_health_test
