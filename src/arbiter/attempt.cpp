@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "panelgate/arbiter/job_queue.hpp"
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "verdict.hpp"
@@ -37,13 +38,14 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo,
       timing_(timing),
       orders_(orders),
       echo_(std::move(echo)),
+      own_(echo_.expected()),
       framer_(group_.station, group_.request.pdu(), orders_,
               has_delimiters() ? modbus::ReplyFramer::Ends::told
                                : modbus::ReplyFramer::Ends::by_length),
+      pace_({byte_time(timing.serial), timing.steady, timing.wake_latency, timing.drift}),
       computed_end_(timing.sent),
       first_byte_(timing.sent),
       last_byte_(timing.sent),
-      echo_possible_(echo_.expected()),
       end_confirmed_(!timing.confirm_end) {}
 
 bool Attempt::can_join(TimePoint now, const Job& job) const {
@@ -53,45 +55,23 @@ bool Attempt::can_join(TimePoint now, const Job& job) const {
 }
 
 Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
-    // Late reading or late notification does not make the line slower.
-    const Duration slack = std::max<Duration>(2 * byte(), 1ms);
     const auto planned = next_look();
-    since_ += bytes.size();
-    looked_ = now;
-    const TimePoint latest = now - since_ * byte();
-    hasty_ = hasty_ || (began_ && latest < *began_ - slack);
-    began_ = began_ ? std::min(*began_, latest) : latest;
+    pace_.on_read(now, bytes.size());
     const Verdict verdict = hear(now, bytes, ends);
-    if (planned && planned->end && now >= planned->at && !end_look_) {
-        const bool whole = since_ * byte() >= planned->reply;
-        unexpected_exception_ = verdict == Verdict::replied && !whole;
-        if (!unexpected_exception_) end_look_ = {planned->reply, whole};
-    }
-    // More should have come by now: a hole, or a slower clock; the next byte decides.
-    const auto busy = busy_until();
-    if (began_ && (latest > *began_ + slack || (busy && *busy <= now))) began_.reset();
+    pace_.on_judged(now, planned, verdict == Verdict::replied);
+    pace_.drop_if_late(now, busy_until());
     return verdict;
 }
 
-std::optional<Attempt::NextLook> Attempt::next_look() const {
-    if (!timing_.steady || hasty_ || !began_) return std::nullopt;
+std::optional<InputPace::Look> Attempt::next_look() const {
+    if (!pace_.is_kept()) return std::nullopt;
     const std::size_t rest = missing();
-    if (rest == 0) return std::nullopt;
-    NextLook next;
-    next.reply = (since_ + rest) * byte();
-    next.end = since_ + rest > modbus::kMinAdu && rest != echo_.missing();
-    next.at = *began_ + next.reply;
-    const Duration early = timing_.wake_latency + timing_.drift.early(next.reply);
-    if (next.end) next.at -= std::min(early, next.reply / 4);  // or a short one could not be judged
-    return next;
+    return pace_.look(rest, pace_.bytes() + rest > modbus::kMinAdu && rest != echo_.missing());
 }
 
-/// A reply that was cut short is noticed before twice its time so far.
 std::optional<TimePoint> Attempt::busy_until() const {
-    constexpr Duration kLongest = 30ms;
     const auto next = next_look();
-    if (!next) return std::nullopt;
-    return std::min(next->at, looked_ + std::max<Duration>(kLongest, looked_ - *began_));
+    return next ? std::optional(pace_.busy_until(*next)) : std::nullopt;
 }
 
 std::size_t Attempt::missing() const {
@@ -106,9 +86,7 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     const bool was_complete = echo_.complete();
     const ByteView rest = echo_.feed(bytes);
     if (echo_.complete() && !was_complete) {
-        since_ = rest.size();
-        began_.reset();
-        if (since_ > 0) began_ = now - since_ * byte();
+        pace_.restart(now, rest.size());
     }
     if (echo_.pending() || rest.size() < bytes.size()) last_byte_ = std::max(last_byte_, now);
     const bool may_lend = !has_delimiters() && echo_.complete() && !was_complete;
@@ -153,7 +131,7 @@ Verdict Attempt::feed(ByteView bytes, const Ends& ends) {
     if (accept(framer_.feed(bytes)) == Verdict::replied) return Verdict::replied;
     if (lender_) {
         if (auto reply = lender_->feed(bytes)) {
-            borrowed_ = true;
+            own_.borrowed = true;
             return accept(std::move(reply));
         }
     }
@@ -163,10 +141,7 @@ Verdict Attempt::feed(ByteView bytes, const Ends& ends) {
 Verdict Attempt::accept(std::optional<Bytes> reply) {
     collect();
     if (!reply) return Verdict::open;
-    if (may_be_echo(*reply)) {
-        own_frame_seen_ = true;
-        return Verdict::open;
-    }
+    if (own_.may_be_echo(echo_, adu_of(*reply))) return Verdict::open;
     // Two equal replies cannot be distinguished.
     if (const auto candidate = std::exchange(candidate_, std::nullopt);
         candidate && candidate != reply) {
@@ -178,20 +153,13 @@ Verdict Attempt::accept(std::optional<Bytes> reply) {
     return Verdict::replied;
 }
 
-/// P8: foreign bytes may precede the echo, which the filter then does not recognise. The first
-/// frame that equals our own confirms nothing, unless a part of the echo came before it.
-bool Attempt::may_be_echo(ByteView reply) const {
-    const bool accounted = !echo_possible_ || echo_.complete() || fragment_ || own_frame_seen_;
-    return !accounted && std::ranges::equal(adu_of(reply), echo_.frame());
-}
-
 /// Turns pending bytes into unsolicited parts. Did the station send them instead of the reply?
 Verdict Attempt::judge_pending(const Ends& ends) {
     const std::size_t before = unsolicited_.size();
     framer_.drop_pending();
     collect();
     judge_unsolicited(before, ends);
-    return wrong_ ? Verdict::wrong : Verdict::open;
+    return instead_ == Instead::reply ? Verdict::wrong : Verdict::open;
 }
 
 void Attempt::judge_unsolicited(std::size_t from, const Ends& ends) {
@@ -206,11 +174,10 @@ void Attempt::judge_unsolicited(std::size_t from, const Ends& ends) {
             disturbed_ = disturbed_ || refuses_other;
             continue;
         }
-        // An unrelated frame may be babble: the reply still has its usual time.
         const bool other = !exception && function != group_.request.function();
         refused_other_ = refused_other_ || refuses_other;
-        (other ? disturbed_ : wrong_) = true;
-        unrelated_ = unrelated_ || other;
+        disturbed_ = disturbed_ || other;
+        instead_ = std::max(instead_, other ? Instead::unrelated : Instead::reply);
     }
 }
 
@@ -227,7 +194,8 @@ void Attempt::collect() {
         frames_in_front_ = frames_in_front_ || (in_front && (!damaged || foreign));
         if (damaged && !foreign) {
             if (in_front) noise_in_front_ += parts[i].bytes.size();
-            fragment_ = fragment_ || (in_front && holds_fragment(parts[i].bytes, echo_.frame()));
+            own_.fragment =
+                own_.fragment || (in_front && holds_fragment(parts[i].bytes, echo_.frame()));
             append_up_to(modbus::ReplyFramer::kMaxHeard, damaged_bytes_, parts[i].bytes);
             disturbed_ = true;
         }
@@ -238,7 +206,7 @@ void Attempt::collect() {
 /// The candidate came before our own request.
 void Attempt::on_echo_behind() {
     if (!timing_.echoes) return;
-    echo_behind_ = true;
+    own_.behind = true;
     if (candidate_) add_unsolicited(*std::exchange(candidate_, std::nullopt));
 }
 
@@ -267,17 +235,17 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
         judge_unsolicited(before, ends);
     }
     const bool usual_is_over = now >= timing_.sent + timing_.usual;
-    if (candidate_ && usual_is_over && doubted_) return Verdict::doubtful;
+    if (candidate_ && usual_is_over && kept_ == Candidate::doubted) return Verdict::doubtful;
     if (candidate_ && usual_is_over) {
         reply_ = std::exchange(candidate_, std::nullopt);
         return Verdict::replied;
     }
-    if (wrong_) return Verdict::wrong;
+    if (instead_ == Instead::reply) return Verdict::wrong;
     const bool damaged = framer_.was_damaged() || echo_.mismatch() || contested_;
     if (framer_.was_damaged_whole()) return Verdict::damaged;
     const Duration wait = in_doubt() ? timing_.usual : timing_.patience;
     if (now < timing_.sent + wait) return Verdict::open;
-    if (unrelated_) return Verdict::wrong;
+    if (instead_ == Instead::unrelated) return Verdict::wrong;
     return damaged ? Verdict::damaged : Verdict::silent;
 }
 
@@ -293,15 +261,14 @@ Verdict Attempt::on_frame_end(bool good, const Ends& ends) {
     const std::size_t before = unsolicited_.size();
     if (accept(framer_.on_end(good)) == Verdict::replied) return Verdict::replied;
     judge_unsolicited(before, ends);
-    if (wrong_) return Verdict::wrong;
+    if (instead_ == Instead::reply) return Verdict::wrong;
     return framer_.was_damaged_whole() ? Verdict::damaged : Verdict::open;
 }
 
 void Attempt::on_end(TimePoint now, Duration left) {
-    constexpr Duration kMaxShift = 1s;
     if (!wants_end(now)) return;
     const TimePoint end = now + left;
-    if (left <= Duration::zero() || heard_ || end > computed_end_ + kMaxShift) {
+    if (left <= Duration::zero() || heard_ || end > computed_end_ + timing::kLatestEnd) {
         end_confirmed_ = true;
         return;
     }
@@ -313,11 +280,12 @@ void Attempt::on_end(TimePoint now, Duration left) {
 void Attempt::teach(EchoMemory& memory) const {
     const bool noisy = noise_in_front_ * 2 >= echo_.frame().size();
     const bool clean = !echo_.mismatch() && !noisy && !frames_in_front_;
-    if (!echoed() && (fragment_ || clean)) memory.on_reply_without_echo(group_.request, fragment_);
+    if (!echoed() && (own_.fragment || clean))
+        memory.on_reply_without_echo(group_.request, own_.fragment);
 }
 
 Duration Attempt::waited(TimePoint now) const {
-    if (unexpected_exception_) return std::max(first_byte_ - timing_.sent, Duration::zero());
+    if (pace_.is_shorter()) return std::max(first_byte_ - timing_.sent, Duration::zero());
     const Duration reply = frame_time(timing_.serial, reply_->size() + modbus::kAduOverhead);
     return std::max(now - timing_.sent - reply, Duration::zero());
 }
@@ -350,13 +318,13 @@ void Attempt::reject_reply() {
     disturbed_ = true;
 }
 
-void Attempt::keep_candidate(Duration needed, bool doubted) {
-    doubted_ = doubted;
+void Attempt::keep_candidate(Duration needed, Candidate kind) {
+    kept_ = kind;
     timing_.usual = std::min(timing_.usual, needed);
     // The reply that the duplicate has delayed comes after it.
-    if (doubted) timing_.usual = std::min(last_byte_ - timing_.sent + needed, timing_.patience);
+    if (kind == Candidate::doubted)
+        timing_.usual = std::min(last_byte_ - timing_.sent + needed, timing_.patience);
     candidate_ = std::exchange(reply_, std::nullopt);
-    had_candidate_ = true;
     candidate_at_ = last_byte_;
     disturbed_ = true;
 }

@@ -21,6 +21,12 @@ bool holds_fragment(ByteView heard, ByteView frame) {
     return false;
 }
 
+bool OwnFrame::may_be_echo(const EchoFilter& filter, ByteView adu) {
+    const bool accounted = !possible || filter.complete() || fragment || seen;
+    if (accounted || !std::ranges::equal(adu, filter.frame())) return false;
+    return seen = true;
+}
+
 ByteView EchoFilter::feed(ByteView bytes) {
     if (expect_ == Expect::nothing) return bytes;
     std::size_t taken = 0;

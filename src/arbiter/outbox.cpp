@@ -1,4 +1,5 @@
 #include "panelgate/arbiter/outbox.hpp"
+#include "panelgate/arbiter/timing.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -135,9 +136,8 @@ void Outbox::on_ended(TimePoint now, const Attempt& attempt, Duration gap) {
 }
 
 void Outbox::on_echo_mismatch(TimePoint now, std::uint8_t station) {
-    constexpr Duration kPause = 10s;
     ++of(station).echo_mismatches;
-    if (reported_collision_ && now < *reported_collision_ + kPause) return;
+    if (reported_collision_ && now < *reported_collision_ + timing::kReportsCollision) return;
     reported_collision_ = now;
     event(StationEvent::Kind::collision, station);
 }

@@ -1,4 +1,5 @@
 #include "panelgate/arbiter/requests.hpp"
+#include "panelgate/arbiter/timing.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -72,7 +73,7 @@ TimePoint OutstandingRequests::surely_answered(TimePoint started, ByteView reply
 
 void OutstandingRequests::on_asked(TimePoint now, const Group& group, bool in_transit) {
     if (now >= rested() && !in_transit) replies_.lapse();
-    if (disordered_at_ && now > *disordered_at_ + kForgetDisorder) disordered_at_.reset();
+    if (disordered_at_ && now > *disordered_at_ + timing::kForgetHabit) disordered_at_.reset();
     if (group.span && !group.distinct_length) last_read_ = group.request;
 }
 
@@ -103,8 +104,8 @@ void OutstandingRequests::on_damaged_reply(TimePoint now, const modbus::Request&
         replies_.add(sent, request.pdu());
         rest(now);
     }
-    duplicates_.on_doubt(DuplicateGuard::kRepeatDelay);
-    again_until_ = now + DuplicateGuard::kRepeatDelay;
+    duplicates_.on_doubt(timing::kRepeatsDamaged);
+    again_until_ = now + timing::kRepeatsDamaged;
     not_before_ = std::max(not_before_, again_until_);
 }
 
@@ -132,7 +133,7 @@ void OutstandingRequests::learn_of_duplicates(TimePoint now, const Attempt& atte
     }
     if (const auto first = attempt.first_reply_at(); first && !any())
         duplicates_.on_repeated_reply(now, *first, attempt.reply());
-    if (attempt.came_damaged_before()) duplicates_.on_doubt(DuplicateGuard::kRepeatDelay);
+    if (attempt.came_damaged_before()) duplicates_.on_doubt(timing::kRepeatsDamaged);
     duplicates_.on_reply(now, group.request.pdu(), attempt.reply());
 }
 

@@ -1,4 +1,5 @@
 #include "panelgate/arbiter/schedule.hpp"
+#include "panelgate/arbiter/timing.hpp"
 
 #include <algorithm>
 #include <iterator>
@@ -241,8 +242,7 @@ Schedule::Next Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
     const auto due = stations.next_probe();
     // Probes have the lowest class, but a busy line must not keep a station offline: its budget
     // limits them.
-    constexpr Duration kPatience = 20ms;
-    if (due && now >= *due + kPatience) {
+    if (due && now >= *due + timing::kProbeWaits) {
         if (auto group = next_probe(now, stations, quiet)) return {std::move(group), false};
     }
     if (Next job = next_job(now, stations, quiet, echo); job.group || job.reopen) return job;
@@ -266,14 +266,13 @@ void Schedule::let_others_go_first(TimePoint now) {
     wrote_.clear();
     turns_ = 0;
     if (!backlog_.has_retries()) patience_ = {};
-    others_until_ = now + std::max<Duration>(patience_, 20ms);
+    others_until_ = now + std::max(patience_, timing::kOthersFirst);
     if (!backlog_.has_retries() || quarantine_ == Quarantine::line) return;
     backlog_.queue().any_first([&](const Job& job) {
         others_.insert(job.station);
         return false;
     });
-    constexpr Duration kDear = 200ms;
-    turns_ = patience_ > kDear ? others_.size() : 1;
+    turns_ = patience_ > timing::kDearRetry ? others_.size() : 1;
 }
 
 /// While a retry waits, each of the others has one turn; after a write another one for its reads

@@ -1,4 +1,5 @@
 #include "panelgate/arbiter/station.hpp"
+#include "panelgate/arbiter/timing.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -71,7 +72,8 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
         result.trail = trail_.settle_time();
     const bool exception = modbus::exception_of(attempt.reply()).has_value();
     hole_.on_reply(now, attempt.longest_pause());
-    if (const auto& look = attempt.end_look()) clock_drift_.on_look(look->reply, look->whole);
+    if (const auto& look = attempt.pace().end_look())
+        clock_drift_.on_look(look->reply, look->whole);
     unusual_ = exception ? kUnusualReplies : std::max(unusual_ - 1, 0);
     return result;
 }
@@ -131,7 +133,8 @@ Duration Station::short_wait(std::optional<Duration> line) const {
     const std::optional<Duration> own = slowest();
     const Duration whole = settings_.response_timeout;
     if (!own && !line) return whole;
-    return std::min(whole, std::max<Duration>(20ms, (own ? *own : *line) * 3 / 2 + 8ms));
+    return std::min(whole, std::max(timing::kShortestWait,
+                                    (own ? *own : *line) * 3 / 2 + timing::kReceiveMargin));
 }
 
 Duration Station::patience(const Group& group, std::optional<Duration> line, bool urgent,
@@ -153,7 +156,8 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
         // A few replies delayed by a network must not make probes long: one in kDear waits as long
         // as it has ever needed, the others as long as most replies take.
         constexpr double kMost = 0.75;
-        const Duration most = std::max<Duration>(20ms, 2 * turnaround_.quantile(kMost) + 8ms);
+        const Duration most = std::max(timing::kShortestWait,
+                                       2 * turnaround_.quantile(kMost) + timing::kReceiveMargin);
         return std::min(short_wait(line), most);
     }
     if ((health_.offline() || flaky_beside_others) && !slowest()) {

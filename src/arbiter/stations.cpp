@@ -1,4 +1,5 @@
 #include "panelgate/arbiter/stations.hpp"
+#include "panelgate/arbiter/timing.hpp"
 
 #include <algorithm>
 
@@ -60,7 +61,7 @@ TimePoint Stations::others_active_until(const Station& station) const {
     for (const auto& [id, other] : stations_) {
         const auto answered = other.health().last_heard();
         if (&other != &station && answered && *answered > station.failed())
-            until = std::max(until, *answered + kOthersActive);
+            until = std::max(until, *answered + timing::kOthersActive);
     }
     return until;
 }
@@ -139,7 +140,7 @@ void Stations::on_failed(TimePoint now, const Group& group, Verdict verdict, Dur
     station.on_failed(now, verdict, cost, group.request.is_read() ? nullptr : &group.request);
     if (station.speculative()) {
         unheard_.spend(now, cost, 2 * timeout_cost());
-        if (station.health().offline()) asked_unheard_.spend(now, cost, kOthersActive);
+        if (station.health().offline()) asked_unheard_.spend(now, cost, timing::kOthersActive);
     } else if (station.health().offline()) {
         probes_.spend(now, cost);
         alone_.spend(now, cost);
@@ -148,8 +149,8 @@ void Stations::on_failed(TimePoint now, const Group& group, Verdict verdict, Dur
     } else if (verdict == Verdict::silent) {
         // Several stations may have failed together: for five times what this one took, the others
         // are not waited for longer than they have ever needed.
-        urgent_until_ =
-            now + std::min<Duration>(static_cast<int>(1 / ProbeBudget::kFailing) * cost, kUrgent);
+        urgent_until_ = now + std::min<Duration>(static_cast<int>(1 / ProbeBudget::kFailing) * cost,
+                                                 timing::kUrgent);
     }
 }
 

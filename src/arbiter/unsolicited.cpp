@@ -1,4 +1,5 @@
 #include "panelgate/arbiter/unsolicited.hpp"
+#include "panelgate/arbiter/timing.hpp"
 
 #include <algorithm>
 #include <cstdlib>
@@ -115,8 +116,7 @@ void UnsolicitedFrames::learn_of_broadcasts(TimePoint now, const Unused& part, S
 }
 
 bool UnsolicitedFrames::answers_other_master(TimePoint now, ByteView adu) const {
-    constexpr Duration kLongest = 500ms;  // for a reply; its master would have asked again
-    return foreign_requests_.fit(adu, now - kLongest);
+    return foreign_requests_.fit(adu, now - timing::kLatestRepetition);
 }
 
 /// Another master asks: sending now would damage the reply to it. Wait as long as our slowest panel
@@ -129,7 +129,8 @@ void UnsolicitedFrames::let_reply_pass(TimePoint now, ByteView request, const St
     constexpr std::size_t kShort = modbus::kReadRequestAdu;
     const Duration reply =
         frame_time(serial_, modbus::reply_length_from_request(pdu).value_or(kShort));
-    const Duration think = std::clamp<Duration>(3 * stations.slowest().value_or(10ms), 20ms, 100ms);
+    const Duration think = std::clamp(3 * stations.slowest().value_or(timing::kForeignThink),
+                                      timing::kShortestForeign, timing::kLongestForeign);
     quiet.rest_until(now + silent_interval(serial_) + think + reply);
 }
 

@@ -269,13 +269,13 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
             attempt.reject_reply();
             return false;
         case Take::keep:
-            attempt.keep_candidate(station.needed(), false);
+            attempt.keep_candidate(station.needed(), Attempt::Candidate::believed);
             return false;
         case Take::ask_again:
-            attempt.keep_candidate(station.needed(), true);
+            attempt.keep_candidate(station.needed(), Attempt::Candidate::doubted);
             return false;
         case Take::suspect_echo:
-            attempt.keep_candidate(station.needed(), true);
+            attempt.keep_candidate(station.needed(), Attempt::Candidate::doubted);
             attempt.suspect_echo();
             return false;
     }
@@ -288,10 +288,9 @@ void Arbiter::settle(TimePoint now) {
     const bool early = active_->replied_early();
     if (!takes_reply(now, station, early)) return;
     pace_.on_reply(early);
-    pace_.on_rate(active_->hasty());
-    unusual_ =
-        active_->unexpected_exception() ? Station::kUnusualReplies : std::max(unusual_ - 1, 0);
-    if (const auto& look = active_->end_look()) wake_latency_.on_look(look->whole);
+    pace_.on_rate(active_->pace().hasty());
+    unusual_ = active_->pace().is_shorter() ? Station::kUnusualReplies : std::max(unusual_ - 1, 0);
+    if (const auto& look = active_->pace().end_look()) wake_latency_.on_look(look->whole);
     Attempt attempt = take_active(now);
     Group& group = attempt.group();
     const Bytes& reply = attempt.reply();
@@ -368,6 +367,20 @@ Group Arbiter::confirming(Group& write, const Station& station) {
     return read;
 }
 
+/// What a failed attempt tells, and what stays outstanding of it.
+void Arbiter::learn_from_failure(TimePoint now, const Attempt& attempt, Verdict verdict) {
+    const modbus::Request& request = attempt.group().request;
+    Station& station = stations_.of(attempt.group().station);
+    if (attempt.came_damaged()) {
+        station.requests().on_damaged_reply(now, request, attempt.timing().sent);
+    } else {
+        station.requests().on_unanswered(now, request.pdu(), attempt.timing().sent);
+    }
+    if (settings_.learns_holes && verdict == Verdict::damaged && attempt.was_cut_off())
+        station.on_broken_reply(now, std::max(attempt.longest_pause(), attempt.timing().hole));
+    if (verdict == Verdict::silent && attempt.echoed()) echo_memory_.on_unanswered(request);
+}
+
 void Arbiter::fail(TimePoint now, Verdict verdict) {
     Attempt attempt = take_active(now);
     outbox_.on_failed(attempt, verdict);
@@ -376,15 +389,8 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     Station& station = stations_.of(group.station);
     const TimePoint sent = attempt.timing().sent;
     const Duration cost = now - attempt.timing().started + stations_.gap(group.station);
-    if (attempt.came_damaged()) {
-        station.requests().on_damaged_reply(now, group.request, sent);
-    } else {
-        station.requests().on_unanswered(now, group.request.pdu(), sent);
-    }
+    learn_from_failure(now, attempt, verdict);
     const bool cut_off = verdict == Verdict::damaged && attempt.was_cut_off();
-    if (settings_.learns_holes && cut_off)
-        station.on_broken_reply(now, std::max(attempt.longest_pause(), attempt.timing().hole));
-    if (verdict == Verdict::silent && attempt.echoed()) echo_memory_.on_unanswered(group.request);
     const bool affordable = stations_.affords_retry(now, station);
     const Condition before = station.condition();
     stations_.on_failed(now, group, verdict, cost);

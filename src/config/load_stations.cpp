@@ -452,7 +452,6 @@ void load_common(Loading& loading, MapReader& in, const LineContext& work, Timin
 void load_line_timing(Loading& loading, MapReader& in, LineContext& work) {
     const SerialFormat& serial = work.line.device.serial;
     work.line.arbiter.reply_hole = automatic_hole(work.line);
-    work.line.arbiter.learns_holes = true;
     if (const Node* node = in.map("timing", "{response_timeout: 500ms}")) {
         MapReader timing(*node, loading.problems, "timing");
         load_common(loading, timing, work, work.timing);

@@ -204,7 +204,6 @@ void mix_crc_orders(Plan& plan) {
 Plan draw(Kind kind, std::uint64_t seed, SerialMode mode) {
     Random random(seed * 31 + static_cast<std::uint64_t>(kind));
     Plan plan;
-    plan.settings.learns_holes = true;
     plan.seed = seed;
     plan.settings.serial.mode = mode;
     if (mode == SerialMode::ascii) plan.settings.serial.data_bits = 7;

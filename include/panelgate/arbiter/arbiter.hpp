@@ -186,6 +186,7 @@ class Arbiter {
     void ask_again(TimePoint now);
     void confirm(const Group& group, bool is_answer);
     static Group confirming(Group& write, const Station& station);
+    void learn_from_failure(TimePoint now, const Attempt& attempt, Verdict verdict);
     void fail(TimePoint now, Verdict verdict);
     void give_back(Group& group);
     void give_up(TimePoint now, const Group& group, Fault fault);

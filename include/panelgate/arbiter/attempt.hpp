@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "panelgate/arbiter/echo.hpp"
+#include "panelgate/arbiter/input_pace.hpp"
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/outstanding.hpp"
 #include "panelgate/arbiter/reply_times.hpp"
@@ -156,17 +157,8 @@ class Attempt {
     /// exception (Timing::as_asked) is noticed when the reply would have been complete. Empty:
     /// every byte may decide.
     std::optional<TimePoint> busy_until() const;
-    /// Result of the first read at the expected end of a reply: its duration at the line's rate,
-    /// and whether all of it was there.
-    struct EndLook {
-        Duration reply{};
-        bool whole = false;
-    };
-    const std::optional<EndLook>& end_look() const { return end_look_; }
-    /// True if the reply was an exception that was not expected.
-    bool unexpected_exception() const { return unexpected_exception_; }
-    /// True if bytes came faster than the line's rate allows since the reply began.
-    bool hasty() const { return hasty_; }
+    /// How the bytes have come so far.
+    const InputPace& pace() const { return pace_; }
 
     bool wants_end(TimePoint now) const { return !end_confirmed_ && now >= timing_.sent; }
     TimePoint end_wanted_at() const { return end_confirmed_ ? TimePoint::max() : timing_.sent; }
@@ -212,20 +204,26 @@ class Attempt {
     void reject_reply();
     /// True if the rejected reply was an exception: the next one may be the same again.
     bool refusal_was_rejected() const { return refusal_rejected_; }
-    /// Keeps the reply as a candidate because it may be a duplicate. If nothing else comes until
-    /// `needed` after the request, the longest time the station has needed, the candidate is the
-    /// answer; if `doubted`, the attempt is doubtful `needed` after the candidate.
-    void keep_candidate(Duration needed, bool doubted);
-    bool had_candidate() const { return had_candidate_; }
+    /// What becomes of a candidate when nothing else comes.
+    enum class Candidate : std::uint8_t {
+        none,      ///< there has been no candidate
+        believed,  ///< it is the answer
+        doubted,   ///< the attempt is doubtful
+    };
+    /// Keeps the reply as a candidate because it may be a duplicate. Nothing else comes: until
+    /// `needed` after the request, the longest time the station has needed, or, if doubted, after
+    /// the candidate.
+    void keep_candidate(Duration needed, Candidate kind);
+    bool had_candidate() const { return kept_ != Candidate::none; }
     /// True if the reply came where the line's echo was expected: if the echo follows, it is
     /// another master's.
     bool precedes_echo() const {
-        return timing_.echoes && !echo_.complete() && !fragment_ && !echo_behind_ &&
+        return timing_.echoes && !echo_.complete() && !own_.fragment && !own_.behind &&
                noise_in_front_ == 0;
     }
     /// True if the reply to a write equals the echo of its request: only timing distinguishes them.
     bool may_be_its_echo() const {
-        return !group_.request.is_read() && !echo_.complete() && !own_frame_seen_ &&
+        return !group_.request.is_read() && !echo_.complete() && !own_.seen &&
                std::ranges::equal(adu_of(*reply_), echo_.frame());
     }
     /// True if the reply also answers another master's request to the same station.
@@ -254,7 +252,7 @@ class Attempt {
 
     const EchoFilter& echo() const { return echo_; }
     /// True if the whole echo came back, and no byte of it was needed to complete the reply.
-    bool echoed() const { return echo_.complete() && !borrowed_; }
+    bool echoed() const { return echo_.complete() && !own_.borrowed; }
     /// Updates what is known of the line's echo from this reply.
     void teach(EchoMemory& memory) const;
     /// True if its own reply came damaged, but with the header intact.
@@ -285,23 +283,23 @@ class Attempt {
     Bytes release_echo() { return echo_.release(); }
 
   private:
+    /// What the station has sent instead of the reply.
+    enum class Instead : std::uint8_t {
+        nothing,
+        unrelated,  ///< of another function: perhaps babble, and the reply has its usual time
+        reply,      ///< it has said something else
+    };
     void drop_what_ended(TimePoint now, std::size_t size);
     Verdict hear(TimePoint now, ByteView bytes, const Ends& ends);
     /// Bytes until the frame that has begun can be judged. 0: each may decide.
     std::size_t missing() const;
-    struct NextLook {
-        TimePoint at;
-        Duration reply{};  ///< at the line's rate, from its beginning until then
-        bool end = false;  ///< the whole reply is expected then
-    };
-    std::optional<NextLook> next_look() const;
+    std::optional<InputPace::Look> next_look() const;
     Duration byte() const { return byte_time(timing_.serial); }
     bool has_delimiters() const { return timing_.serial.mode == SerialMode::ascii; }
     /// The bytes that the echo filter buffered were no echo.
     Verdict take_from_echo(const Ends& ends);
     Verdict feed(ByteView bytes, const Ends& ends);
     Verdict accept(std::optional<Bytes> reply);
-    bool may_be_echo(ByteView reply) const;
     Verdict judge_pending(const Ends& ends);
     void add_unsolicited(const Bytes& pdu);
     /// The ADU of this reply of the station.
@@ -320,48 +318,36 @@ class Attempt {
     Timing timing_;
     modbus::CrcOrders orders_;
     EchoFilter echo_;
+    OwnFrame own_;
     modbus::ReplyFramer framer_;
     /// As framer_, in case the echo's last byte was lost and the reply's first byte was taken for
     /// it.
     std::optional<modbus::ReplyFramer> lender_;
     std::optional<Bytes> reply_;
     std::optional<Bytes> candidate_;  ///< a reply that may be a duplicate
-    bool had_candidate_ = false;
+    Candidate kept_ = Candidate::none;
     TimePoint candidate_at_{};
     std::optional<TimePoint> first_reply_at_;
-    bool doubted_ = false;  ///< of the candidate
     std::vector<modbus::Unused> unsolicited_;
     Bytes damaged_bytes_;
     Bytes stale_;
+    InputPace pace_;
     TimePoint computed_end_;
     TimePoint first_byte_;
     std::optional<TimePoint> echo_since_;  ///< when the echo filter buffered its first byte
     std::optional<TimePoint> early_;
     TimePoint last_byte_;
     Duration longest_pause_{};
-    /// When the input began, if the line has kept its rate since; empty: the next byte decides.
-    std::optional<TimePoint> began_;
-    std::size_t since_ = 0;  ///< bytes since then
-    TimePoint looked_{};     ///< when bytes were last read
-    std::optional<EndLook> end_look_;
-    bool unexpected_exception_ = false;  ///< its reply was shorter than expected
-    bool hasty_ = false;
     bool heard_ = false;
     bool disturbed_ = false;
-    bool fragment_ = false;
-    bool echo_behind_ = false;          ///< after another frame
     ForeignRequests foreign_requests_;  ///< of other masters
-    bool own_frame_seen_ = false;       ///< after other bytes, where only its echo was expected
-    bool echo_possible_ = true;
-    std::size_t noise_in_front_ = 0;  ///< bytes
-    bool frames_in_front_ = false;    ///< good frames
+    std::size_t noise_in_front_ = 0;    ///< bytes
+    bool frames_in_front_ = false;      ///< good frames
     bool contested_ = false;
     bool refusal_rejected_ = false;
     bool echo_suspected_ = false;
-    bool borrowed_ = false;
-    bool wrong_ = false;
+    Instead instead_ = Instead::nothing;
     bool refused_other_ = false;
-    bool unrelated_ = false;  ///< the station sent a frame unrelated to the request
     bool end_confirmed_ = true;
 };
 

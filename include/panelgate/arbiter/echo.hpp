@@ -51,6 +51,21 @@ class EchoFilter {
     Bytes released_;
 };
 
+/// What was seen of our own frame where the filter did not recognise it (P8): foreign bytes may
+/// precede the echo. Pure.
+struct OwnFrame {
+    explicit OwnFrame(bool is_expected) : possible(is_expected) {}
+    /// The first frame that equals our own confirms nothing, unless a part of the echo came before
+    /// it. Remembers it.
+    bool may_be_echo(const EchoFilter& filter, ByteView adu);
+
+    bool possible;          ///< the line may have an echo
+    bool seen = false;      ///< after other bytes, where only its echo was expected
+    bool fragment = false;  ///< a part of it came damaged
+    bool behind = false;    ///< after another frame
+    bool borrowed = false;  ///< its last byte was lost, and the reply's first taken for it
+};
+
 /// True if the reply to this request can never equal the request: it shows whether there is an
 /// echo.
 bool teaches_echo(const modbus::Request& request);

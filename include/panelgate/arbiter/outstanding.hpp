@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/pool.hpp"
 #include "panelgate/base/time.hpp"
@@ -151,7 +152,6 @@ class ReconnectState {
 class BroadcastReplies {
   public:
     static constexpr std::size_t kBroadcasts = 16;  ///< that are remembered
-    static constexpr Duration kLongest = 5s;        ///< a later frame is no answer to one
 
     void on_sent(TimePoint sent, ByteView request) {
         Sent& oldest = last_[next_++ % kBroadcasts];
@@ -161,9 +161,9 @@ class BroadcastReplies {
     std::optional<Duration> delay_of(TimePoint now, ByteView reply) const {
         std::optional<Duration> delay;
         for (const Sent& one : last_) {
-            if (one.request.empty() || now >= one.at + kLongest) continue;
+            if (one.request.empty() || now >= one.at + timing::kLatestBroadcastAnswer) continue;
             if (!modbus::answers(one.request, reply)) continue;
-            delay = std::min(delay.value_or(kLongest), now - one.at);
+            delay = std::min(delay.value_or(timing::kLatestBroadcastAnswer), now - one.at);
         }
         return delay;
     }
@@ -219,15 +219,11 @@ class ForeignRequests {
 class DuplicateGuard {
   public:
     static constexpr std::size_t kReplies = 8;
-    static constexpr Duration kLongest = 500ms;  ///< a later frame is no duplicate
-    static constexpr Duration kForget = 2min;
-    static constexpr Duration kRepeatDelay =
-        150ms;                                ///< some panels resend a damaged reply within this
     static constexpr int kConfirmations = 3;  ///< after which equal answers are trusted
     static constexpr int kDenials = 3;        ///< after which they count as duplicates
 
     void on_reply(TimePoint now, Bytes request, Bytes reply) {
-        if (now - learned_at_ > kForget) learned_ = {};
+        if (now - learned_at_ > timing::kForgetDuplicates) learned_ = {};
         Slot& slot = slots_[next_++ % kReplies];
         slot = {};
         slot.at = now;
@@ -282,7 +278,7 @@ class DuplicateGuard {
     /// earlier one, and the station has not yet shown that it gives equal answers.
     bool suspicious(TimePoint now, ByteView request, ByteView reply) const {
         if (confirmed_[kind_of(request, reply)] >= kConfirmations) return false;
-        const bool any = denied_ > 0 && now - denied_at_ <= kForget;
+        const bool any = denied_ > 0 && now - denied_at_ <= timing::kForgetDuplicates;
         return std::ranges::any_of(slots_, [&](const Slot& slot) {
             return slot.is_recent(now) && std::ranges::equal(reply, slot.reply) &&
                    (any || !std::ranges::equal(request, slot.request));
@@ -305,7 +301,7 @@ class DuplicateGuard {
     /// again. The value may have just changed: three times in a row it is a duplicate.
     void on_denied(TimePoint at, ByteView reply) {
         confirmed_ = {};
-        denied_ = at - denied_at_ <= kForget ? denied_ + 1 : 1;
+        denied_ = at - denied_at_ <= timing::kForgetDuplicates ? denied_ + 1 : 1;
         denied_at_ = at;
         const TimePoint earlier = earlier_reply_at(at, reply);
         if (denied_ >= kDenials && earlier != TimePoint{}) learn(at, at - earlier);
@@ -313,7 +309,7 @@ class DuplicateGuard {
     /// With nothing outstanding, one request got this reply at `first` and again now: one of them
     /// is a duplicate, of the other or of an earlier reply.
     void on_repeated_reply(TimePoint now, TimePoint first, ByteView reply) {
-        if (now - first > kLongest) return;
+        if (now - first > timing::kLatestRepetition) return;
         const TimePoint earlier = earlier_reply_at(first, reply);
         learn(now,
               std::max(now - first, earlier == TimePoint{} ? Duration::zero() : first - earlier));
@@ -333,7 +329,9 @@ class DuplicateGuard {
         Bytes request;
         Bytes reply;
         bool second = false;  ///< a frame of the same shape followed it
-        bool is_recent(TimePoint now) const { return !reply.empty() && now - at <= kLongest; }
+        bool is_recent(TimePoint now) const {
+            return !reply.empty() && now - at <= timing::kLatestRepetition;
+        }
     };
     /// Values are trusted separately: two writes to one address have equal answers, and so do many
     /// exceptions.

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
 
@@ -151,23 +152,22 @@ class Quickest {
 /// Learns how long a station pauses inside its replies where that is longer than the line's
 /// `reply_hole`. Two attempts in a row whose reply broke off show it (one may be noise); where they
 /// have ended before it goes on, the next ones wait a quarter longer each. Never longer than the
-/// response timeout; forgotten when it has not paused for kForget. Pure.
+/// response timeout; forgotten when it has not paused for kForgetHabit. Pure.
 class ReplyHole {
   public:
-    static constexpr Duration kForget = 10min;
-
     /// An attempt failed whose reply broke off: after `pause` it went on, or was given up.
     void on_broken(TimePoint now, Duration pause, Duration most) {
         seen_ = std::max(seen_, pause);
         used_ = now;
-        if (++broken_ >= 2) learned_ = std::min(std::max(learned_, seen_ * 5 / 4 + 10ms), most);
+        if (++broken_ >= 2)
+            learned_ = std::min(std::max(learned_, seen_ * 5 / 4 + timing::kCandidateMargin), most);
     }
     /// A reply came whole; the longest pause inside it.
     void on_reply(TimePoint now, Duration pause) {
         broken_ = 0;
         seen_ = {};
         if (2 * pause >= learned_) used_ = now;
-        if (now >= used_ + kForget) learned_ = {};
+        if (now >= used_ + timing::kForgetHabit) learned_ = {};
     }
     /// 0: it does not pause for longer than the line.
     Duration learned() const { return learned_; }
@@ -185,11 +185,10 @@ class ReplyHole {
 class Trail {
   public:
     static constexpr std::size_t kReplies = 8;
-    static constexpr int kOften = 3;            ///< of kReplies: regularly
-    static constexpr Duration kLongest = 60ms;  ///< later bytes do not count
+    static constexpr int kOften = 3;  ///< of kReplies: regularly
 
     /// `frame`: duration of a usual reply on this line; a duplicate ends that much later.
-    explicit Trail(Duration frame = {}) : longest_(kLongest + frame) {}
+    explicit Trail(Duration frame = {}) : longest_(timing::kLongestTrail + frame) {}
 
     Duration longest() const { return longest_; }
     /// A reply ended; records what followed the previous one.

@@ -10,6 +10,7 @@
 #include "panelgate/arbiter/outstanding.hpp"
 #include "panelgate/arbiter/reply_times.hpp"
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -61,8 +62,9 @@ class OutstandingRequests {
     /// How long after a broadcast the station may answer it, which is wrong: its longest usual
     /// time; if it has done so, the window of any reply, or somewhat longer than that took.
     Duration broadcast_window(Duration usual) const {
-        return broadcast_delay_ ? std::max(latest_reply(), *broadcast_delay_ * 5 / 4 + 100ms)
-                                : usual + late_.worst();
+        return broadcast_delay_
+                   ? std::max(latest_reply(), *broadcast_delay_ * 5 / 4 + timing::kBroadcastMargin)
+                   : usual + late_.worst();
     }
     /// True if it has answered one with an exception.
     bool refuses_broadcasts() const { return refuses_broadcasts_; }
@@ -178,14 +180,13 @@ class OutstandingRequests {
     /// requests may only now have reached the station.
     void on_proved(TimePoint now, TimePoint sent);
 
-    static constexpr Duration kForgetDisorder = 10min;
     static constexpr int kClosedMemory = 8;  ///< response timeouts
 
   private:
     /// It has sent this exception unsolicited just before.
     bool is_unsolicited_refusal(TimePoint now, ByteView pdu) const {
         return std::ranges::equal(pdu, unsolicited_refusal_) &&
-               now < unsolicited_refusal_at_ + DuplicateGuard::kLongest;
+               now < unsolicited_refusal_at_ + timing::kLatestRepetition;
     }
     void remember_refusal(TimePoint now, ByteView pdu);
     void rest(TimePoint now);
@@ -208,7 +209,7 @@ class OutstandingRequests {
     TimePoint again_until_{};  ///< it may resend the damaged reply until then
     Bytes damaged_pdu_;        ///< the request whose reply has just come damaged
     /// When it last answered a request after a later one: order closes nothing, and proves nothing,
-    /// for kForgetDisorder after that.
+    /// for timing::kForgetHabit after that.
     std::optional<TimePoint> disordered_at_;
     TimePoint drained_at_{};  ///< nothing is sent before, behind a disorder: answers are one behind
     Bytes unsolicited_refusal_;  ///< and when it first came

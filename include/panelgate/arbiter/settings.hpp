@@ -87,7 +87,7 @@ struct Settings {
     bool explain = false;
     /// A station that pauses for longer than `reply_hole` inside its replies is waited for: its
     /// pause is learned.
-    bool learns_holes = false;
+    bool learns_holes = true;
     friend bool operator==(const Settings&, const Settings&) = default;
 };
 

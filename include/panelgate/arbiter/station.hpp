@@ -10,6 +10,7 @@
 #include "panelgate/arbiter/requests.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station_health.hpp"
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -124,7 +125,7 @@ class Station {
     /// True if it is neither listed nor was ever heard: there may be no such station.
     bool speculative() const { return !listed_ && !health_.last_heard(); }
     bool forgettable(TimePoint now) const {
-        return speculative() && !requests_.any() && now >= asked_ + kForgetUnheard;
+        return speculative() && !requests_.any() && now >= asked_ + timing::kForgetUnheard;
     }
     /// True if it missed its last request, and is not offline yet.
     bool missed_last() const {
@@ -166,7 +167,9 @@ class Station {
     /// heard that of the `line`, if known.
     Duration usual(std::optional<Duration> line = {}) const { return short_wait(line); }
     /// ... without that margin, except for receiver buffering.
-    Duration needed() const { return slowest().value_or(settings_.response_timeout) + 10ms; }
+    Duration needed() const {
+        return slowest().value_or(settings_.response_timeout) + timing::kCandidateMargin;
+    }
     Duration response_timeout() const { return timeout(); }
     /// True if its last replies were as requested: no exceptions, no damage.
     bool answers_as_asked() const { return unusual_ == 0; }
@@ -190,7 +193,6 @@ class Station {
     static constexpr int kWritesInARow = 4;     ///< while a read waits for it
     static constexpr int kCredit = 2;           ///< whole timeouts of credit
     static constexpr int kBudgetMemory = 3;     ///< whole timeouts that are remembered
-    static constexpr Duration kForgetUnheard = 60s;
 
   private:
     Duration timeout() const {

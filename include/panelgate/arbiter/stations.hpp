@@ -7,6 +7,7 @@
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station.hpp"
 #include "panelgate/arbiter/station_health.hpp"
+#include "panelgate/arbiter/timing.hpp"
 
 namespace panelgate::arbiter {
 
@@ -140,14 +141,9 @@ class Stations {
     }
     /// Budget of offline stations: more while an outage of all has only just begun.
     const ProbeBudget& probes() const {
-        const bool all_just_died = !any_online() && alone_.next() < heard_ + kOutage;
+        const bool all_just_died = !any_online() && alone_.next() < heard_ + timing::kYoungOutage;
         return all_just_died ? alone_ : probes_;
     }
-
-    static constexpr Duration kOutage = 30s;
-    static constexpr Duration kUrgent = 5s;  ///< at most
-    static constexpr Duration kOthersActive =
-        5s;  ///< others that answered within this use the line
 
     OfflineSettings offline_;
     StationSettings unlisted_;

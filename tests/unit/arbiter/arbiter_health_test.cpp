@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "arbiter_fixture.hpp"
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::arbiter::arbiter_health_test {
@@ -229,7 +230,6 @@ void serve_in_halves(BusScript& bus, Ticket asked, Duration pause) {
 }
 
 TEST_F(ArbiterTest, P4APanelThatPausesInsideItsRepliesIsWaitedForFromTheThirdOn) {
-    settings.learns_holes = true;
     settings.stations[0].retries = 0;
     for (const bool is_known : {false, true}) {
         BusScript line{settings};
@@ -256,9 +256,9 @@ TEST(ReplyHole, IsLearnedFromTwoInARowAndForgottenWhenItDoesNotPauseAnyMore) {
     EXPECT_EQ(hole.learned(), 0ms) << "not in a row";
     hole.on_broken(now, 60ms, 500ms);
     EXPECT_EQ(hole.learned(), 110ms);
-    now += ReplyHole::kForget - 1s;
+    now += timing::kForgetHabit - 1s;
     hole.on_reply(now, 80ms);
-    now += ReplyHole::kForget - 1s;
+    now += timing::kForgetHabit - 1s;
     hole.on_reply(now, 1ms);
     EXPECT_EQ(hole.learned(), 110ms);
     now += 1s;

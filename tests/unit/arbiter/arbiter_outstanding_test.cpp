@@ -8,6 +8,7 @@
 
 #include "arbiter_fixture.hpp"
 #include "panelgate/arbiter/outstanding.hpp"
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
@@ -143,7 +144,7 @@ TEST_F(ArbiterTest, P1AfterAReplyThatCameDamagedAndThenWholeTheNextOneMayComeTwi
     bus.hear_paced(encode_adu(17, kReply));
     const TimePoint replied = bus.now();
     bus.submit(17, read_at(5), 1);
-    EXPECT_GE(bus.next_sent(300ms).value().at - replied, DuplicateGuard::kRepeatDelay);
+    EXPECT_GE(bus.next_sent(300ms).value().at - replied, timing::kRepeatsDamaged);
 }
 
 /// A busy panel reports busy several times and then gives the value: no duplicate.

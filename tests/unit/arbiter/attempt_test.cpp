@@ -114,7 +114,7 @@ TEST_F(AttemptTest, P1ARejectedReplyCountsAsHeardAndTheNextOneAnswers) {
 
 TEST_F(AttemptTest, P1ACandidateAnswersWhenNothingElseCameInTheTimeThatTheStationNeeds) {
     ASSERT_EQ(hear(10ms, kReplyAdu), Verdict::replied);
-    attempt_.keep_candidate(60ms, false);
+    attempt_.keep_candidate(60ms, Attempt::Candidate::believed);
     Attempt other = attempt_;
     EXPECT_EQ(hear(15ms, "FF FF"_hex), Verdict::open);
     EXPECT_EQ(attempt_.on_deadline(attempt_.timing().sent + 60ms - 1ns, ends_), Verdict::open);
@@ -129,7 +129,7 @@ TEST_F(AttemptTest, P1ACandidateAnswersWhenNothingElseCameInTheTimeThatTheStatio
 
 TEST_F(AttemptTest, P1WhereDuplicatesAreKnownTheCandidateIsNoAnswer) {
     ASSERT_EQ(hear(10ms, kReplyAdu), Verdict::replied);
-    attempt_.keep_candidate(60ms, true);
+    attempt_.keep_candidate(60ms, Attempt::Candidate::doubted);
     EXPECT_EQ(run_to_verdict(), Verdict::doubtful) << "and it is asked once more";
     EXPECT_EQ(ended_, Duration(70ms)) << "a duplicate may have kept it from saying its own";
     EXPECT_TRUE(attempt_.take_unsolicited().empty()) << "it proves no duplicate either";
@@ -137,7 +137,7 @@ TEST_F(AttemptTest, P1WhereDuplicatesAreKnownTheCandidateIsNoAnswer) {
 
 TEST_F(AttemptTest, P1ACandidateThatComesOnceMoreIsTheAnswerAndShowsNoDuplicate) {
     ASSERT_EQ(hear(10ms, kReplyAdu), Verdict::replied);
-    attempt_.keep_candidate(60ms, true);
+    attempt_.keep_candidate(60ms, Attempt::Candidate::doubted);
     EXPECT_EQ(hear(30ms, kReplyAdu), Verdict::replied);
     EXPECT_EQ(attempt_.reply(), kReply);
     EXPECT_TRUE(attempt_.take_unsolicited().empty());
@@ -231,7 +231,7 @@ TEST_F(AttemptPaceTest, TheReplyIsLookedAtWhenItsHeaderAndWhenAllOfItIsThere) {
         for (const Look& look : row.looks) {
             hear(look.from, look.to, look.late);
             EXPECT_EQ(busy(), look.busy);
-            EXPECT_FALSE(attempt_.end_look());
+            EXPECT_FALSE(attempt_.pace().end_look());
         }
         EXPECT_EQ(hear(row.looks.back().to, 11), Verdict::replied);
     }
@@ -241,11 +241,11 @@ TEST_F(AttemptPaceTest, ReportsWhetherTheReplyWasThereWhenItsEndWasLookedAt) {
     for (const std::size_t there : {std::size_t{10}, std::size_t{11}}) {
         attempt_ = attempt_of(as_asked());
         hear(0, 1);
-        EXPECT_FALSE(attempt_.end_look());
+        EXPECT_FALSE(attempt_.pace().end_look());
         hear(1, there, kCharacter);
-        ASSERT_TRUE(attempt_.end_look());
-        EXPECT_EQ(attempt_.end_look()->reply, 11 * kCharacter);
-        EXPECT_EQ(attempt_.end_look()->whole, there == 11);
+        ASSERT_TRUE(attempt_.pace().end_look());
+        EXPECT_EQ(attempt_.pace().end_look()->reply, 11 * kCharacter);
+        EXPECT_EQ(attempt_.pace().end_look()->whole, there == 11);
         EXPECT_EQ(busy(), std::nullopt) << "the last byte is wanted when it comes";
     }
 }
@@ -254,8 +254,8 @@ TEST_F(AttemptPaceTest, AnUnexpectedExceptionShowsNothingAboutTheEndAndWhenItBeg
     attempt_ = attempt_of(as_asked());
     hear(0, 1);
     EXPECT_EQ(read(11, "83 02 C1 34"_hex), Verdict::replied);
-    EXPECT_TRUE(attempt_.unexpected_exception());
-    EXPECT_FALSE(attempt_.end_look());
+    EXPECT_TRUE(attempt_.pace().is_shorter());
+    EXPECT_FALSE(attempt_.pace().end_look());
     EXPECT_EQ(attempt_.first_sign(now_), 5ms + kCharacter);
 }
 
@@ -295,9 +295,9 @@ TEST_F(AttemptPaceTest, WhatComesFasterThanTheLineIsWantedAtOnce) {
     attempt_ = Attempt(group_of(kStation, "03 00 6B 00 64"_hex), timing_of(500ms), {});
     read(0, "11 03 C8"_hex);
     EXPECT_TRUE(busy());
-    EXPECT_FALSE(attempt_.hasty());
+    EXPECT_FALSE(attempt_.pace().hasty());
     read(0, Bytes(62, 7), 1ms);  // an adapter on USB that knows of no rate
-    EXPECT_TRUE(attempt_.hasty());
+    EXPECT_TRUE(attempt_.pace().hasty());
     EXPECT_EQ(attempt_.busy_until(), std::nullopt);
 }
 

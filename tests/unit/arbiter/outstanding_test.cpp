@@ -1,4 +1,5 @@
 #include "panelgate/arbiter/outstanding.hpp"
+#include "panelgate/arbiter/timing.hpp"
 
 #include <gtest/gtest.h>
 
@@ -169,7 +170,7 @@ const Bytes kRequest = "03 00 6B 00 01"_hex;
 const Bytes kOtherRequest = "03 00 6C 00 01"_hex;
 const Bytes kReply = "03 02 00 01"_hex;
 const Bytes kOtherReply = "03 02 00 02"_hex;
-constexpr Duration kTooLate = DuplicateGuard::kLongest + 1ns;
+constexpr Duration kTooLate = timing::kLatestRepetition + 1ns;
 
 class DuplicateGuardTest : public testing::Test {
   protected:
@@ -238,7 +239,7 @@ TEST_F(DuplicateGuardTest, IsForgottenSomeMinutesAfterItStopped) {
     reply();
     unasked(20ms, kReply);
     const TimePoint last = now_;
-    while (now_ < last + DuplicateGuard::kForget - 1s) reply();
+    while (now_ < last + timing::kForgetDuplicates - 1s) reply();
     EXPECT_TRUE(guard_.known());
     for (int i = 0; i < 3; ++i) reply();
     EXPECT_FALSE(guard_.known());
@@ -283,7 +284,7 @@ TEST_F(DuplicateGuardTest, P1AReplyDeniedThreeTimesWhenAskedOnceMoreWasADuplicat
     guard_.on_confirmed(kOtherRequest, kReply);
     deny();
     EXPECT_FALSE(guard_.known()) << "not in a row";
-    now_ += DuplicateGuard::kForget + 1s;
+    now_ += timing::kForgetDuplicates + 1s;
     deny();
     deny();
     EXPECT_FALSE(guard_.known()) << "the first was long ago";
@@ -307,7 +308,7 @@ TEST_F(DuplicateGuardTest, P1AfterADenialAnEqualAnswerToTheVerySameRequestIsSusp
     guard_.on_confirmed(kRequest, kReply);
     EXPECT_FALSE(suspicious(60ms, kRequest)) << "it has not changed";
     guard_.on_denied(now_ + 80ms, kReply);
-    now_ += DuplicateGuard::kForget + 1s;
+    now_ += timing::kForgetDuplicates + 1s;
     reply();
     EXPECT_FALSE(suspicious(20ms, kRequest)) << "long ago";
 }
@@ -319,7 +320,7 @@ TEST_F(DuplicateGuardTest, P1AStationThatAnswersOneRequestTwiceSendsDuplicates) 
     guard_.on_repeated_reply(now_ + 60ms, now_ + 50ms, kReply);
     EXPECT_EQ(guard_.settle_time(), Duration(75ms))
         << "the first may have been a duplicate of the one before";
-    guard_.on_repeated_reply(now_ + 60ms + DuplicateGuard::kLongest, now_ + 50ms, kReply);
+    guard_.on_repeated_reply(now_ + 60ms + timing::kLatestRepetition, now_ + 50ms, kReply);
     EXPECT_EQ(guard_.settle_time(), Duration(75ms)) << "later, it is something else";
 }
 

@@ -1,4 +1,5 @@
 #include "panelgate/arbiter/reply_times.hpp"
+#include "panelgate/arbiter/timing.hpp"
 
 #include <gtest/gtest.h>
 
@@ -155,11 +156,11 @@ TEST_F(TrailTest, WhatComesOftenIsWaitedForSomewhatLongerThanItHasEverLasted) {
         Duration longest;     ///< 0: nothing is expected
     };
     const Row rows[] = {
-        {{}, 20, 0ms},                                               // only replies
-        {{5ms, 5ms}, 1, 0ms},                                        // an accident
-        {{4ms, 5ms, 6ms}, 1, 6ms},                                   // a habit
-        {std::vector<Duration>(20, Trail::kLongest + 1ns), 1, 0ms},  // something else
-        {std::vector<Duration>(20, 5ms), Trail::kReplies, 0ms},      // it has stopped
+        {{}, 20, 0ms},                                                     // only replies
+        {{5ms, 5ms}, 1, 0ms},                                              // an accident
+        {{4ms, 5ms, 6ms}, 1, 6ms},                                         // a habit
+        {std::vector<Duration>(20, timing::kLongestTrail + 1ns), 1, 0ms},  // something else
+        {std::vector<Duration>(20, 5ms), Trail::kReplies, 0ms},            // it has stopped
     };
     for (const Row& row : rows) {
         trail_ = Trail();

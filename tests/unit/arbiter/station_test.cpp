@@ -1,4 +1,5 @@
 #include "panelgate/arbiter/station.hpp"
+#include "panelgate/arbiter/timing.hpp"
 
 #include <gtest/gtest.h>
 
@@ -162,7 +163,7 @@ TEST_F(StationTest, P5AReplyThatCameDamagedIsNotOutstandingButSomeResendIt) {
     EXPECT_FALSE(may_ask(now_, kOther));
     answer(group_of(kId, kRead, 2), kReply);
     EXPECT_FALSE(may_ask(now_ + 100ms, kOther)) << "the retry's own reply may come second";
-    EXPECT_TRUE(may_ask(now_ + DuplicateGuard::kRepeatDelay, kOther));
+    EXPECT_TRUE(may_ask(now_ + timing::kRepeatsDamaged, kOther));
 }
 
 TEST_F(StationTest, P4AProbeWaitsAsLongAsMostRepliesTakeAndNowAndThenAsLongAsAnyTook) {
@@ -274,12 +275,12 @@ TEST_F(StationTest, OnlyAnUnheardStationIsForgottenWhenNotWantedForAMinute) {
     Station unheard = station(false);
     unheard.on_asked(now_, group_of(kId, kRead));
     station_.on_asked(now_, group_of(kId, kRead));
-    EXPECT_FALSE(unheard.forgettable(now_ + Station::kForgetUnheard - 1ns));
-    EXPECT_TRUE(unheard.forgettable(now_ + Station::kForgetUnheard));
+    EXPECT_FALSE(unheard.forgettable(now_ + timing::kForgetUnheard - 1ns));
+    EXPECT_TRUE(unheard.forgettable(now_ + timing::kForgetUnheard));
     EXPECT_FALSE(station_.forgettable(now_ + 1h));
     unheard.on_wanted(now_ + 30s);
-    EXPECT_FALSE(unheard.forgettable(now_ + Station::kForgetUnheard));
-    EXPECT_TRUE(unheard.forgettable(now_ + 30s + Station::kForgetUnheard));
+    EXPECT_FALSE(unheard.forgettable(now_ + timing::kForgetUnheard));
+    EXPECT_TRUE(unheard.forgettable(now_ + 30s + timing::kForgetUnheard));
     unheard.requests().on_unanswered(now_, kRead, now_);
     EXPECT_FALSE(unheard.forgettable(now_ + 1h)) << "a reply is outstanding";
     unheard.on_unsolicited_frame(now_ + 1s, kReply);
@@ -320,7 +321,7 @@ TEST_F(StationTest, P8ABroadcastIsAwaitedAsLongAsItsAnswerHasTaken) {
     const auto other = test::request_of("06 00 09 00 07"_hex);
     EXPECT_EQ(broadcasts.over(other, 1s), TimePoint{});
     EXPECT_EQ(broadcasts.over(other, 1s, true), now_ + 1s) << "any may have its exception";
-    EXPECT_EQ(broadcasts.delay_of(now_ + BroadcastReplies::kLongest, kWrite), std::nullopt);
+    EXPECT_EQ(broadcasts.delay_of(now_ + timing::kLatestBroadcastAnswer, kWrite), std::nullopt);
 }
 
 /// One silent or damaged transaction, without a retry.

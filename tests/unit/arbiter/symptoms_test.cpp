@@ -6,6 +6,7 @@
 
 #include "arbiter_fixture.hpp"
 #include "panelgate/arbiter/counters.hpp"
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
@@ -189,7 +190,7 @@ TEST_F(SymptomsTest, AnAnswerToABroadcastIsNotWhatTheNextRequestIsAnswered) {
 TEST_F(SymptomsTest, WhatComesLongAfterABroadcastDoesNotAnswerIt) {
     ask(0, kWrite, {});
     for (int i = 0; i < 5; ++i) ask(17, kRead, encode_adu(17, kReply));
-    bus.run_for(BroadcastReplies::kLongest);
+    bus.run_for(timing::kLatestBroadcastAnswer);
     hear(encode_adu(18, kWrite));
     EXPECT_EQ(of(18).broadcast_replies, 0u);
 }

@@ -1,4 +1,5 @@
 #include "panelgate/arbiter/unsolicited.hpp"
+#include "panelgate/arbiter/timing.hpp"
 
 #include <gtest/gtest.h>
 
@@ -116,7 +117,7 @@ TEST_F(UnsolicitedFramesTest, AReplyToABroadcastIsOneForSeconds) {
     for (int i = 0; i < 10; ++i) unsolicited.on_sent(encode_adu(17, kRead));
     now += 900ms;
     EXPECT_FALSE(is_wrong_reply(reply));
-    now += BroadcastReplies::kLongest;
+    now += timing::kLatestBroadcastAnswer;
     EXPECT_TRUE(is_wrong_reply(reply));
 }
 
