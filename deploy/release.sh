@@ -141,6 +141,17 @@ engine_lacks() {
     esac
 }
 
+# What a bill of materials has besides the libraries that dpkg knows of in the image: what was compiled into it.
+built_in() {
+    python3 - "$1" <<'PYTHON'
+import json, re, sys
+for part in json.load(open(sys.argv[1]))["components"]:
+    if re.search(r"-dev$|^libjs-", part["name"]):
+        [source] = [one["value"] for one in part["properties"] if one["name"] == "debian:source"]
+        print(part["name"], part["version"], re.search(r"arch=(\w+)", part["purl"])[1], *source.split(), sep="\t")
+PYTHON
+}
+
 # The Dockerfile with what the packages have in place of its first stage.
 make_context() {
     local architecture
@@ -151,8 +162,7 @@ make_context() {
         mkdir -p "$work/context/image-$architecture/usr/share/doc/panelgate" "$work/context/image-$architecture/usr/share/panelgate"
         cp -r "$work/deb-$architecture/usr/bin" "$work/context/image-$architecture/usr/"
         cp "$work/deb-$architecture/usr/share/doc/panelgate/copyright" "$work/context/image-$architecture/usr/share/doc/panelgate/"
-        sed -n 's/.*"name": "\([^"]*-dev\|libjs-[^"]*\)", "version": "\([^"]*\)".*?arch=\([^&]*\)&.*"debian:source", "value": "\([^ ]*\) \([^"]*\)".*/\1\t\2\t\3\t\4\t\5/p' \
-            "$out/$name-$architecture.cdx.json" >"$work/context/image-$architecture/usr/share/panelgate/built-in.tsv"
+        built_in "$out/$name-$architecture.cdx.json" >"$work/context/image-$architecture/usr/share/panelgate/built-in.tsv"
     done
     awk '/^FROM .* AS build$/ { print; print "ARG TARGETARCH"; print "COPY image-${TARGETARCH} /image"; skip = 1; next }
          /^FROM / { skip = 0 }
@@ -227,6 +237,8 @@ clean_up() {
     rm -rf "$work"
 }
 trap clean_up EXIT
+left=$(awk '/^## / { inside = ($2 ~ /Unreleased/) } inside && /^- /' CHANGELOG.md | wc -l)
+[ "$left" = 0 ] || say "CHANGELOG.md has $left lines under Unreleased: they are not in the notes of $version"
 say "panelgate $version of $(git rev-parse --short HEAD), $(date -u -d "@$SOURCE_DATE_EPOCH" +%F)"
 make_packages
 make_apt

@@ -65,12 +65,11 @@ end_of() {
     cat "$logs/${1//[ \/]/-}.begun.log"
     return $verdict
 }
+# What wants the machine for itself gets it.
+hold() { local group; for group in "${begun[@]}"; do kill "-$1" -- "-$group" 2>/dev/null || true; done; }
+
 # What goes on when this ends would be in the way of the next.
-end_all() {
-    local group
-    for group in "${begun[@]}"; do kill -- "-$group" 2>/dev/null || true; done
-}
-trap end_all EXIT
+trap 'hold TERM' EXIT
 
 # Without a build nothing else makes sense.
 must() {
@@ -138,24 +137,27 @@ must "packages" deploy/install_packages.sh build run test try
 step "format" check_format
 units=OFF
 [ $mode = usual ] || units=ON
-which=(-LE nightly)
-[ $mode != nightly ] || which=()
+less="|nightly"
+[ $mode != nightly ] || less=
 must "build release" build release $units ON
 [ $mode = quick ] || later "build asan" build_asan
 [ $mode != nightly ] || step "model" bash -c "deploy/install_packages.sh model && tests/model/run.sh"
 [ $mode != nightly ] || step "headers stand alone" cmake --build --preset release --target all_verify_interface_header_sets
-step "tests release" run_tests release "${which[@]}"
+step "tests release" run_tests release -LE "alone$less"
+hold STOP
+step "tests release alone" run_tests release -L alone ${less:+-LE nightly}
+hold CONT
 step "deploy/demo.sh" /usr/bin/python3 -B tests/system/demo_script.py
 if [ $mode != quick ]; then
     must "build asan" end_of "build asan"
-    [ $gcc = no ] || later "build g++" build_gcc
+    [ $gcc = no ] || [ $mode = nightly ] || later "build g++" build_gcc
     export ASAN_SYMBOLIZER_PATH=/usr/bin/llvm-symbolizer-19
+    which=()
     [ $mode = nightly ] || which=(-L "unit|scenario|fuzz|sanitized")
     PANELGATE_SANITIZED=1 step "tests asan" run_tests asan "${which[@]}"
-elif [ $gcc = yes ]; then
-    later "build g++" build_gcc
 fi
 if [ $gcc = yes ]; then
+    [ -n "${begun["build g++"]-}" ] || later "build g++" build_gcc
     must "build g++" end_of "build g++"
     step "tests g++" run_gcc
 fi
