@@ -28,7 +28,7 @@ RUN cd /usr/share/panelgate && { cat built-in.tsv; /tmp/deploy/sbom.sh rows; } |
 
 # docker build --build-arg REVISION=$(git rev-parse HEAD) --build-arg CREATED=$(date -u +%FT%TZ)
 ARG DEBIAN
-ARG VERSION=0.1.0
+ARG VERSION=1.0.0
 ARG REVISION=unknown
 ARG CREATED=unknown
 LABEL org.opencontainers.image.title="panelgate" \

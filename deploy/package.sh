@@ -91,7 +91,7 @@ configure() {
     cmake -S . -B "$build" -G Ninja -DCMAKE_TOOLCHAIN_FILE="$PWD/deploy/package/toolchain.cmake" \
         -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS_RELEASE=-O2 -DCMAKE_INSTALL_PREFIX=/usr -DCMAKE_SKIP_RPATH=ON \
         -DPANELGATE_TRIPLE="$triple" -DPANELGATE_SYSROOT="$sysroot" -DPANELGATE_EMULATOR="$emulator" \
-        -DPANELGATE_MACHINE_FLAGS="$flags" -DPANELGATE_TESTS="$1" -DPANELGATE_PACKAGE=ON -DPANELGATE_WERROR=OFF \
+        -DPANELGATE_MACHINE_FLAGS="$flags" -DPANELGATE_TESTS="$1" -DPANELGATE_PACKAGE=ON -DPANELGATE_UNITY=ON -DPANELGATE_WERROR=OFF \
         -DPANELGATE_ARCHITECTURE="$architecture" -DPANELGATE_DOCUMENTS="$build/documents" \
         -DPANELGATE_DEPENDS="${2-}" >"$build.log" 2>&1 || { tail -n 20 "$build.log" >&2; exit 1; }
 }
@@ -123,6 +123,10 @@ documents() {
         "$version" "The panelgate authors <panelgate@plant.example>" "$day" |
         gzip -9n >"$build/documents/changelog.Debian.gz"
     gzip -9nc CHANGELOG.md >"$build/documents/changelog.gz"
+    # What its libraries come from, and what is compiled into it
+    DPKG_ADMINDIR=$sysroot/var/lib/dpkg deploy/sbom.sh rows libboost1.81-dev libcli11-dev libjs-dygraphs \
+        $(sed 's/([^)]*)//g; s/,/ /g' <<<"$needed") | LC_ALL=C sort -u |
+        deploy/sbom.sh cyclonedx "$version" >"$build/documents/sbom.cdx.json"
     deploy/manual/manual.py "$build/documents" "${run[@]}" "$build/panelgate"
     gzip -9nf "$build"/documents/panelgate.{1,yaml.5}
 }
@@ -160,8 +164,8 @@ say "panelgate for $architecture"
 forget_other_libraries
 configure OFF
 make panelgate
-documents
 needed=$(depends) || die "the packages that the program needs are not known"
+documents
 configure OFF "$needed"
 pack
 say "build/packages/panelgate_$version-1_$architecture.deb ($(stat -c %s "$packages/panelgate_$version-1_$architecture.deb") bytes): $needed"

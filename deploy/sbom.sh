@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
 # deploy/sbom.sh rows [PACKAGE...]   what dpkg has installed (of these packages), one a line:
 #                                    name, version, architecture, source, its version; tabs between
-# deploy/sbom.sh cyclonedx           such rows from stdin as a bill of materials, CycloneDX 1.5 JSON
-# The image has its own as /usr/share/panelgate/sbom.cdx.json; to read it without running anything:
+#                                    DPKG_ADMINDIR: of another folder than /var/lib/dpkg
+# deploy/sbom.sh cyclonedx [VERSION] such rows from stdin as a bill of materials, CycloneDX 1.5 JSON: of
+#                                    panelgate VERSION
+# Package and image have their own as /usr/share/panelgate/sbom.cdx.json; without running anything:
 #   docker create --name x panelgate && docker cp x:/usr/share/panelgate/sbom.cdx.json . && docker rm x
 set -euo pipefail
 
@@ -13,9 +15,12 @@ rows() {
 
 # Names and versions of Debian hold nothing that JSON escapes; a purl escapes + and :
 cyclonedx() {
-    awk -F '\t' '
+    awk -F '\t' -v version="${1-}" '
         function escaped(text) { gsub(/\+/, "%2B", text); gsub(/:/, "%3A", text); return text }
-        BEGIN { printf "{\"bomFormat\": \"CycloneDX\", \"specVersion\": \"1.5\", \"version\": 1, \"components\": [" }
+        BEGIN { printf "{\"bomFormat\": \"CycloneDX\", \"specVersion\": \"1.5\", \"version\": 1, "
+            if (version != "")
+                printf "\"metadata\": {\"component\": {\"type\": \"application\", \"name\": \"panelgate\", \"version\": \"%s\"}}, ", version
+            printf "\"components\": [" }
         {
             purl = "pkg:deb/debian/" escaped($1) "@" escaped($2) "?arch=" $3 "&distro=debian-12"
             printf "%s\n  {\"type\": \"library\", \"bom-ref\": \"%s\", \"name\": \"%s\", \"version\": \"%s\", \"purl\": \"%s\", ",
@@ -27,6 +32,6 @@ cyclonedx() {
 
 case "${1-}" in
     rows) shift; rows "$@" ;;
-    cyclonedx) cyclonedx ;;
-    *) sed -n '2,6s/^# //p' "$0" >&2; exit 64 ;;
+    cyclonedx) shift; cyclonedx "$@" ;;
+    *) sed -n '2,8s/^# //p' "$0" >&2; exit 64 ;;
 esac

@@ -1,5 +1,6 @@
 # Writes OUTPUT, a C++ source that defines NAMESPACE::SYMBOL(): the names (without folder and
-# ending) and texts of FILES. Raw literals are split, since a compiler may limit their length.
+# ending) and texts of FILES, with VERSION for %VERSION%. Raw literals are split, since a compiler may
+# limit their length.
 set(CODE "#include <string_view>\n#include <utility>\n#include <vector>\n\n")
 string(APPEND CODE "namespace ${NAMESPACE} {\n")
 string(APPEND CODE "using Embedded = std::vector<std::pair<std::string_view, std::string_view>>;\n")
@@ -9,6 +10,7 @@ separate_arguments(LIST NATIVE_COMMAND "${FILES}")
 foreach(FILE ${FILES})
     get_filename_component(STEM ${FILE} NAME_WE)
     file(READ ${FILE} TEXT)
+    string(REPLACE "%VERSION%" "${VERSION}" TEXT "${TEXT}")
     string(LENGTH "${TEXT}" LENGTH)
     set(LITERAL "")
     set(AT 0)

@@ -8,11 +8,14 @@ set(DOC share/doc/panelgate)
 
 install(FILES ${DEPLOY}/systemd/panelgate.service DESTINATION /lib/systemd/system)
 install(FILES ${DEPLOY}/udev/60-panelgate.rules DESTINATION /lib/udev/rules.d)
-install(FILES ${CONFIG}/demo.yaml DESTINATION /etc/panelgate RENAME panelgate.yaml)
+# postinst copies the demonstration to /etc/panelgate/panelgate.yaml, once. A configuration is never that of
+# the package, so an upgrade has nothing to ask about it.
+install(FILES ${CONFIG}/demo.yaml DESTINATION share/panelgate)
 install(DIRECTORY ${CONFIG}/profiles DESTINATION share/panelgate FILES_MATCHING PATTERN *.yaml)
 install(FILES ${CONFIG}/minimal.yaml ${CONFIG}/panelgate.example.yaml ${CONFIG}/demo.yaml
         DESTINATION ${DOC}/examples)
-install(FILES ${DEPLOY}/operations.md DESTINATION ${DOC})
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs DESTINATION ${DOC})
+install(FILES ${PANELGATE_DOCUMENTS}/sbom.cdx.json DESTINATION share/panelgate)
 install(DIRECTORY ${DEPLOY}/prometheus ${DEPLOY}/grafana DESTINATION ${DOC}/examples)
 install(FILES ${HERE}/copyright DESTINATION ${DOC})
 install(FILES ${PANELGATE_DOCUMENTS}/panelgate.bash DESTINATION share/bash-completion/completions
@@ -48,7 +51,7 @@ set(CPACK_DEBIAN_PACKAGE_DEPENDS "${PANELGATE_DEPENDS}, adduser")
 set(CPACK_DEBIAN_PACKAGE_PREDEPENDS "init-system-helpers (>= 1.54~)")
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "prometheus")
 set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
-set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${HERE}/postinst ${HERE}/prerm ${HERE}/postrm ${HERE}/conffiles)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${HERE}/postinst ${HERE}/prerm ${HERE}/postrm)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION TRUE)
 set(CPACK_PRE_BUILD_SCRIPTS ${HERE}/same_times.cmake)
 include(CPack)

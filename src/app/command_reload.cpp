@@ -1,12 +1,15 @@
 #include <boost/json/parse.hpp>
 #include <boost/json/value.hpp>
+#include <csignal>
 #include <iostream>
 #include <string>
+#include <thread>
 #include <variant>
 
 #include "commands.hpp"
 #include "gateway_client.hpp"
 #include "http_door.hpp"
+#include "local_gateway.hpp"
 #include "panelgate/base/network.hpp"
 
 namespace panelgate::app {
@@ -17,6 +20,9 @@ namespace json = boost::json;
 
 constexpr Duration kPatience = 60s;  // a large file on a small machine
 constexpr Duration kHealthTimeout = 2s;
+// The pauses before a gateway is asked what came of its SIGHUP. Fewer than the wrong tokens that it
+// answers at once.
+constexpr Duration kPauses[] = {100ms, 500ms, 2s};
 constexpr std::size_t kMostOfVerdict = 8 * 1024 * 1024;  // bytes of the verdict
 
 std::string text_in(const json::object& object, std::string_view name) {
@@ -67,6 +73,36 @@ ExitCode print_verdict(const json::object& verdict) {
     return outcome == "invalid" ? kBadConfig : kUnavailable;
 }
 
+/// The gateway knows the token that its file had when it was read last. Where it is another one by
+/// now, a gateway of this machine is asked by SIGHUP, which is for whoever may end it as well; the
+/// verdict is then asked for with the token, which is known once the file has been read.
+ExitCode reload_by_signal(const ReloadOptions& options, const config::Endpoint& at) {
+    const std::string known = "http://" + endpoint_text(at.address, at.port) +
+                              " does not know the token in " + options.token_file;
+    const auto process = process_at(at);
+    if (options.rollback || !process || ::kill(*process, SIGHUP) != 0) {
+        std::cerr << "panelgate: not reloaded: " << known << "\n  (if it has changed: "
+                  << (options.rollback ? "reload first, then roll back"
+                                       : "systemctl reload panelgate, or kill -HUP its process")
+                  << ")\n";
+        return kNotReady;
+    }
+    std::cerr << "panelgate: " << known << " yet: asked by SIGHUP, process " << *process << '\n';
+    ExitCode code = kFine;
+    const auto gateway =
+        GatewayClient::make({options.file, options.http, options.token_file}, code);
+    if (!gateway) return code;
+    for (const Duration pause : kPauses) {
+        std::this_thread::sleep_for(pause);
+        const GatewayAnswer answer = gateway->get("/api/v1/reload");
+        if (answer.is_ok() && answer.json.contains("outcome")) return print_verdict(answer.json);
+    }
+    std::cerr
+        << "panelgate: it does not know the token still: its log says whether it has reloaded; "
+           "a token that systemd hands out (LoadCredential) is taken at a restart\n";
+    return kNotReady;
+}
+
 }  // namespace
 
 ExitCode reload(const ReloadOptions& options) {
@@ -86,6 +122,8 @@ ExitCode reload(const ReloadOptions& options) {
         "\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
     const HttpReply reply = ask(address, port, request, kPatience, kMostOfVerdict,
                                 [](const HttpReply&) { return false; });
+    if (!secret->empty() && reply.status().starts_with("401 "))
+        return reload_by_signal(options, std::get<config::Endpoint>(endpoint));
     boost::system::error_code wrong;
     const json::value body = json::parse(reply.body(), wrong);
     if (!wrong && body.is_object() && body.as_object().contains("outcome"))

@@ -5,7 +5,7 @@
 
 namespace panelgate::mqtt {
 
-/// The JSON format: one retained topic per point, TOPIC/STATION/POINT. See deploy/operations.md.
+/// The JSON format: one retained topic per point, TOPIC/STATION/POINT. See docs/reference/mqtt.md.
 class JsonTopics final : public MessageFormat {
   public:
     /// The subjects must outlive it.

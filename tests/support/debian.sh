@@ -39,12 +39,15 @@ make_debian() {
         --hook-dir=/usr/share/mmdebstrap/hooks/merged-usr --include="$needed${3+,$3}" bookworm "$2" "${mirror[@]}"
 }
 
-# next_version PACKAGE FILE [other]: the same as a later version; `other`: with another program.
+# next_version PACKAGE FILE [other]: the same as a later version, with a later demonstration; `other`: with another
+# program, too.
 next_version() {
     local folder
     folder=$(mktemp -d)
     dpkg-deb -R "$1" "$folder"
     sed -i 's/^Version: .*$/&+next/' "$folder/DEBIAN/control"
+    find "$folder/etc/panelgate/panelgate.yaml" "$folder/usr/share/panelgate/demo.yaml" -type f \
+        -exec sh -c 'echo "# later" >>"$0"' {} \; 2>/dev/null || true
     [ -z "${3-}" ] || echo >>"$folder/usr/bin/panelgate"
     dpkg-deb --root-owner-group -b "$folder" "$2" >/dev/null
     rm -rf "$folder"

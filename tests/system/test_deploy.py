@@ -18,7 +18,8 @@ ALERTS = ROOT / "deploy/prometheus/rules/alerts.yml"
 ALERT = re.compile(r"- alert: (\w+)")
 SCRIPTS = ("deploy/demo.sh", "deploy/install_packages.sh", "deploy/sbom.sh", "tests/run.sh",
            "tests/image.sh", "deploy/kubernetes/rules.sh", ".ci/run", "deploy/package.sh",
-           "tests/packages.sh", "tests/service.sh", "tests/model/run.sh", "deploy/package/demo_test.sh", "deploy/package/database.sh",
+           "deploy/release.sh", "tests/release.sh", "tests/upgrade.sh", "tests/packages.sh", "tests/service.sh",
+           "tests/model/run.sh", "deploy/package/demo_test.sh", "deploy/package/database.sh",
            "deploy/package/postinst", "deploy/package/prerm", "deploy/package/postrm")
 
 

@@ -274,6 +274,46 @@ class Reload(unittest.TestCase):
             self.assertEqual(command("--rollback")[0], 0)
             self.assertEqual(running.program.get("/api/v1/stations/mixer")[0], 200)
 
+    def with_tokens(self, folder, before, after):
+        """A gateway whose token's file has another content since, and how `reload` ends with that."""
+        token = folder / "ops"
+        token.write_text(before)
+        token.chmod(0o600)
+        http = f"{config.FREE_PORT}, anonymous: none, tokens: [{{name: ops, role: operator, file: {token}}}]"
+        running = self.enterContext(Running(config.gateway(STEADY, http=http)))
+        token.write_text(after)
+        place = f"127.0.0.1:{running.program.http_port()}"
+
+        def command(*more):
+            return subprocess.run([harness.PANELGATE, "reload", "--http", place, "--token-file", str(token), *more],
+                                  capture_output=True, text=True, timeout=harness.PATIENCE, check=False)
+        return running, command
+
+    def test_a_new_token_in_its_file_locks_nobody_out(self):
+        folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
+        running, command = self.with_tokens(folder, "the-token-of-before-1", "the-token-that-is-new")
+        rolled = command("--rollback")  # a signal could not say that
+        self.assertEqual((rolled.returncode, rolled.stdout), (1, ""))
+        self.assertIn("reload first", rolled.stderr)
+        self.assertNotIn("cause=SIGHUP", running.program.log.text())
+        done = command()
+        self.assertEqual((done.returncode, done.stdout),
+                         (0, "applied\n  http/tokens/ops: secret changed\n"), done.stderr)
+        self.assertIn("asked by SIGHUP, process ", done.stderr)
+        self.assertNotIn("that-is-new", done.stderr)
+        again = command()
+        self.assertEqual((again.returncode, again.stdout), (0, "unchanged\n"))
+        self.assertNotIn("SIGHUP", again.stderr)
+
+    def test_a_token_that_stays_unknown_is_told(self):
+        folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
+        running, command = self.with_tokens(folder, "the-token-of-before-1", "the-token-that-is-new")
+        running.file.write_text("lines: 7\n")  # so the new token is never known
+        done = command()
+        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        self.assertIn("its log says", done.stderr)
+        running.program.log.wait_for("reload outcome=invalid cause=SIGHUP")
+
     def test_p1_a_device_under_another_name_gives_nobody_the_reply_of_before(self):
         def panel(frame):  # slow at one place, or it says which place it was asked for
             address = struct.unpack(">H", frame[2:4])[0]

@@ -30,7 +30,7 @@ OF_A_TRANSACTION = {"id", "sequence", "ended", "time", "client", "arrived", "gra
                     "first_byte_in", "last_byte_in", "answered", "request", "reply"}
 OF_AN_INCIDENT = {"time", "errors", "complete", "frames", "decisions", "transactions"}
 OF_A_RELOAD = {"at", "warnings"}
-OF_A_BUILD = {"commit", "compiler", "libraries"}
+OF_A_BUILD = {"version", "commit", "compiler", "libraries"}
 OF_A_RELAY = {"state", "reads", "writes"}
 OF_A_POINT = {"time"}
 # Of panels that confirm and do not keep (verify_test.cpp), and of a line whose master speaks.

@@ -68,10 +68,10 @@ def start(*arguments, stderr=subprocess.PIPE):
 
 
 def scan(*arguments):
-    """(exit code, stdout, stderr)"""
+    """(exit code, stdout, stderr); without what it says every 5 s where it takes so long."""
     process = start(*arguments)
     out, err = process.communicate(timeout=3 * LIMIT)
-    return process.returncode, out, err
+    return process.returncode, out, re.sub(r"(?m)^panelgate: \d+ %, .*\n", "", err)
 
 
 def drain(descriptor, process):
