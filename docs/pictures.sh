@@ -11,7 +11,7 @@ for tool in chromium pngquant optipng; do
 done
 /usr/bin/python3 -B deploy/manual/pictures.py docs/pictures "$program"
 for picture in docs/pictures/*.png; do
-    pngquant --force --strip --speed 1 --quality 60-95 --output "$picture" "$picture"
+    pngquant --force --nofs --strip --speed 1 --output "$picture" 24 "$picture"
     optipng -quiet -o5 -strip all "$picture"
 done
 ls -l docs/pictures/*.png

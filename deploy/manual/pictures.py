@@ -14,7 +14,8 @@ SIZE = (1200, 760)
 SHOWN = "performance.getEntriesByName('shown').length === 1 && document.getAnimations().length === 0"
 # What has to be there before a picture is taken.
 ALL_WELL = "document.querySelectorAll('.tile.good').length === 5 && !document.querySelector('.finding')"
-CURVES = "[...document.querySelectorAll('.tile polyline, .tile path')].filter((one) => (one.getAttribute('points') ?? one.getAttribute('d') ?? '').length > 200).length >= 5"
+CURVES = "[...document.querySelectorAll('.tile .spark .value')].every((one) => one.getAttribute('d').length > 200)"
+TREND = "document.querySelector('[data-point] .value')?.getAttribute('d').split('L').length > 5"
 
 
 def put(gateway, station, faults):
@@ -26,10 +27,10 @@ class Album:
     def __init__(self, folder, gateway, chrome):
         self.folder, self.gateway, self.chrome = pathlib.Path(folder), gateway, chrome
 
-    def take(self, name, view, *conditions, then=None, height=None):
-        self.chrome.open(f"{self.gateway.base()}/#/{view}")
+    def take(self, name, view, *conditions, then=None, height=SIZE[1]):
         for scheme in ("light", "dark"):
             self.chrome.prefer(scheme)
+            self.chrome.open(f"{self.gateway.base()}/#/{view}")
             for condition in (SHOWN, *conditions):
                 self.chrome.wait(condition, patience=90)
             if then:
@@ -37,19 +38,22 @@ class Album:
             (self.folder / f"{name}-{scheme}.png").write_bytes(self.chrome.picture(height))
 
     def frame(self):
-        """A reply is picked and shown byte by byte."""
-        self.chrome.wait("document.querySelector('canvas.scope').dataset.frames > 12")
-        self.chrome.script("document.querySelector('button.primary[aria-pressed=true]') || document.querySelector('button.primary').click()")
-        self.chrome.script("[...document.querySelectorAll('tbody button')].filter((one) => one.textContent.startsWith('1F 03')).at(-1)?.click()")
-        self.chrome.wait("document.querySelector('.detail .meanings')")
+        """What is shown stands still, and its longest reply is explained byte by byte."""
+        self.chrome.script("document.querySelector('button.primary').click()")
+        for _ in range(2):
+            self.chrome.script("document.querySelector('button[aria-label=\"Zoom out\"]').click()")
+        self.chrome.wait("document.querySelector('canvas.scope').dataset.frames > 10 && document.querySelectorAll('tbody button').length > 10")
+        self.chrome.script("[...document.querySelectorAll('tbody button')].sort((a, b) => a.textContent.length - b.textContent.length)"
+                           ".at(-1).click()")
+        self.chrome.wait("document.querySelector('.detail .meanings dd')?.textContent.length > 0 && / = /.test(document.querySelector('.detail').textContent)")
+        self.chrome.script("document.activeElement.blur(); scrollTo(0, 0)")
 
     def all(self):
-        self.take("overview", "", ALL_WELL, CURVES)
-        self.take("station", "station/press", "document.querySelectorAll('[data-point] .badge.good').length >= 3",
-                  "document.querySelector('.plot canvas')")
-        self.take("scope", "scope", "document.querySelector('canvas.scope')", then=self.frame)
+        self.take("overview", "", ALL_WELL, CURVES, height=580)
+        self.take("station", "station/press", TREND, "document.querySelector('.plot canvas')", height=720)
+        self.take("scope", "scope", "document.querySelector('canvas.scope')?.dataset.frames > 4", then=self.frame)
         put(self.gateway, "oven", {"dead": 1})
-        self.take("findings", "", "document.querySelector('.tile.bad.offline') && document.querySelector('.finding')", CURVES)
+        self.take("findings", "", "document.querySelector('.tile.bad.offline') && document.querySelector('.finding')", CURVES, height=660)
 
 
 def main(folder, *program):

@@ -163,17 +163,20 @@ class Site:
         return self.at(page, re.sub(r"\.md$", ".html", there)) + hash_ + name
 
     def contents(self, page):
+        """The parts, with the pages of the one that the page belongs to: all of them on each were 60 kB more."""
         lines = []
-        for heading, _, entries in self.sections:
-            paths = [path for _, path in entries]
-            lines.append(f"<details{' open' if page.path in paths else ''}><summary>{html.escape(heading)}</summary><ul>")
-            for title, path in entries:
-                here = ' aria-current="page"' if path == page.path else ""
-                way = self.at(page, self.pages[path].name)
-                lines.append(f'<li><a href="{way}"{here}>{html.escape(title)}</a></li>')
-            lines.append("</ul></details>")
+        for heading, name, entries in self.sections:
+            lines.append(f'<li><a href="{self.at(page, "index.html")}#{name}">{html.escape(heading)}</a>')
+            if page.path in [path for _, path in entries]:
+                lines.append("<ul>")
+                for title, path in entries:
+                    here = ' aria-current="page"' if path == page.path else ""
+                    lines.append(f'<li><a href="{self.at(page, self.pages[path].name)}"{here}>{html.escape(title)}</a></li>')
+                lines.append("</ul>")
+            lines.append("</li>")
         here = ' aria-current="page"' if page is self.rest else ""
-        return "\n".join([*lines, f'<p><a href="{self.at(page, REST)}"{here}>REST, every member</a></p>'])
+        lines.append(f'<li><a href="{self.at(page, REST)}"{here}>REST, every member</a></li>')
+        return "<ul>\n" + "\n".join(lines) + "\n</ul>"
 
     def neighbours(self, page):
         """Links to the page before and the one behind."""

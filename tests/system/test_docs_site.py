@@ -26,7 +26,7 @@ import chrome  # noqa: E402
 
 DOCS = ROOT / "docs"
 SOURCES = sorted(str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md"))
-LARGEST = 620_000  # bytes of the whole manual, packed
+LARGEST = 650_000  # bytes of the whole manual, packed
 PICTURE = 150_000
 
 
@@ -311,9 +311,8 @@ class Keys(unittest.TestCase):
         page.script("document.querySelector('a[href=\"#contents-of-all\"]').focus()")
         page.key("Enter")
         page.wait("document.activeElement.id === 'contents-of-all'")
-        page.key("Tab")
-        page.key("Tab")
-        page.key("Tab")
+        for _ in range(3):  # the part, its first page, its second
+            page.key("Tab")
         page.key("Enter")
         page.wait("location.pathname === '/docs/start/first-panel.html'")
         page.script("document.querySelector('[rel=next]').focus()")
