@@ -11,7 +11,9 @@ for tool in chromium pngquant optipng; do
 done
 /usr/bin/python3 -B deploy/manual/pictures.py docs/pictures "$program"
 for picture in docs/pictures/*.png; do
-    pngquant --force --nofs --strip --speed 1 --output "$picture" 24 "$picture"
+    colours=24
+    case $picture in *scope*) colours=64 ;; esac  # with a key of colours
+    pngquant --force --nofs --strip --speed 1 --output "$picture" $colours "$picture"
     optipng -quiet -o5 -strip all "$picture"
 done
 ls -l docs/pictures/*.png

@@ -91,11 +91,15 @@ class Chrome:
 
     def open(self, url):
         """Ends when all of the page is there, whatever was open before."""
-        self.command("Page.navigate", url="about:blank")
-        self._events.clear()
-        self.command("Page.navigate", url=url)
-        while "Page.loadEventFired" not in self._events:
-            self._message()
+        for address in ("about:blank", url):
+            self._events.clear()
+            self.command("Page.navigate", url=address)
+            while "Page.loadEventFired" not in self._events:
+                self._message()
+
+    def arrived(self, path):
+        """Waits until a link has led there."""
+        self.wait(f"location.pathname === {json.dumps(path)} && document.readyState === 'complete'")
 
     def script(self, text):
         """What an expression is, or what its promise gives."""

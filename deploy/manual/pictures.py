@@ -40,8 +40,7 @@ class Album:
     def frame(self):
         """What is shown stands still, and its longest reply is explained byte by byte."""
         self.chrome.script("document.querySelector('button.primary').click()")
-        for _ in range(2):
-            self.chrome.script("document.querySelector('button[aria-label=\"Zoom out\"]').click()")
+        self.chrome.script("document.querySelector('button[aria-label=\"Zoom out\"]').click()")
         self.chrome.wait("document.querySelector('canvas.scope').dataset.frames > 10 && document.querySelectorAll('tbody button').length > 10")
         self.chrome.script("[...document.querySelectorAll('tbody button')].sort((a, b) => a.textContent.length - b.textContent.length)"
                            ".at(-1).click()")

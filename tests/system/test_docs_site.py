@@ -154,7 +154,7 @@ class Served(unittest.TestCase):
                     self.assertEqual((there.scheme, there.netloc), ("", ""))
                     self.assertTrue(self.fetch(there.path)[1])
             self.assertEqual(page.inline, [], path)
-        for name in ("site.js", "site.css", "search.js"):
+        for name in ("site.js", "site.css"):
             text = self.fetch(f"/docs/{name}")[1].decode()
             self.assertNotRegex(text, r"@import|url\(|\bfetch\(|XMLHttpRequest")
 
@@ -279,45 +279,46 @@ class Keys(unittest.TestCase):
     def test_search_goes_to_a_page_and_back(self):
         page = self.open("/docs/tasks/numbers.html")
         page.key("/")
-        self.assertEqual(self.active(), "words")
+        self.assertEqual(self.active(), "site-words")
         page.key("tokens")
-        page.wait("document.querySelector('#found b')?.textContent === 'Tokens'")
+        page.wait("document.querySelector('#site-found b')?.textContent === 'Tokens'")
         page.key("Escape")
-        self.assertTrue(page.script("document.querySelector('#found').hidden"))
+        self.assertTrue(page.script("document.querySelector('#site-found').hidden"))
         page.key(" ")
-        page.wait("!document.querySelector('#found').hidden")
+        page.wait("!document.querySelector('#site-found').hidden")
         page.key("ArrowDown")
         page.key("ArrowDown")
-        self.assertEqual(page.script("[...document.querySelectorAll('#found a')].indexOf(document.activeElement)"), 1)
+        self.assertEqual(page.script("[...document.querySelectorAll('#site-found a')].indexOf(document.activeElement)"), 1)
         page.key("ArrowUp")
         page.key("Enter")
-        page.wait("location.pathname === '/docs/tasks/tokens.html'")
+        page.arrived("/docs/tasks/tokens.html")
 
     def test_search_finds_each_page_by_its_title(self):
         page = self.open("/docs/")
-        page.script("document.querySelector('#words').focus()")
-        page.wait("document.querySelector('script[src$=\"search.js\"]')")
+        page.script("document.querySelector('#site-words').focus()")
+        page.key("panelgate")
+        page.wait("document.querySelector('#site-found a')")
         for source in SOURCES:
             with self.subTest(page=source):
                 title = re.search(r"(?m)^# (.+)$", (DOCS / source).read_text())[1].replace("`", "")
                 found = page.script(
-                    "new Promise((done) => { const field = document.querySelector('#words'); "
+                    "new Promise((done) => { const field = document.querySelector('#site-words'); "
                     f"field.value = {json.dumps(title)}; field.dispatchEvent(new Event('input')); "
-                    "setTimeout(() => done([...document.querySelectorAll('#found a')].map((one) => one.pathname)), 0); })")
-                self.assertIn(page_of(source), [path.replace("/docs/docs/", "/docs/") for path in found[:3]])
+                    "setTimeout(() => done([...document.querySelectorAll('#site-found a')].map((one) => one.pathname)), 0); })")
+                self.assertIn(page_of(source), found[:3])
 
     def test_contents_and_next_page(self):
         page = self.open("/docs/start/demo.html")
-        page.script("document.querySelector('a[href=\"#contents-of-all\"]').focus()")
+        page.script("document.querySelector('a[href=\"#site-contents\"]').focus()")
         page.key("Enter")
-        page.wait("document.activeElement.id === 'contents-of-all'")
+        page.wait("document.activeElement.id === 'site-contents'")
         for _ in range(3):  # the part, its first page, its second
             page.key("Tab")
         page.key("Enter")
-        page.wait("location.pathname === '/docs/start/first-panel.html'")
+        page.arrived("/docs/start/first-panel.html")
         page.script("document.querySelector('[rel=next]').focus()")
         page.key("Enter")
-        page.wait("location.pathname === '/docs/start/from-mbusd.html'")
+        page.arrived("/docs/start/from-mbusd.html")
 
     def test_nothing_is_asked_elsewhere_and_nothing_complains(self):
         self.chrome.requests.clear()
@@ -326,7 +327,7 @@ class Keys(unittest.TestCase):
             for size in (chrome.WIDE, chrome.NARROW):
                 self.chrome.resize(size)
                 page = self.open(path)
-                page.script("document.querySelector('#words').focus()")
+                page.script("document.querySelector('#site-words').focus()")
                 page.wait("document.querySelector('script[src$=\"search.js\"]')")
                 self.assertLessEqual(page.script("document.documentElement.scrollWidth"), size[0], path)
         self.chrome.resize(chrome.WIDE)
@@ -343,7 +344,7 @@ class Keys(unittest.TestCase):
                 page.wait("performance.getEntriesByName('shown').length === 1")
                 self.assertRegex(page.script("document.querySelector('#help').ariaLabel"), r"^Help: .+")
                 page.script("document.querySelector('#help').click()")
-                page.wait("location.pathname === '/docs/operate/dashboard.html'")
+                page.arrived("/docs/operate/dashboard.html")
                 self.assertTrue(page.script("document.getElementById(location.hash.slice(1))?.tagName === 'H2'"))
 
     def test_a_finding_and_an_exception_lead_to_their_entry(self):
@@ -353,7 +354,7 @@ class Keys(unittest.TestCase):
             page.wait("document.querySelector('.finding a.explained')")
             cause = page.script("document.querySelector('.finding').dataset.cause")
             page.script("document.querySelector('.finding a.explained').click()")
-            page.wait("location.pathname === '/docs/reference/findings.html'")
+            page.arrived("/docs/reference/findings.html")
             self.assertEqual(page.script("location.hash"), f"#{cause}")
             self.assertTrue(page.script("document.getElementById(location.hash.slice(1)) !== null"))
         finally:
@@ -365,7 +366,7 @@ class Keys(unittest.TestCase):
         page.script("document.querySelector('#read').click()")
         page.wait("document.querySelector('.answer .refusal a.explained')")
         page.script("document.querySelector('.answer .refusal a.explained').click()")
-        page.wait("location.pathname === '/docs/trouble/exceptions.html'")
+        page.arrived("/docs/trouble/exceptions.html")
 
     def test_where_a_token_is_needed_help_tells_how_one_is_made(self):
         with harness.configured("lines: [{name: a, device: tcp://127.0.0.1:9, stations: [{id: 1}]}]\n"
@@ -373,7 +374,7 @@ class Keys(unittest.TestCase):
             self.chrome.open(program.url("/"))
             self.chrome.wait("document.querySelector('#sign-in')")
             self.chrome.script("document.querySelector('#help').click()")
-            self.chrome.wait("location.pathname === '/docs/tasks/tokens.html'")
+            self.chrome.arrived("/docs/tasks/tokens.html")
 
 
 class Pages(unittest.TestCase):

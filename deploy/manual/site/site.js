@@ -15,7 +15,7 @@
     }
 
     function chooseTheme() {
-        const select = of('theme');
+        const select = of('site-theme');
         select.hidden = false;
         select.value = remembered();
         select.addEventListener('change', () => {
@@ -35,26 +35,28 @@
     }
 
     const letters = (text) => text.toLowerCase();
+    const literally = (word) => word.replace(/[.*+?^${}()|[\]\\/]/g, '\\$&');
 
     /** How well a part of a page fits: 0 where it lacks a word. */
     function score(words, title, heading, text) {
         let sum = 0;
         for (const word of words) {
-            const there = (where) => where.includes(word) ? (new RegExp('(^|[^\\p{L}\\p{N}])' + word.replace(/[^\p{L}\p{N}]/gu, '\\$&'), 'u').test(where) ? 2 : 1) : 0;
+            const there = (where) => where.includes(word) ? (new RegExp('(^|[^\\p{L}\\p{N}])' + literally(word), 'u').test(where) ? 2 : 1) : 0;
             const found = 20 * there(heading) + 8 * there(title) + there(text);
             if (found === 0) return 0;
             sum += found;
         }
-        return heading === words.join(' ') || title === words.join(' ') ? sum + 40 : sum;
+        return sum;
     }
 
     function search(words) {
         const found = [];
         for (const [name, title, parts] of pages) {
             for (const [id, heading, text] of parts) {
-                // What stands above all headings of a page is found before what is below one of them.
                 const fits = score(words, letters(title), letters(heading), letters(text));
-                if (fits > 0) found.push({way: base + name + (id ? '#' + id : ''), title, heading, text, fits: fits + (id ? 0 : 4)});
+                // A page is found before its parts, where its title has all the words.
+                const whole = id === '' ? (words.every((word) => letters(title).includes(word)) ? 10 * words.length : 4) : 0;
+                if (fits > 0) found.push({way: base + name + (id ? '#' + id : ''), title, heading, text, fits: fits + whole});
             }
         }
         return found.sort((one, other) => other.fits - one.fits);
@@ -66,7 +68,7 @@
         const from = first === text.length ? 0 : Math.max(0, text.lastIndexOf(' ', Math.max(0, first - AROUND)) + 1);
         const shown = text.slice(from, from + SHOWN).replace(text.length > from + SHOWN ? /\s\S*$/ : '', '');
         const node = document.createElement('small');
-        const any = new RegExp('(' + words.map((word) => word.replace(/[^\p{L}\p{N}]/gu, '\\$&')).join('|') + ')', 'giu');
+        const any = new RegExp('(' + words.map((word) => literally(word)).join('|') + ')', 'giu');
         shown.split(any).forEach((piece, i) => {
             if (i % 2 === 0) return node.append(piece);
             const mark = document.createElement('mark');
@@ -87,48 +89,49 @@
         return item;
     }
 
-    const close = () => { of('found').hidden = true; };
+    const close = () => { of('site-found').hidden = true; };
 
     function look() {
-        const words = letters(of('words').value).split(/\s+/).filter(Boolean);
+        const words = letters(of('site-words').value).split(/\s+/).map((word) => word.replace(/^[^\p{L}\p{N}\/_-]+|[^\p{L}\p{N}\/_#+-]+$/gu, '')).filter(Boolean);
         if (words.length === 0 || pages.length === 0) return close();
         const all = search(words);
-        of('count').textContent = all.length === 0 ? 'Nothing is found.' : all.length > MOST ? `The first ${MOST} of ${all.length}` : `${all.length} found`;
-        of('found').querySelector('ol').replaceChildren(...all.slice(0, MOST).map((one) => row(one, words)));
-        of('found').hidden = false;
-        of('found').scrollTop = 0;
+        of('site-count').textContent = all.length === 0 ? 'Nothing is found.' : all.length > MOST ? `The first ${MOST} of ${all.length}` : `${all.length} found`;
+        of('site-found').querySelector('ol').replaceChildren(...all.slice(0, MOST).map((one) => row(one, words)));
+        of('site-found').hidden = false;
+        of('site-found').scrollTop = 0;
         return undefined;
     }
 
     /** Arrows go through what is found, Escape back to the words. */
     function key(event) {
-        const links = [...of('found').querySelectorAll('a')];
+        const links = [...of('site-found').querySelectorAll('a')];
         const at = links.indexOf(document.activeElement);
-        const typing = document.activeElement === of('words');
-        if (event.key === 'Escape' && !of('found').hidden) {
+        const typing = document.activeElement === of('site-words');
+        if (event.key === 'Escape' && !of('site-found').hidden) {
+            event.preventDefault();  // it would empty the field
             close();
-            of('words').focus();
+            of('site-words').focus();
         } else if ((event.key === 'ArrowDown' || event.key === 'ArrowUp') && (typing || at >= 0) && links.length > 0) {
             event.preventDefault();
             const next = at + (event.key === 'ArrowDown' ? 1 : -1);
-            (links[next] ?? (next < 0 ? of('words') : links[at])).focus();
+            (links[next] ?? (next < 0 ? of('site-words') : links[at])).focus();
         } else if (event.key === '/' && !/^(INPUT|SELECT|TEXTAREA)$/.test(document.activeElement.tagName)) {
             event.preventDefault();
-            of('words').focus();
+            of('site-words').focus();
         }
     }
 
     function offerSearch() {
-        of('search').hidden = false;
-        of('words').addEventListener('focus', fetchIndex);
-        of('words').addEventListener('input', () => { fetchIndex(); look(); });
-        of('search').addEventListener('submit', (event) => {
+        of('site-search').hidden = false;
+        of('site-words').addEventListener('focus', fetchIndex);
+        of('site-words').addEventListener('input', () => { fetchIndex(); look(); });
+        of('site-search').addEventListener('submit', (event) => {
             event.preventDefault();
-            of('found').querySelector('a')?.click();
+            of('site-found').querySelector('a')?.click();
         });
-        of('found').addEventListener('click', (event) => event.target.closest('a') && close());
+        of('site-found').addEventListener('click', (event) => event.target.closest('a') && close());
         document.addEventListener('keydown', key);
-        document.addEventListener('pointerdown', (event) => event.target.closest('#found, #search') || close());
+        document.addEventListener('pointerdown', (event) => event.target.closest('#site-found, #site-search') || close());
     }
 
     /** What is wider than the page is moved by keys, too. */
@@ -146,8 +149,8 @@
     document.addEventListener('DOMContentLoaded', () => {
         chooseTheme();
         offerSearch();
-        const here = of('contents-of-all').querySelector('[aria-current]');
-        if (here) of('contents-of-all').scrollTop = here.offsetTop - innerHeight / 2;
+        const here = of('site-contents').querySelector('[aria-current]');
+        if (here) of('site-contents').scrollTop = here.offsetTop - innerHeight / 2;
     });
     for (const event of ['load', 'resize']) window.addEventListener(event, reachable);
 })();
