@@ -335,6 +335,16 @@ class Keys(unittest.TestCase):
         self.assertEqual([url for url in self.chrome.requests if not url.startswith((base, "about:", "data:"))], [])
         self.assertEqual(self.chrome.complaints, [])
 
+    def test_paper_is_white_and_has_only_the_text(self):
+        page = self.open("/docs/tasks/tokens.html")
+        page.command("Emulation.setEmulatedMedia", media="print", features=[{"name": "prefers-color-scheme", "value": "dark"}])
+        try:
+            self.assertEqual(page.script("getComputedStyle(document.body).backgroundColor"), "rgb(255, 255, 255)")
+            for selector in ("header", "#site-contents", ".neighbours"):
+                self.assertEqual(page.script(f"getComputedStyle(document.querySelector('{selector}')).display"), "none")
+        finally:
+            page.command("Emulation.setEmulatedMedia", media="", features=[])
+
     def test_each_view_of_the_dashboard_has_its_part_of_the_manual(self):
         views = re.findall(r"(\w+): \w+View\b|'': (\w+)View", (ROOT / "src/web/page/app.js").read_text())
         self.assertGreater(len(views), 8)
