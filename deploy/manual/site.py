@@ -149,10 +149,10 @@ class Site:
 
     def at(self, page, name):
         """The way from a page to a file of the site. The program has the page of REST beside its folder."""
+        if self.inside and page is self.rest:
+            return "/docs" if name == REST else "/docs/" + name
         if self.inside and name == REST:
             return "../" * (1 + page.name.count("/")) + "docs"
-        if self.inside and page is self.rest:
-            return "/docs/" + name
         return os.path.relpath(name, os.path.dirname(page.name) or ".")
 
     def way(self, page, target):

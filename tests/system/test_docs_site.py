@@ -372,7 +372,7 @@ class Keys(unittest.TestCase):
         page = self.open("/#/request/press")
         page.wait("document.querySelector('#where')")
         page.script("document.querySelector('#where').focus()")
-        page.key("UW9999")
+        page.key("holding-registers/65000")  # which the panel has not
         page.script("document.querySelector('#read').click()")
         page.wait("document.querySelector('.answer .refusal a.explained')")
         page.script("document.querySelector('.answer .refusal a.explained').click()")
