@@ -233,7 +233,7 @@ class Site(unittest.TestCase):
     def test_it_stands_alone(self):
         with tempfile.TemporaryDirectory() as folder:
             out = pathlib.Path(folder) / "site"
-            subprocess.run([ROOT / "deploy/manual/site.sh", out], check=True, capture_output=True, timeout=harness.PATIENCE)
+            subprocess.run([ROOT / "deploy/manual/site.sh", out], check=True, capture_output=True, timeout=4 * harness.PATIENCE)
             pages = {path: Html(path.read_text()) for path in out.rglob("*.html")}
             self.assertEqual(len(pages), len(SOURCES) + 1)
             for path, page in pages.items():
@@ -255,7 +255,7 @@ class Site(unittest.TestCase):
             page = tree / "docs/glossary.md"
             page.write_text(page.read_text() + "\n[a](nothing.md) [b](index.md#nothing) ![c](pictures/nothing.png)\n")
             done = subprocess.run(["/usr/bin/python3", "-B", tree / "deploy/manual/site.py", tree / "out", "1"],
-                                  capture_output=True, text=True, check=False, timeout=harness.PATIENCE)
+                                  capture_output=True, text=True, check=False, timeout=4 * harness.PATIENCE)
             self.assertEqual(done.returncode, 1)
             self.assertEqual(len(done.stderr.strip().split("\n")), 3, done.stderr)
 
