@@ -1,6 +1,7 @@
 """Chromium without a window, spoken to through a pipe (the DevTools protocol): it wants the package chromium
 and nothing else. Looks at pages for docs/pictures.sh and for the tests."""
 import base64
+import contextlib
 import json
 import os
 import shutil
@@ -12,6 +13,10 @@ WIDE, NARROW = (1280, 900), (390, 844)
 PATIENCE = 30  # seconds
 PROGRAM = shutil.which("chromium")
 KEYS = {"Tab": 9, "Enter": 13, "Escape": 27, "ArrowUp": 38, "ArrowDown": 40, "/": 191}
+
+
+class Refused(Exception):
+    """Chromium has not done a command."""
 
 
 class Chrome:
@@ -79,7 +84,7 @@ class Chrome:
         while (message := self._message()).get("id") != number:
             pass
         if "error" in message:
-            raise ValueError(f"{method}: {message['error']}")
+            raise Refused(f"{method}: {message['error']}")
         return message["result"]
 
     def resize(self, size):
@@ -109,12 +114,14 @@ class Chrome:
         return done["result"].get("value")
 
     def wait(self, condition, patience=PATIENCE):
-        """Until an expression of the page is true."""
+        """Until an expression of the page is true, and of the next one where a link leads away meanwhile."""
+        look = f"new Promise((done) => {{ const end = Date.now() + 500; const look = () => {{ if ({condition}) done(true); " \
+               "else if (Date.now() > end) done(false); else setTimeout(look, 20); }; look(); })"
         end = time.monotonic() + patience
         while time.monotonic() < end:
-            if self.script(f"new Promise((done) => {{ const end = Date.now() + 500; const look = () => {{ if ({condition}) "
-                           "done(true); else if (Date.now() > end) done(false); else setTimeout(look, 20); }; look(); })"):
-                return
+            with contextlib.suppress(Refused):
+                if self.script(look):
+                    return
         raise AssertionError(f"never true: {condition}")
 
     def key(self, name):
