@@ -10,6 +10,8 @@ COPY deploy/install_packages.sh deploy/packages.txt deploy/sbom.sh deploy/
 RUN deploy/install_packages.sh build
 COPY CMakeLists.txt CMakePresets.json LICENSE ./
 COPY config config
+COPY deploy/manual deploy/manual
+COPY docs docs
 COPY include include
 COPY src src
 RUN cmake --preset release -DPANELGATE_TESTS=OFF -DPANELGATE_UNITY=ON && cmake --build --preset release --target panelgate

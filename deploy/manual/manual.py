@@ -2,8 +2,8 @@
 """manual.py FOLDER PROGRAM...: panelgate.1, panelgate.yaml.5 and the completions, into FOLDER.
 
 Made of what stands in one place already: commands and options are what `PROGRAM help` prints, keys
-are config/panelgate.example.yaml. PROGRAM may have words before it (an emulator). The date is
-SOURCE_DATE_EPOCH, or today.
+are those of docs/reference/configuration.md, the example is config/minimal.yaml. PROGRAM may have words
+before it (an emulator). The date is SOURCE_DATE_EPOCH, or today.
 """
 import os
 import pathlib
@@ -13,7 +13,8 @@ import sys
 import time
 
 HERE = pathlib.Path(__file__).resolve().parent
-EXAMPLE = HERE.parents[1] / "config/panelgate.example.yaml"
+EXAMPLE = HERE.parents[1] / "config/minimal.yaml"
+REFERENCE = HERE.parents[1] / "docs/reference/configuration.md"
 ENTRY = re.compile(r"^  (\S.*?)(?:\s{2,}(\S.*))?$")
 COLUMN = " " * 30
 OF_FILES = ("-c", "--config", "--profiles", "--diff", "--token-file", "-o", "--output")  # their value
@@ -110,8 +111,26 @@ def page_1(commands):
     return {"SYNOPSIS": "\n".join(synopsis), "COMMANDS": "\n".join(parts)}
 
 
+def keys():
+    """[(title, path of the map or "", [(key, values, default, what it is, a change)])] of the reference."""
+    for part in REFERENCE.read_text().split("\n## ")[1:]:
+        title, _, text = part.partition("\n")
+        found = re.search(r"(?m)^`([\w.]+)`$", text)
+        rows = [[cell.strip().replace("\\|", "|").replace("`", "") for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+                for line in text.splitlines() if line.startswith("| `")]
+        yield title.strip("`"), found[1] if found else "", rows
+
+
 def page_5():
-    return {"KEYS": mdoc(EXAMPLE.read_text().rstrip("\n"))}
+    lines = []
+    for title, path, rows in keys():
+        lines += [f".Ss {mdoc(title)}{': ' + path if path else ''}", ".Bl -tag -width Ds"]
+        for key, values, default, text, change in rows:
+            facts = [values, "required" if default == "required" else f"default {default}" if default else ""]
+            lines += [f".It Ic {mdoc(key)} No : {mdoc(', '.join(filter(None, facts)))}", prose(text)]
+            lines += [prose(f"A change: {change}.")] if change else []
+        lines.append(".El")
+    return {"KEYS": "\n".join(lines), "EXAMPLE": mdoc(EXAMPLE.read_text().rstrip("\n"))}
 
 
 def completion(commands, about):

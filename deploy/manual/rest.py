@@ -140,7 +140,7 @@ def text(program):
         document = Document(gateway.text("/openapi.json"))
     info = document.all["info"]["description"]
     lines = ["# REST", "", "Made from the program by `deploy/manual/reference.py`. A gateway has the same in full, with",
-             "the form of each answer, at `/docs` and as OpenAPI 3.1 at `/openapi.json`.", "",
+             "the form of each answer, at `/docs` (this manual: `/docs/`) and as OpenAPI 3.1 at `/openapi.json`.", "",
              *wrapped(info),
              "The lines of curl ask `panelgate demo`. With tokens a call wants `-H \"Authorization: Bearer TOKEN\"`",
              "of a token with its role; *none* is free for all. See [Tokens](../tasks/tokens.md).", "",

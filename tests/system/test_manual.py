@@ -62,7 +62,27 @@ class Manual(unittest.TestCase):
         keys = {key for file in (ROOT / "src/config").glob("*.cpp")
                 for key in KEY.findall(file.read_text())}
         self.assertGreater(len(keys), 80)
-        self.assertEqual([key for key in sorted(keys) if not re.search(rf"\b{key}:", page)], [])
+        self.assertEqual([key for key in sorted(keys) if f"\n.It Ic {key} No :" not in page], [])
+
+    def test_the_page_of_the_configuration_says_what_the_reference_says(self):
+        page = " ".join(self.page("panelgate.yaml.5").split())
+        rows = re.findall(r"(?m)^\| `([\w-]+)` \| (.*?) \| (.*?) \| (.*?) \| (.*?) ?\|$",
+                          (ROOT / "docs/reference/configuration.md").read_text())
+        self.assertGreater(len(rows), 100)
+        for key, values, _, text, change in rows:
+            for said in (f".It Ic {key} No : {values}", text, change):
+                self.assertIn(" ".join(said.replace("`", "").replace("\\|", "|").split()), page, key)
+
+    def test_what_help_says_is_in_the_page_and_in_the_reference(self):
+        page = " ".join(self.page("panelgate.1").split())
+        reference = (ROOT / "docs/reference/cli.md").read_text()
+        for command in re.findall(r"(?m)^### (\w+)$", reference):
+            about = harness.run("help", command).stdout.splitlines()[0]
+            about = about[0].upper() + about[1:] + "."
+            self.assertIn(about, page)
+            self.assertIn(about, reference)
+        for code, meaning in re.findall(r"(?m)^\| (\d+) \| (.*) \|$", reference):
+            self.assertIn(f".It {code} ", page)
 
     def shell(self, *command):
         path = f"{pathlib.Path(harness.PANELGATE).parent}:{os.environ['PATH']}"

@@ -189,15 +189,6 @@ Handling get_openapi(HttpRequest request, const Api*) {
     return KeptAnswer::give(kept, std::move(request));
 }
 
-Handling get_docs(HttpRequest request, const Api*) {
-    static const auto kept = std::make_shared<KeptAnswer>(
-        docs_page(boost::json::parse(openapi_text()).as_object()), "text/html; charset=utf-8");
-    Handling giving = KeptAnswer::give(kept, std::move(request));
-    HttpResponse response = co_await std::move(giving);
-    response.headers.emplace_back("Content-Security-Policy", std::string(kDocsPolicy));
-    co_return response;
-}
-
 Handling get_version(HttpRequest, const Api* api) {
     const Providers& providers = api->providers;
     boost::json::object libraries;

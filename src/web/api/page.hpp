@@ -1,13 +1,12 @@
 #pragma once
 
-#include <boost/json/object.hpp>
 #include <span>
 #include <string>
 #include <string_view>
 
 namespace panelgate::web {
 
-/// A file of the dashboard, compiled into the program.
+/// A file of the dashboard or the manual, compiled into the program.
 struct PageFile {
     std::string_view name;                  ///< "index.html", "scope.js"
     std::string_view type;                  ///< for Content-Type
@@ -17,12 +16,11 @@ struct PageFile {
 
 /// All files; "index.html" is the page.
 std::span<const PageFile> shipped_page();
+/// The manual (deploy/manual/site.py): "index.html", "tasks/tokens.html"; "rest.html" is REST's
+/// page.
+std::span<const PageFile> shipped_docs();
 
 /// The text of openapi.json, assembled from the embedded parts.
 const std::string& openapi_text();
-/// Renders an OpenAPI document as an HTML page without scripts or external resources. Pure.
-std::string docs_page(const boost::json::object& document);
-/// The Content-Security-Policy of that page: its own style only.
-extern const std::string_view kDocsPolicy;
 
 }  // namespace panelgate::web

@@ -40,6 +40,8 @@ constexpr Row kRows[] = {
     {"GET", "/", get_index, kPage},
     {"GET", "/page/{}", get_page, kPage},
     {"GET", "/docs", get_docs, kPage},
+    {"GET", "/docs/{}", get_manual, kPage},
+    {"GET", "/docs/{}/{}", get_manual, kPage},
     {"GET", "/openapi.json", get_openapi, kSee},
     {"GET", "/healthz", get_healthz, kFree, kPlain, {}, kProbe},
     {"GET", "/readyz", get_readyz, kFree, kPlain, {}, kProbe},

@@ -30,6 +30,7 @@ Handling get_page(HttpRequest request, const Api* api);
 Handling get_configuration(HttpRequest request, const Api* api);
 Handling get_openapi(HttpRequest request, const Api* api);
 Handling get_docs(HttpRequest request, const Api* api);
+Handling get_manual(HttpRequest request, const Api* api);
 Handling get_version(HttpRequest request, const Api* api);
 Handling get_healthz(HttpRequest request, const Api* api);
 Handling get_readyz(HttpRequest request, const Api* api);

@@ -58,6 +58,7 @@ std::optional<Target> parse_target(std::string_view target) {
     if (!parsed.authority && !target.starts_with('/')) return std::nullopt;
     target = next_part(target, '#');
     std::string_view path = next_part(target, '?');
+    parsed.folder = path.ends_with('/');
     if (!path.empty()) path.remove_prefix(1);
     while (!path.empty()) {
         auto segment = decode(next_part(path, '/'), false);
@@ -124,6 +125,7 @@ HttpRequest to_request(BeastRequest&& message, Target target, std::string host) 
     request.port = port_of_authority(authority_of(message, target));
     request.method = message.method_string();
     request.path = std::move(target.path);
+    request.folder = target.folder;
     request.query = std::move(target.query);
     for (const char* name : kHeadersRead) {
         const auto field = message.find(name);

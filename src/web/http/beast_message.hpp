@@ -22,6 +22,7 @@ struct Target {
     std::vector<std::string> path;
     std::multimap<std::string, std::string> query;  ///< decoded, repeated names kept
     std::optional<std::string> authority;           ///< of an absolute target: "host:80"
+    bool folder = false;                            ///< the path ends with '/'
 };
 /// Parses a target; nullopt for another form, a broken percent-encoding, or invalid UTF-8.
 std::optional<Target> parse_target(std::string_view target);

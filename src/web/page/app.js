@@ -3,6 +3,7 @@ import {forgetToken, gateway, hasToken, introduce, offers} from './api.js';
 import {attribute, choice, h, replace, text} from './dom.js';
 import {language, languages, store, stored, t} from './language.js';
 import {discoveryView} from './discovery.js';
+import {helpLink} from './help.js';
 import {latencyView} from './latency.js';
 import {live} from './live.js';
 import {overviewView, tone} from './overview.js';
@@ -18,12 +19,15 @@ const VIEWS = {'': overviewView, scope: scopeView, latency: latencyView, points:
     clients: clientsView, request: requestView, discovery: discoveryView, settings: settingsView, station: stationView};
 const NAMED = {'': 'overview', scope: 'scope', latency: 'latency', points: 'points', relays: 'relays', clients: 'clients',
     request: 'request', discovery: 'discovery', settings: 'settings'};
+/** Sections of the manual's page on this page: what the view is called in English. */
+const EXPLAINED = {...NAMED, '': 'overview', scope: 'bus-scope', settings: 'configuration', station: 'a-station'};
 /** Views that a gateway may not have the paths for. */
 const NEEDS = {discovery: 'POST /api/v1/lines/{}/discover'};
 const THEMES = ['auto', 'light', 'dark'];
 
 const main = document.getElementById('main');
 const banner = document.getElementById('banner');
+const help = helpLink();
 let shown = null;
 
 function theme(chosen) {
@@ -38,7 +42,7 @@ function tools(...who) {
     text(document.getElementById('skip'), t('skip'));
     replace(document.getElementById('tools'), who,
         choice(t('language'), languages, language, (chosen) => { store('language', chosen); location.reload(); }),
-        choice(t('theme'), THEMES.map((name) => [name, t('theme.' + name)]), stored('theme') ?? 'auto', theme));
+        choice(t('theme'), THEMES.map((name) => [name, t('theme.' + name)]), stored('theme') ?? 'auto', theme), help.node);
 }
 
 function build() {
@@ -74,6 +78,7 @@ function show() {
     shown.update?.();
     for (const link of document.querySelectorAll('#nav a')) attribute(link, 'aria-current', link.dataset.view === view ? 'page' : null);
     entitle();
+    help.update(EXPLAINED[view], NAMED[view] ? t('nav.' + NAMED[view]) : t('station'));
     main.dataset.view = view;
     window.scrollTo(0, 0);
 }
@@ -103,6 +108,7 @@ async function enter() {
     forgetToken();
     if (forgotten && await known()) return;
     tools();
+    help.update(null, t('token'));
     await signIn(main, forgotten);
 }
 

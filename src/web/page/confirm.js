@@ -3,6 +3,7 @@ import {Refused, get, offers, path, put} from './api.js';
 import {h, replace} from './dom.js';
 import {explain} from './frame.js';
 import {frameView} from './frame_view.js';
+import {explained, problemPage} from './help.js';
 import {bytesOf} from './timeline.js';
 import {t} from './language.js';
 import {remember, shownValue} from './point_values.js';
@@ -31,9 +32,10 @@ export function confirm(title, content, action) {
 /** Why something was refused, in the gateway's words. */
 export function refusal(error) {
     const problem = error instanceof Refused ? error.problem : {detail: String(error)};
+    const page = problemPage(problem);
     const facts = [error.status || null, problem.rule, problem.transmitted === false ? t('not.sent') : problem.transmitted ? t('was.sent') : null];
     return h('p', {class: 'refusal', role: 'alert'}, h('strong', {lang: 'en'}, problem.detail ?? t('unreachable')), ' ',
-        h('small', null, facts.filter(Boolean).join(' · ')));
+        h('small', null, facts.filter(Boolean).join(' · '), page ? [' · ', explained(page, problem.title)] : null));
 }
 
 /** The frame of a plan, or nothing where the gateway does not tell it. */

@@ -1,5 +1,6 @@
 // What the line doctor has found, in the reader's language: made of the finding's cause and figures.
 import {h} from './dom.js';
+import {explained, findingPage} from './help.js';
 import {language, said, t} from './language.js';
 
 /** Causes that concern the whole line, or may; all others without a station are of one that is not listed. */
@@ -38,5 +39,5 @@ export function findingNote(finding) {
     const advice = sentence('advice', adviceKeys(known), known, finding.advice);
     const evidence = sentence('evidence', evidenceKeys(known), known, finding.evidence);
     return h('li', {class: 'finding', 'data-cause': finding.cause}, h('strong', {lang: wrong.lang}, wrong.text), ' ',
-        h('span', {lang: advice.lang}, advice.text), evidence.text ? h('small', {lang: evidence.lang}, evidence.text) : null);
+        h('span', {lang: advice.lang}, advice.text), ' ', explained(findingPage(finding.cause), finding.cause), evidence.text ? h('small', {lang: evidence.lang}, evidence.text) : null);
 }

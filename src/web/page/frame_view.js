@@ -2,6 +2,7 @@
 import {get, offers, path} from './api.js';
 import {h} from './dom.js';
 import {explain, hex} from './frame.js';
+import {exceptionPage, explained} from './help.js';
 import {t} from './language.js';
 
 const REMEMBERED = 2000;
@@ -21,9 +22,14 @@ export function notations(station, table, address, count) {
     return known.get(key);
 }
 
+function exception(code) {
+    const known = t('exception.' + code).replace(/^exception\.\d+$/, String(code));
+    return [known, ' ', explained(exceptionPage(code), known)];
+}
+
 function value(field, found, names) {
     if (field.kind === 'function') return t('fn.' + (field.value & 0x7F)).replace(/^fn\.\d+$/, '');
-    if (field.kind === 'exception') return t('exception.' + field.value).replace(/^exception\.\d+$/, '');
+    if (field.kind === 'exception') return exception(field.value);
     if (field.kind === 'address' && names[0]) return `${field.value} → ${names[0]}`;
     if (field.kind === 'station' && field.value === 0) return t('broadcast');
     if (field.kind === 'values') return found.values.map((one, i) => names[i] ? `${names[i]} = ${one}` : one).join('  ');

@@ -12,6 +12,8 @@ export const words = {
 "nav.settings": ["Configuration", "Konfiguration", "설정", "設定"],
 "skip": ["Skip to the content", "Zum Inhalt springen", "본문으로 건너뛰기", "本文へ移動"],
 "menu": ["Menu", "Menü", "메뉴", "メニュー"],
+"help": ["Help: {about}", "Hilfe: {about}", "도움말: {about}", "ヘルプ: {about}"],
+"help.more": ["In the manual", "Im Handbuch", "설명서에서", "マニュアルで"],
 "language": ["Language", "Sprache", "언어", "言語"],
 "theme": ["Theme", "Farbschema", "테마", "テーマ"],
 "theme.auto": ["Auto", "Auto", "자동", "自動"],

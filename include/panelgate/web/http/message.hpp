@@ -96,6 +96,7 @@ struct HttpRequest {
     std::vector<std::string> arguments;  ///< segments matched by the route's {}
     std::shared_ptr<Caller> caller;
     Role role = Role::none;  ///< of the client
+    bool folder = false;     ///< the path ends with '/'
 };
 /// The request headers that are read; each may occur once.
 inline constexpr const char* kHeadersRead[] = {

@@ -32,6 +32,8 @@ TEST(Target, CutsAPathIntoSegmentsAndDecodesThem) {
     EXPECT_THAT(parse_target("/")->path, IsEmpty());
     EXPECT_THAT(parse_target("/a/b%20c/d%2Fe/f+g")->path, ElementsAre("a", "b c", "d/e", "f+g"));
     EXPECT_THAT(parse_target("/a//b/")->path, ElementsAre("a", "", "b"));
+    EXPECT_TRUE(parse_target("/a//b/?c=d")->folder);
+    EXPECT_FALSE(parse_target("/a//b?c=d/")->folder);
     EXPECT_THAT(parse_target("/%C3%A4?t=%E2%82%AC")->path, ElementsAre("\xC3\xA4"));
     for (const char* text : {"", "a", "ftp://x/", "http:/x", "*", "/%", "/%4", "/%4x", "/%%41",
                              "/% 1", "/a?b=%x",  // from here on: what is not UTF-8
