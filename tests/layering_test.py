@@ -27,7 +27,7 @@ LIBRARIES = {
     "yaml-cpp": ("yaml-cpp/",),
     "zlib": ("zlib.h",),
 }
-THIRD_PARTY = re.compile(r"^((boost|yaml-cpp|prometheus|spdlog|fmt|CLI|gtest|gmock|openssl)/|(zlib|mosquitto)\.h$)")
+THIRD_PARTY = re.compile(r"^((boost|openssl|yaml-cpp|prometheus|spdlog|fmt|CLI|gtest|gmock)/|(zlib|mosquitto)\.h$)")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 CLOCK = re.compile(r"::now\s*\(")
 DETACHED = re.compile(r"\bdetached\b")
