@@ -214,6 +214,26 @@ TEST(ConfigLoad, AProfilesDirAddsToTheShippedProfilesAndReplacesThem) {
               config.profiles->find("generic")->areas.size());
 }
 
+TEST(ConfigLoad, ARelativeProfilesDirIsBesideTheConfigurationFile) {
+    const auto generic =
+        RealFiles().read(std::string(SOURCE_ROOT) + "/config/profiles/generic.yaml").value();
+    const MemoryFiles files({{"/etc/pg/p/own-panel.yaml", generic},
+                             {"here/p/own-panel.yaml", generic},
+                             {"p/own-panel.yaml", generic},
+                             {"/q/own-panel.yaml", generic}});
+    const std::string rest =
+        kSimple + "    stations: [{id: 1, profile: own-panel}]\n" + kServe + "profiles_dir: ";
+    // a text on standard input, or from a pipe, has no folder of its own
+    for (const char* file : {"/etc/pg/f.yaml", "here/f.yaml", "f.yaml", "/dev/stdin", "/dev/fd/63",
+                             "/proc/self/fd/5"}) {
+        EXPECT_EQ(load_valid(rest + "p", files, file).profiles_dir, "p") << file;
+        EXPECT_EQ(load_valid(rest + "/q", files, file).profiles_dir, "/q") << file;
+    }
+    yaml::Problems problems("/etc/pg/f.yaml");
+    EXPECT_FALSE(load(kSimple + kServe + "profiles_dir: ../x", files, problems));
+    EXPECT_THAT(problems.text(), HasSubstr("cannot list the directory /etc/x"));
+}
+
 TEST(ConfigLoad, NothingIsReturnedWhenAnythingIsWrong) {
     EXPECT_EQ(problems_of(kSimple + kServe + "colour: red\n").list().size(), 1U);
 }
