@@ -21,12 +21,13 @@ LIBRARIES = {
     "Boost.Multiprecision": ("boost/multiprecision/",),
     "CLI11": ("CLI/",),
     "libmosquitto": ("mosquitto.h",),
+    "OpenSSL": ("openssl/",),
     "prometheus-cpp": ("prometheus/",),
     "spdlog": ("spdlog/", "fmt/"),
     "yaml-cpp": ("yaml-cpp/",),
     "zlib": ("zlib.h",),
 }
-THIRD_PARTY = re.compile(r"^((boost|yaml-cpp|prometheus|spdlog|fmt|CLI|gtest|gmock)/|(zlib|mosquitto)\.h$)")
+THIRD_PARTY = re.compile(r"^((boost|openssl|yaml-cpp|prometheus|spdlog|fmt|CLI|gtest|gmock)/|(zlib|mosquitto)\.h$)")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 CLOCK = re.compile(r"::now\s*\(")
 DETACHED = re.compile(r"\bdetached\b")

@@ -38,7 +38,7 @@ std::string without_brackets(const std::string& text) {
 void load_hosts(Loading& loading, yaml::MapReader& in, web::Settings& settings) {
     const yaml::Node* list = in.sequence("hosts");
     in.looks_like("hosts", "^\\[?[A-Za-z0-9._:-]+\\]?$", true);
-    in.entries("hosts", 1, 0);
+    in.schema("hosts").fewest = 1;
     if (list == nullptr) return;
     for (const yaml::Node& item : list->items) {
         const std::string host = without_brackets(item.scalar);
@@ -131,10 +131,13 @@ web::Token load_token(Loading& loading, const Node& node) {
     });
     web::Token token;
     token.name = in.required_text("name").value_or("");
-    constexpr std::array<std::pair<std::string_view, web::Role>, 2> kRoles{
-        {{"viewer", web::Role::viewer}, {"operator", web::Role::operator_}}};
+    constexpr std::array<std::pair<std::string_view, Role>, 4> kRoles{
+        {{"viewer", Role::viewer},
+         {"operator", Role::operator_},
+         {"engineer", Role::engineer},
+         {"admin", Role::admin}}};
     if (in.required_text("role"))
-        token.role = in.choice<web::Role>("role", kRoles).value_or(web::Role::viewer);
+        token.role = in.choice<Role>("role", kRoles).value_or(Role::viewer);
     token.secret = load_secret(loading, in, elsewhere, token);
     token_keys().read(in, token);
     in.finish();

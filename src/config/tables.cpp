@@ -22,8 +22,8 @@ const Keys<Config>& root_keys() {
     static const auto kKeys =
         Keys<Config>()
             .other("profiles_dir",
-                   "Folder of further panel profiles; its *.yaml add to the shipped ones "
-                   "or replace them.",
+                   "Folder of further panel profiles, relative to this file; its *.yaml add to "
+                   "the shipped ones or replace them.",
                    [](const Config& config) { return config.profiles_dir; })
             .other("templates",
                    "Keys that many stations share, by the template's name: all of a "

@@ -191,10 +191,10 @@ TEST(ConfigLoad, ReadsByWhichNamesAndFromWhereAndWithWhichTokensHttpMayBeAsked) 
     ASSERT_EQ(config.http->allow.size(), 2U);
     EXPECT_EQ(config.http->allow[0].address, "10.0.0.0");
     EXPECT_EQ(config.http->allow[0].prefix, 8U);
-    EXPECT_EQ(config.http->anonymous, web::Role::none);
+    EXPECT_EQ(config.http->anonymous, Role::none);
     ASSERT_EQ(config.http->tokens.size(), 1U);
     EXPECT_EQ(config.http->tokens[0].name, "ops");
-    EXPECT_EQ(config.http->tokens[0].role, web::Role::operator_);
+    EXPECT_EQ(config.http->tokens[0].role, Role::operator_);
     EXPECT_EQ(config.http->tokens[0].secret, "s3cret");
     EXPECT_EQ(config.log.level, rt::LogLevel::trace);
     EXPECT_EQ(config.log.format, rt::LogFormat::json);
@@ -212,6 +212,26 @@ TEST(ConfigLoad, AProfilesDirAddsToTheShippedProfilesAndReplacesThem) {
     ASSERT_NE(config.profiles->find("omron-cp2e"), nullptr);
     EXPECT_EQ(config.profiles->find("panasonic-gt")->areas.size(),
               config.profiles->find("generic")->areas.size());
+}
+
+TEST(ConfigLoad, ARelativeProfilesDirIsBesideTheConfigurationFile) {
+    const auto generic =
+        RealFiles().read(std::string(SOURCE_ROOT) + "/config/profiles/generic.yaml").value();
+    const MemoryFiles files({{"/etc/pg/p/own-panel.yaml", generic},
+                             {"here/p/own-panel.yaml", generic},
+                             {"p/own-panel.yaml", generic},
+                             {"/q/own-panel.yaml", generic}});
+    const std::string rest =
+        kSimple + "    stations: [{id: 1, profile: own-panel}]\n" + kServe + "profiles_dir: ";
+    // a text on standard input, or from a pipe, has no folder of its own
+    for (const char* file : {"/etc/pg/f.yaml", "here/f.yaml", "f.yaml", "/dev/stdin", "/dev/fd/63",
+                             "/proc/self/fd/5"}) {
+        EXPECT_EQ(load_valid(rest + "p", files, file).profiles_dir, "p") << file;
+        EXPECT_EQ(load_valid(rest + "/q", files, file).profiles_dir, "/q") << file;
+    }
+    yaml::Problems problems("/etc/pg/f.yaml");
+    EXPECT_FALSE(load(kSimple + kServe + "profiles_dir: ../x", files, problems));
+    EXPECT_THAT(problems.text(), HasSubstr("cannot list the directory /etc/x"));
 }
 
 TEST(ConfigLoad, NothingIsReturnedWhenAnythingIsWrong) {
@@ -450,7 +470,7 @@ TEST(ConfigShipped, TheDemoHasTheFivePanelsOfTheContract) {
               "oven 20 panasonic-gt\nfiller 1 omron-cp2e\n");
     EXPECT_EQ(config.modbus_tcp.at(0).name(), "127.0.0.1:1502");
     EXPECT_EQ(config.http->name(), "127.0.0.1:8080");
-    EXPECT_EQ(config.http->anonymous, web::Role::operator_);
+    EXPECT_EQ(config.http->anonymous, Role::operator_);
 }
 
 }  // namespace

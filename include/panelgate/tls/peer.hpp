@@ -1,0 +1,25 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+struct x509_st;
+
+namespace panelgate::tls {
+
+/// The role in a client's certificate, Modbus/TCP Security: one UTF8String, the whole of it one
+/// role.
+inline constexpr std::string_view kRoleExtension = "1.3.6.1.4.1.50316.802.1";
+
+/// Who is at the other end, as its certificate says.
+struct Peer {
+    std::string subject;              ///< "CN=panel PC 3,O=Plant"; "" without a certificate
+    std::optional<std::string> role;  ///< none: no such extension, or none that counts
+    std::string role_fault;           ///< why an extension does not count; "" if it does
+};
+
+/// Reads a certificate; null: nobody. Long names are cut off, control characters replaced.
+Peer peer_of(const x509_st* certificate);
+
+}  // namespace panelgate::tls

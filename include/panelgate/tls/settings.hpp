@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "panelgate/base/time.hpp"
+
+namespace panelgate::tls {
+
+/// Whether clients show a certificate. One that is shown must always be good.
+enum class ClientCertificate : std::uint8_t { none, optional, required };
+enum class Version : std::uint8_t { tls12, tls13 };
+
+/// The contents of the files, in PEM form; "" for a file that is not named.
+struct Material {
+    std::string certificate;
+    std::string key;
+    std::string ca;
+    std::string crl;
+    friend bool operator==(const Material&, const Material&) = default;
+};
+
+/// Settings of the `tls` map of a listener.
+struct Settings {
+    std::string certificate;  ///< path: the server's certificate, then those up to its CA
+    std::string key;          ///< path
+    std::string ca;           ///< path: who may have signed a client's certificate
+    std::string crl;          ///< path: certificates that their CA has revoked; "" none
+    ClientCertificate client = ClientCertificate::none;
+    bool role_from_certificate = false;
+    Version lowest = Version::tls12;
+    Duration handshake_timeout = 10s;
+    std::size_t max_handshakes = 128;  ///< at the same time; beyond it the oldest gives way
+    std::size_t max_handshakes_per_address = 16;
+    Material material{};
+    friend bool operator==(const Settings&, const Settings&) = default;
+};
+
+}  // namespace panelgate::tls

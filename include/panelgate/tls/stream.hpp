@@ -1,0 +1,222 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/compose.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/system/error_code.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "panelgate/base/time.hpp"
+#include "panelgate/tls/peer.hpp"
+
+namespace panelgate::tls {
+
+class Engine;
+
+/// A connection, plain or with TLS, chosen at run time: plain until secure(). Meets Asio's
+/// AsyncReadStream and AsyncWriteStream. One read and one write at a time; whoever owns it keeps it
+/// alive until both have ended. Never blocks. One thread.
+class Stream {
+  public:
+    using executor_type = boost::asio::any_io_executor;
+    /// What has arrived and is not read.
+    enum class Input : std::uint8_t { none, bytes, end, broken };
+
+    explicit Stream(boost::asio::ip::tcp::socket socket);
+    ~Stream();
+    Stream(const Stream&) = delete;
+    Stream& operator=(const Stream&) = delete;
+
+    /// From now on it speaks TLS; the handshake is over.
+    void secure(std::shared_ptr<Engine> engine);
+    bool is_secure() const { return engine_ != nullptr; }
+    /// Who is at the other end; nobody before secure().
+    const Peer& peer() const { return peer_; }
+
+    executor_type get_executor() { return socket_.get_executor(); }
+    /// For its addresses, options and wait operations. Bytes go through this class.
+    boost::asio::ip::tcp::socket& socket() { return socket_; }
+    const boost::asio::ip::tcp::socket& socket() const { return socket_; }
+
+    template <class Buffers, class Token>
+    auto async_read_some(const Buffers& buffers, Token&& token);
+    template <class Buffers, class Token>
+    auto async_write_some(const Buffers& buffers, Token&& token);
+    /// Writes what can be written at once; would_block if nothing. After would_block the next write
+    /// must begin with the same bytes, and have as many of them or more.
+    std::size_t write_some(boost::asio::const_buffer bytes, boost::system::error_code& error);
+    /// Looks without reading; only while no read is pending.
+    Input look();
+    /// Bytes in the socket that are not read, encrypted or not.
+    std::size_t available() const;
+
+    /// If an operation is pending by then, it fails and the connection is closed.
+    void expires_after(Duration patience);
+    /// Tells the client that nothing more is sent.
+    void shutdown_send();
+    /// Idempotent. Pending operations fail.
+    void close();
+
+  private:
+    enum class Need : std::uint8_t { nothing, readable, writable };
+    struct Step {
+        std::size_t bytes = 0;
+        boost::system::error_code error{};
+        Need need = Need::nothing;
+    };
+    template <class Buffers>
+    struct Read;
+    template <class Buffers>
+    struct Write;
+
+    Step read_secure(boost::asio::mutable_buffer into);
+    Step write_secure(boost::asio::const_buffer bytes);
+    Step step_of(int result);
+
+    template <class Op>
+    void wait(Need need, Op&& op) {
+        const auto what = need == Need::writable ? boost::asio::ip::tcp::socket::wait_write
+                                                 : boost::asio::ip::tcp::socket::wait_read;
+        socket_.async_wait(what, std::forward<Op>(op));
+    }
+
+    boost::asio::ip::tcp::socket socket_;
+    std::shared_ptr<Engine> engine_;  ///< null: plain
+    Peer peer_;
+    boost::asio::steady_timer timer_;
+    int pending_ = 0;  ///< operations
+    std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+};
+
+/// The first part of a read: a buffer that is not empty.
+template <class Buffers>
+boost::asio::mutable_buffer first_of(const Buffers& buffers) {
+    const auto end = boost::asio::buffer_sequence_end(buffers);
+    for (auto at = boost::asio::buffer_sequence_begin(buffers); at != end; ++at) {
+        const boost::asio::mutable_buffer one(*at);
+        if (one.size() > 0) return one;
+    }
+    return {};
+}
+
+template <class Buffers>
+struct Stream::Read {
+    enum class At : std::uint8_t { begin, plain, waited, posted };
+
+    Stream& stream;
+    Buffers buffers;
+    At at = At::begin;
+    Step step{};
+
+    template <class Self>
+    void operator()(Self& self, boost::system::error_code error = {}, std::size_t size = 0) {
+        Stream& on = stream;
+        if (at == At::begin && !on.is_secure()) {
+            at = At::plain;
+            const Buffers into = buffers;
+            return on.socket_.async_read_some(into, std::move(self));
+        }
+        if (at == At::plain) return end(self, error, size);
+        if (at == At::posted) return end(self, step.error, step.bytes);
+        if (error) return end(self, error, 0);
+        step = on.read_secure(first_of(buffers));
+        const bool inside =
+            at == At::begin;  // of the call that begins it: no handler may run there
+        if (step.need != Need::nothing) {
+            at = At::waited;
+            return on.wait(step.need, std::move(self));
+        }
+        if (!inside) return end(self, step.error, step.bytes);
+        at = At::posted;
+        boost::asio::post(on.get_executor(), std::move(self));
+    }
+    template <class Self>
+    void end(Self& self, boost::system::error_code error, std::size_t size) {
+        --stream.pending_;
+        self.complete(error, size);
+    }
+};
+
+/// Several small buffers become one record.
+template <class Buffers>
+struct Stream::Write {
+    enum class At : std::uint8_t { begin, plain, waited, posted };
+    static constexpr std::size_t kRecord = 16 * 1024;
+
+    Stream& stream;
+    Buffers buffers;
+    At at = At::begin;
+    Step step{};
+    std::string gathered{};
+
+    template <class Self>
+    void operator()(Self& self, boost::system::error_code error = {}, std::size_t size = 0) {
+        Stream& on = stream;
+        if (at == At::begin && !on.is_secure()) {
+            at = At::plain;
+            const Buffers from = buffers;
+            return on.socket_.async_write_some(from, std::move(self));
+        }
+        if (at == At::plain) return end(self, error, size);
+        if (at == At::posted) return end(self, step.error, step.bytes);
+        if (error) return end(self, error, 0);
+        const bool inside = at == At::begin;
+        step = on.write_secure(inside ? record() : again());
+        if (step.need != Need::nothing) {
+            at = At::waited;
+            return on.wait(step.need, std::move(self));
+        }
+        if (!inside) return end(self, step.error, step.bytes);
+        at = At::posted;
+        boost::asio::post(on.get_executor(), std::move(self));
+    }
+    boost::asio::const_buffer record() {
+        const boost::asio::const_buffer first = whole();
+        if (first.size() == boost::asio::buffer_size(buffers) || first.size() >= kRecord)
+            return first;
+        gathered.resize(std::min(kRecord, boost::asio::buffer_size(buffers)));
+        boost::asio::buffer_copy(boost::asio::buffer(gathered), buffers);
+        return boost::asio::buffer(gathered);
+    }
+    boost::asio::const_buffer again() {
+        return gathered.empty() ? whole()
+                                : boost::asio::const_buffer(boost::asio::buffer(gathered));
+    }
+    /// The first buffer that is not empty.
+    boost::asio::const_buffer whole() const {
+        const auto last = boost::asio::buffer_sequence_end(buffers);
+        for (auto one = boost::asio::buffer_sequence_begin(buffers); one != last; ++one) {
+            const boost::asio::const_buffer bytes(*one);
+            if (bytes.size() > 0) return bytes;
+        }
+        return {};
+    }
+    template <class Self>
+    void end(Self& self, boost::system::error_code error, std::size_t size) {
+        --stream.pending_;
+        self.complete(error, size);
+    }
+};
+
+template <class Buffers, class Token>
+auto Stream::async_read_some(const Buffers& buffers, Token&& token) {
+    ++pending_;
+    return boost::asio::async_compose<Token, void(boost::system::error_code, std::size_t)>(
+        Read<Buffers>{*this, buffers}, token, socket_);
+}
+
+template <class Buffers, class Token>
+auto Stream::async_write_some(const Buffers& buffers, Token&& token) {
+    ++pending_;
+    return boost::asio::async_compose<Token, void(boost::system::error_code, std::size_t)>(
+        Write<Buffers>{*this, buffers}, token, socket_);
+}
+
+}  // namespace panelgate::tls

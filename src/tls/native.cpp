@@ -1,0 +1,67 @@
+#include "native.hpp"
+
+#include <openssl/asn1.h>
+#include <openssl/err.h>
+#include <openssl/pem.h>
+#include <algorithm>
+#include <cstdint>
+#include <ctime>
+
+namespace panelgate::tls {
+namespace {
+
+constexpr std::size_t kLongestName = 200;
+
+int no_password(char*, int, int, void*) { return 0; }
+
+template <class T, class Read>
+std::vector<Owned<T>> all_of(std::string_view pem, Read read) {
+    std::vector<Owned<T>> found;
+    const Owned<BIO> in = reader_of(pem);
+    while (T* one = read(in.get())) found.emplace_back(one);
+    ERR_clear_error();
+    return found;
+}
+
+}  // namespace
+
+Owned<BIO> reader_of(std::string_view text) {
+    return Owned<BIO>(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
+}
+
+std::vector<Owned<X509>> certificates_of(std::string_view pem) {
+    return all_of<X509>(
+        pem, [](BIO* in) { return PEM_read_bio_X509(in, nullptr, no_password, nullptr); });
+}
+
+std::vector<Owned<X509_CRL>> lists_of(std::string_view pem) {
+    return all_of<X509_CRL>(
+        pem, [](BIO* in) { return PEM_read_bio_X509_CRL(in, nullptr, no_password, nullptr); });
+}
+
+Owned<EVP_PKEY> key_of(std::string_view pem) {
+    const Owned<BIO> in = reader_of(pem);
+    Owned<EVP_PKEY> key(PEM_read_bio_PrivateKey(in.get(), nullptr, no_password, nullptr));
+    ERR_clear_error();
+    return key;
+}
+
+std::int64_t seconds_of(const ASN1_TIME* time) {
+    std::tm parts{};
+    if (ASN1_TIME_to_tm(time, &parts) != 1) return 0;
+    return ::timegm(&parts);
+}
+
+std::string subject_of(const X509* certificate) {
+    const Owned<BIO> out(BIO_new(BIO_s_mem()));
+    X509_NAME_print_ex(out.get(), X509_get_subject_name(certificate), 0,
+                       XN_FLAG_RFC2253 & ~static_cast<unsigned long>(ASN1_STRFLGS_ESC_MSB));
+    char* text = nullptr;
+    const long size = BIO_get_mem_data(out.get(), &text);
+    std::string subject(text, static_cast<std::size_t>(std::max(size, 0L)));
+    if (subject.size() > kLongestName) subject.resize(kLongestName);
+    std::ranges::replace_if(subject, [](unsigned char c) { return c < ' ' || c == 0x7f; }, '?');
+    return subject;
+}
+
+}  // namespace panelgate::tls

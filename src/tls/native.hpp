@@ -1,0 +1,36 @@
+#pragma once
+
+#include <openssl/bio.h>
+#include <openssl/evp.h>
+#include <openssl/ssl.h>
+#include <openssl/x509.h>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace panelgate::tls {
+
+/// Frees OpenSSL's objects.
+struct Free {
+    void operator()(BIO* bio) const { BIO_free_all(bio); }
+    void operator()(EVP_PKEY* key) const { EVP_PKEY_free(key); }
+    void operator()(X509* certificate) const { X509_free(certificate); }
+    void operator()(X509_CRL* list) const { X509_CRL_free(list); }
+    void operator()(SSL* ssl) const { SSL_free(ssl); }
+};
+template <class T>
+using Owned = std::unique_ptr<T, Free>;
+
+/// A view of text; it must outlive the result.
+Owned<BIO> reader_of(std::string_view text);
+/// All certificates of a PEM text, in order; what is none is skipped.
+std::vector<Owned<X509>> certificates_of(std::string_view pem);
+std::vector<Owned<X509_CRL>> lists_of(std::string_view pem);
+/// Null if there is none, or it is encrypted: nobody is asked for a password.
+Owned<EVP_PKEY> key_of(std::string_view pem);
+/// Seconds since 1970.
+std::int64_t seconds_of(const ASN1_TIME* time);
+std::string subject_of(const X509* certificate);
+
+}  // namespace panelgate::tls

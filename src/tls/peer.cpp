@@ -1,0 +1,68 @@
+#include "panelgate/tls/peer.hpp"
+
+#include <openssl/asn1.h>
+#include <openssl/err.h>
+#include <openssl/objects.h>
+#include <openssl/x509.h>
+#include <algorithm>
+#include <memory>
+
+#include "native.hpp"
+
+namespace panelgate::tls {
+namespace {
+
+constexpr std::size_t kLongestRole = 64;
+
+int nid_of_role() {
+    static const int kNid = [] {
+        const std::string oid(kRoleExtension);
+        const int known = OBJ_txt2nid(oid.c_str());
+        return known != NID_undef ? known : OBJ_create(oid.c_str(), "modbusRole", "Modbus role");
+    }();
+    return kNid;
+}
+
+struct FreeText {
+    void operator()(ASN1_UTF8STRING* text) const { ASN1_UTF8STRING_free(text); }
+};
+
+/// The text of an extension; a fault in `peer` where it is no role.
+void read_role(const ASN1_OCTET_STRING* value, Peer& peer) {
+    const unsigned char* at = ASN1_STRING_get0_data(value);
+    const unsigned char* const end = at + ASN1_STRING_length(value);
+    const std::unique_ptr<ASN1_UTF8STRING, FreeText> text(
+        d2i_ASN1_UTF8STRING(nullptr, &at, ASN1_STRING_length(value)));
+    ERR_clear_error();
+    if (!text || at != end) {
+        peer.role_fault = "its role is not one UTF8String";
+        return;
+    }
+    const auto* const begin = reinterpret_cast<const char*>(ASN1_STRING_get0_data(text.get()));
+    std::string role(begin, static_cast<std::size_t>(ASN1_STRING_length(text.get())));
+    const bool has_control =
+        std::ranges::any_of(role, [](unsigned char c) { return c < ' ' || c == 0x7f; });
+    if (role.empty() || role.size() > kLongestRole || has_control) {
+        peer.role_fault = "its role is not a word of 1 to 64 characters";
+        return;
+    }
+    peer.role = std::move(role);
+}
+
+}  // namespace
+
+Peer peer_of(const x509_st* certificate) {
+    Peer peer;
+    if (certificate == nullptr) return peer;
+    peer.subject = subject_of(certificate);
+    const int at = X509_get_ext_by_NID(certificate, nid_of_role(), -1);
+    if (at < 0) return peer;
+    if (X509_get_ext_by_NID(certificate, nid_of_role(), at) >= 0) {
+        peer.role_fault = "it has more than one role";
+        return peer;
+    }
+    read_role(X509_EXTENSION_get_data(X509_get_ext(certificate, at)), peer);
+    return peer;
+}
+
+}  // namespace panelgate::tls
