@@ -18,7 +18,8 @@ ADDED = {"log_client": ("info", ["client"]), "shared_->log": ("", ["listener"]),
 ELSEWHERE = {"write": ("", ["line", "station", "client", "at", "pdu", "outcome", "transaction"]),
              "listening": ("", ["modbus_tcp", "http"]), "listener waits": ("", ["modbus_tcp", "http"]),
              "log lines left out": ("", ["of", "client", "clients", "count"]),
-             "log lines dropped": ("", ["count"]), "connection closed": ("info, warn", []),
+             "log lines dropped": ("", ["count"]), "tls handshake failed": ("info, warn", []),
+             "connection closed": ("info, warn", []),
              "connection gives way": ("info, warn", []),
              "datagram refused": ("debug, info, warn", [])}
 MEANINGS = {
@@ -80,6 +81,7 @@ MEANINGS = {
     "station online": "a panel answers again",
     "stopped at once": "a second signal ended the program before all was answered",
     "stopping": "the program ends: nothing more is accepted",
+    "tls handshake failed": "a client did not get in by TLS, and why",
     "write": "a write, by whom, where, its frame and its outcome",
     "write refused": "a write by REST that was not allowed, and why",
 }

@@ -33,7 +33,7 @@ class Command:
         self.entries, self.examples, self.notes = [], [], []
         inside = shown = False
         for line in lines[at + 1:]:
-            if line.endswith(":") and not line.startswith(" "):
+            if re.match(r"\w+:$", line):
                 shown = line.startswith("Example")
                 inside = not shown
             elif shown and line.startswith("  "):
