@@ -9,6 +9,7 @@
 
 #include "hints.hpp"
 #include "load_access.hpp"
+#include "load_tls.hpp"
 #include "loader.hpp"
 #include "panelgate/config/describe.hpp"
 #include "panelgate/config/endpoint.hpp"
@@ -319,8 +320,14 @@ void load_allow(Loading& loading, MapReader& in, std::vector<Network>& allow) {
 
 constexpr std::string_view kNoNetwork = "name at least one network, or leave it out for all";
 
-void refuse_tls(MapReader& in) {
-    in.refuse("tls", "is not in this version; remove it and listen on a trusted network only");
+constexpr std::uint16_t kSecurePort = 802;  // Modbus/TCP Security
+
+void load_secure(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
+    settings.tls = load_tls(loading, in);
+    if (!settings.tls) return;
+    if (!in.has("listen")) settings.port = kSecurePort;
+    if (settings.udp)
+        in.problem("udp", "datagrams are not encrypted by tls; leave one of them out");
 }
 
 /// Keys that users write as for the serial lines of other programs.
@@ -340,7 +347,7 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     load_framing(in, settings);
     load_diagnostics(loading, in, settings);
     load_allow(loading, in, settings.allow);
-    refuse_tls(in);
+    load_secure(loading, in, settings);
     refuse_empty_access(in);
     refuse_empty(in, "allow", kNoNetwork);
     in.finish();
@@ -385,7 +392,7 @@ void load_http(Loading& loading, MapReader& root) {
     load_hosts(loading, in, settings);
     load_allow(loading, in, settings.allow);
     load_tokens(loading, in, settings.tokens);
-    refuse_tls(in);
+    settings.tls = load_tls(loading, in);
     refuse_empty(in, "hosts", "name at least one host, or leave it out for the machine's names");
     refuse_empty(in, "allow", kNoNetwork);
     refuse_empty(in, "tokens", "give at least one token, or leave it out");

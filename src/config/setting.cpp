@@ -1,6 +1,7 @@
 #include "panelgate/config/setting.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <ranges>
 #include <span>
 #include <string>
@@ -77,6 +78,14 @@ void show_access(const SettingWriter& section, const tcp_server::Settings& setti
                                    target.line + '/' + std::to_string(target.station));
 }
 
+void show_tls(const SettingWriter& listener, const std::optional<tls::Settings>& settings) {
+    if (!settings) return;
+    const SettingWriter section = listener.item("tls");
+    tls_keys().show(section, *settings);
+    const tls::Material& files = settings->material;
+    section.put_secret("files", files.certificate + files.key + files.ca + files.crl);
+}
+
 void show_http(const SettingWriter& top, const web::Settings& settings) {
     const SettingWriter section = top.item("http");
     http_keys().show(section, settings);
@@ -85,6 +94,7 @@ void show_http(const SettingWriter& top, const web::Settings& settings) {
         token_keys().show(one, token);
         one.put_secret("secret", token.secret);
     }
+    show_tls(section, settings.tls);
 }
 
 void show_servers(const SettingWriter& top, const Config& config) {
@@ -93,6 +103,7 @@ void show_servers(const SettingWriter& top, const Config& config) {
         const SettingWriter section = top.item("modbus_tcp", listeners.name(settings.name()));
         show_access(section, settings);
         listener_keys().show(section, settings);
+        show_tls(section, settings.tls);
     }
     for (const serial_server::Settings& settings : config.serial_masters) {
         const SettingWriter section = top.item("serial_masters", settings.name);

@@ -1,7 +1,9 @@
 #include "panelgate/tcp_server/dispatch.hpp"
 
 #include <algorithm>
+#include <array>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -71,6 +73,11 @@ std::vector<bus::BusClient*> UnitMap::broadcast_lines(std::uint8_t unit) const {
 Caller::Caller(std::string name, bus::Host host, std::string protocol)
     : name_(std::move(name)), protocol_(std::move(protocol)), host_(host) {}
 
+bool Caller::reads_only() const {
+    constexpr std::array<std::string_view, 3> kWriters{"operator", "engineer", "admin"};
+    return certificate_role_ && !std::ranges::count(kWriters, *certificate_role_);
+}
+
 void Caller::transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,
                       bus::AnswerHandler handler) {
     use(bus);
@@ -132,14 +139,16 @@ Decision decide_broadcast(std::uint8_t function, Result<modbus::Request> request
 
 }  // namespace
 
-Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const UnitMap& units) {
+Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const UnitMap& units,
+                bool reads_only) {
     if (pdu.empty()) return refuse(Fault::malformed);
     auto request = modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::fit);
     if (!request && request.error() == Fault::denied) return refuse(Fault::denied);
     const bool itself = settings.diagnostics_unit == unit && !units.is_alias(unit);
     const bool writes = !modbus::is_pure_read(pdu);  // also if malformed
     if (itself) return Diagnose{};                   // nothing in it is writable
-    if (writes && settings.read_only) return refuse(Fault::denied, targets_of(unit, units));
+    if (writes && (settings.read_only || reads_only))
+        return refuse(Fault::denied, targets_of(unit, units));
 
     const bool broadcast = !units.broadcast_lines(unit).empty();
     const Result<Target> target = units.route(unit);

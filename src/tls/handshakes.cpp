@@ -196,9 +196,12 @@ Handshakes::Handshakes(asio::any_io_executor executor, std::string name, Setting
 
 Handshakes::~Handshakes() = default;
 
-void Handshakes::apply(const Settings& settings) {
+void Handshakes::apply(const Settings& settings) try {
     if (settings == settings_) return;
     apply(settings, std::make_shared<const Context>(settings));
+} catch (const Unusable& why) {
+    rt::log(rt::LogLevel::error, "certificate not renewed",
+            {{"listener", name_}, {"reason", why.what()}});
 }
 
 void Handshakes::apply(const Settings& settings, std::shared_ptr<const Context> context) {

@@ -3,8 +3,10 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -71,6 +73,11 @@ class Caller {
 
     const std::string& name() const { return name_; }
     bus::Host host() const { return host_; }
+    /// The role in its certificate, where its listener goes by that; "" none, which is the least.
+    void take_role(std::string role) { certificate_role_ = std::move(role); }
+    const std::optional<std::string>& certificate_role() const { return certificate_role_; }
+    /// By its certificate: only operators and above write.
+    bool reads_only() const;
     /// Passes the request to a bus for one of its stations; station 0: broadcast.
     void transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,
                   bus::AnswerHandler handler);
@@ -87,6 +94,7 @@ class Caller {
     std::string protocol_;
     bus::Host host_;
     bus::ClientId client_ = bus::next_client_id();
+    std::optional<std::string> certificate_role_{};
     std::set<bus::RequestPort*> used_;
 };
 
@@ -107,9 +115,11 @@ struct Diagnose {};  ///< the gateway answers from its own registers
 using Decision = std::variant<Refuse, Forward, Broadcast, Diagnose>;
 
 /// Decides on a request in the order of EXC-08: function 0 or 128..255 is 01; a write through a
-/// read-only listener 01; an unrouted unit 0A; a write that its bus would refuse 01, before any
-/// other check; anything but a write (BC-02) to a broadcast unit 01; a PDU that is inconsistent
-/// with its function or cannot be answered 03. Queries the buses only for access rights.
-Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const UnitMap& units);
+/// read-only listener, or by a client that only reads, 01; an unrouted unit 0A; a write that its
+/// bus would refuse 01, before any other check; anything but a write (BC-02) to a broadcast unit
+/// 01; a PDU that is inconsistent with its function or cannot be answered 03. Queries the buses
+/// only for access rights.
+Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const UnitMap& units,
+                bool reads_only = false);
 
 }  // namespace panelgate::tcp_server
