@@ -70,30 +70,38 @@ std::vector<bus::BusClient*> UnitMap::broadcast_lines(std::uint8_t unit) const {
     return lines_;
 }
 
-Caller::Caller(std::string name, bus::Host host, std::string protocol)
-    : name_(std::move(name)), protocol_(std::move(protocol)), host_(host) {}
+Caller::Caller(std::string name, WhoRef who) : name_(std::move(name)), who_(std::move(who)) {}
 
-bool Caller::reads_only() const {
-    constexpr std::array<std::string_view, 3> kWriters{"operator", "engineer", "admin"};
-    return certificate_role_ && !std::ranges::count(kWriters, *certificate_role_);
+void Caller::certify(std::string subject, std::optional<std::string> role) {
+    Who who = *who_;
+    who.certificate = std::move(subject);
+    by_certificate_ = role.has_value();
+    if (role) {
+        constexpr std::array kRoles{Role::viewer, Role::operator_, Role::engineer, Role::admin};
+        const auto known =
+            std::ranges::find(kRoles, std::string_view(*role), [](Role one) { return label(one); });
+        who.role = known == kRoles.end() ? Role::none : *known;
+        who.certificate_role = std::move(*role);
+    }
+    who_ = make_who(std::move(who));
 }
 
 void Caller::transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,
                       bus::AnswerHandler handler) {
     use(bus);
     bus->transact(
-        {.station = station, .request = std::move(request), .client = client_, .host = host_},
+        {.station = station, .request = std::move(request), .client = client_, .who = who_},
         std::move(handler));
 }
 
 void Caller::count_refused(bus::RequestPort* bus, std::uint8_t station, ByteView pdu) {
     use(bus);
-    bus->count_refused(station, pdu, client_);
+    bus->count_refused(station, pdu, who_);
 }
 
 /// Names the client on the bus before its first request.
 void Caller::use(bus::RequestPort* bus) {
-    if (used_.insert(bus).second) bus->name_client(client_, protocol_ + ' ' + name_);
+    if (used_.insert(bus).second) bus->name_client(client_, who_->name);
 }
 
 void Caller::withdraw() {

@@ -54,14 +54,15 @@ void Session::on_secure(bool secure) {
     if (closed_) return;
     if (!secure) return close();
     const tls::Peer& peer = stream_.peer();
-    if (shared_->settings.tls && shared_->settings.tls->role_from_certificate) {
-        pipeline_->take_role(peer.role.value_or(""));
-        if (!peer.role_fault.empty())
-            shared_->log(rt::LogLevel::warn, "certificate without a role",
-                         {{"client", pipeline_->client()},
-                          {"subject", peer.subject},
-                          {"reason", peer.role_fault}});
-    }
+    std::optional<std::string> role;
+    if (shared_->settings.tls && shared_->settings.tls->role_from_certificate)
+        role = peer.role.value_or("");
+    if (role && !peer.role_fault.empty())
+        shared_->log(rt::LogLevel::warn, "certificate without a role",
+                     {{"client", pipeline_->client()},
+                      {"subject", peer.subject},
+                      {"reason", peer.role_fault}});
+    pipeline_->certify(peer.subject, std::move(role));
     active_ = shared_->clock.now();
     go_on();
 }

@@ -239,11 +239,13 @@ void Handshakes::end(Conversation& conversation, Outcome outcome, const std::str
     ++counters_.handshakes[static_cast<std::size_t>(outcome)];
     running_.remove(&conversation);
     if (outcome == Outcome::done) return;
-    rt::log(level_of(outcome), "tls handshake failed",
-            {{"listener", name_},
-             {"client", conversation.client},
-             {"outcome", std::string(label(outcome))},
-             {"reason", why}});
+    const std::string& client = conversation.client;
+    const std::string subject = name_ + ' ' + client.substr(0, client.rfind(':')) + ' ' + why;
+    rt::log_about(subject, level_of(outcome), "tls handshake failed",
+                  {{"listener", name_},
+                   {"client", client},
+                   {"outcome", std::string(label(outcome))},
+                   {"reason", why}});
 }
 
 Counters Handshakes::counters() const {

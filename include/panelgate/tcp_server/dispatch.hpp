@@ -6,12 +6,12 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <utility>
 #include <variant>
 #include <vector>
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
+#include "panelgate/base/who.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
@@ -67,17 +67,18 @@ class UnitMap {
 /// One client as seen by the buses: its identity and the buses it has used.
 class Caller {
   public:
-    /// `name` is its address with port, or its serial port; connections from one address share a
-    /// host. The buses show it as "PROTOCOL NAME".
-    Caller(std::string name, bus::Host host, std::string protocol = "modbus_tcp");
+    /// `who` is never null. `name` is its address with port, or its serial port, for logs; the
+    /// buses show it as `who->name`.
+    Caller(std::string name, WhoRef who);
 
     const std::string& name() const { return name_; }
-    bus::Host host() const { return host_; }
-    /// The role in its certificate, where its listener goes by that; "" none, which is the least.
-    void take_role(std::string role) { certificate_role_ = std::move(role); }
-    const std::optional<std::string>& certificate_role() const { return certificate_role_; }
+    const WhoRef& who() const { return who_; }
+    std::uint64_t host() const { return who_->host; }
+    /// What its certificate says. `role` is the one in it, "" none, which is the least; nothing
+    /// where its listener does not go by that. Call it before the first request.
+    void certify(std::string subject, std::optional<std::string> role);
     /// By its certificate: only operators and above write.
-    bool reads_only() const;
+    bool reads_only() const { return by_certificate_ && who_->role < Role::operator_; }
     /// Passes the request to a bus for one of its stations; station 0: broadcast.
     void transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,
                   bus::AnswerHandler handler);
@@ -91,10 +92,9 @@ class Caller {
     void use(bus::RequestPort* bus);
 
     std::string name_;
-    std::string protocol_;
-    bus::Host host_;
+    WhoRef who_;
     bus::ClientId client_ = bus::next_client_id();
-    std::optional<std::string> certificate_role_{};
+    bool by_certificate_ = false;  ///< its role is its certificate's
     std::set<bus::RequestPort*> used_;
 };
 

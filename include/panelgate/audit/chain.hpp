@@ -1,0 +1,80 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace panelgate::audit {
+
+/// A SHA-256 as 64 hex digits.
+using Hash = std::array<char, 64>;
+inline std::string_view text_of(const Hash& hash) { return {hash.data(), hash.size()}; }
+/// What the first record of a chain follows: 64 times '0'.
+Hash no_hash();
+std::optional<Hash> parse_hash(std::string_view text);
+
+/// Where a chain stands: the number and the hash of its last record. Number 0: no record.
+struct Position {
+    std::uint64_t number = 0;
+    Hash hash = no_hash();
+    friend bool operator==(const Position&, const Position&) = default;
+};
+
+/// SHA-256 of a previous hash and a text; keeps its OpenSSL context.
+class Digest {
+  public:
+    Digest();
+    ~Digest();
+    Digest(Digest&&) noexcept;
+    Digest& operator=(Digest&&) noexcept;
+
+    /// Throws std::runtime_error if OpenSSL has no SHA-256.
+    Hash of(const Hash& previous, std::string_view text);
+
+  private:
+    struct Context;
+    std::unique_ptr<Context> context_;
+};
+
+/// Makes records of bodies: `{"n":N,BODY,"hash":"H"}` and a newline. H is SHA-256 of the previous
+/// record's H (its 64 digits) and this line up to `,"hash"`. Whoever has the files can check it
+/// with any tool; no key is needed, and none can be stolen.
+class Chain {
+  public:
+    explicit Chain(const Position& last = {}) : last_(last) {}
+
+    void append(std::string& out, std::string_view body);
+    const Position& last() const { return last_; }
+
+  private:
+    Position last_;
+    Digest digest_;
+};
+
+/// The parts of a line; views of it.
+struct Sealed {
+    std::uint64_t number = 0;
+    std::string_view text;  ///< what the hash covers besides the previous hash
+    std::string_view body;  ///< without the number
+    Hash hash{};
+};
+/// Takes a line, without its newline, apart. nullopt if it is no record.
+std::optional<Sealed> parse_line(std::string_view line);
+/// Returns the hash that a record of kind `file` says it follows.
+std::optional<Hash> previous_in(const Sealed& record);
+
+/// Where a file's end is, as far as the chain is concerned.
+struct Tail {
+    Position last{};          ///< its last whole record; number 0: it has none
+    std::string_view torn;    ///< what follows the last newline
+    bool ended = false;       ///< the last record is of kind `end`
+    bool continuable = true;  ///< false: its last whole line is no record
+};
+/// `end`: the end of a file, at least its last line; `is_whole`: it is the whole file. Pure.
+Tail parse_tail(std::string_view end);
+
+}  // namespace panelgate::audit

@@ -1,0 +1,210 @@
+#include "panelgate/audit/trail.hpp"
+
+#include <algorithm>
+#include <condition_variable>
+#include <csignal>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "panelgate/audit/record.hpp"
+#include "writer.hpp"
+
+namespace panelgate::audit {
+
+namespace {
+
+constexpr Duration kAgain = 1s;  // between two tries while the disk takes nothing
+
+/// Signals are for the loop's thread.
+std::thread start_thread(std::function<void()> run) {
+    sigset_t all{};
+    sigset_t before{};
+    ::sigfillset(&all);
+    ::pthread_sigmask(SIG_SETMASK, &all, &before);
+    std::thread thread(std::move(run));
+    ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
+    return thread;
+}
+
+}  // namespace
+
+struct Trail::State {
+    State(const Settings& s, Hooks h, std::atomic<bool>& f)
+        : settings(s), hooks(std::move(h)), failing(f), writer(s, hooks.wall, hooks.start) {
+        pending.reserve(std::min<std::size_t>(settings.buffer, 64 * 1024));
+    }
+
+    void run();
+    bool wait(std::unique_lock<std::mutex>& lock);
+    void take_over();
+    void work();
+    void anchor();
+    void publish();
+
+    // Shared, under `mutex`.
+    std::mutex mutex;
+    std::condition_variable wake;
+    Settings settings;
+    std::optional<Settings> next;
+    std::string pending;
+    std::uint64_t lost = 0;  ///< not yet recorded
+    Counters counters;
+    bool stop = false;
+
+    // Of the thread.
+    Hooks hooks;
+    std::atomic<bool>& failing;
+    Writer writer;
+    Composer composer;
+    std::string taken;
+    std::uint64_t failures = 0;
+    std::uint64_t anchored = 0;
+    WallTime anchored_at{};
+    std::thread thread;
+};
+
+/// Waits until there is something to do, and then a little for more. True: that was the last time.
+bool Trail::State::wait(std::unique_lock<std::mutex>& lock) {
+    if (failing) {
+        wake.wait_for(lock, kAgain, [&] { return stop; });
+        return stop;
+    }
+    wake.wait(lock, [&] { return stop || next || !pending.empty(); });
+    wake.wait_for(lock, settings.flush,
+                  [&] { return stop || next || pending.size() > settings.buffer / 2; });
+    return stop;
+}
+
+/// Call with the lock.
+void Trail::State::take_over() {
+    if (next) {
+        settings = *std::exchange(next, std::nullopt);
+        writer.apply(settings);
+        anchored = 0;
+    }
+    if (!writer.idle()) return;
+    const std::uint64_t left_out = std::exchange(lost, 0);
+    std::swap(taken, pending);
+    if (left_out == 0) return;
+    composer.begin(hooks.wall(), Kind::lost).number("count", left_out);
+    taken += composer.body();
+    taken += '\n';
+}
+
+void Trail::State::anchor() {
+    const Position& last = writer.last();
+    if (last.number == 0 || last.number == anchored) return;
+    const WallTime time = hooks.wall();
+    const bool due = anchored == 0 || last.number - anchored >= settings.anchor_every ||
+                     time - anchored_at >= settings.anchor_after || time < anchored_at;
+    if (!due) return;
+    anchored = last.number;
+    anchored_at = time;
+    hooks.tell({Notice::Kind::anchor, {}, last});
+}
+
+void Trail::State::work() {
+    bool good = false;
+    std::string why;
+    try {
+        if (!taken.empty()) writer.take(taken);
+        taken.clear();
+        good = writer.work();
+        if (!good) why = writer.why();
+    } catch (const std::exception& error) {
+        why = error.what();
+    }
+    if (auto remark = writer.remark(); !remark.empty())
+        hooks.tell({Notice::Kind::remark, std::move(remark), {}});
+    if (good != !failing) {
+        failing = !good;
+        hooks.tell({good ? Notice::Kind::recovered : Notice::Kind::failing, why, {}});
+        if (!good) ++failures;
+    }
+    if (good) anchor();
+}
+
+void Trail::State::publish() {
+    counters.records = writer.records();
+    counters.rotations = writer.rotations();
+    counters.failures = failures;
+    counters.failing = failing;
+}
+
+void Trail::State::run() {
+    bool last = false;
+    std::unique_lock lock(mutex);
+    while (!last) {
+        last = writer.last().number > 0 || failing ? wait(lock) : stop;
+        take_over();
+        lock.unlock();
+        work();
+        lock.lock();
+        publish();
+    }
+    if (failing) return;
+    take_over();  // what came while the last try was going on
+    lock.unlock();
+    work();
+    lock.lock();
+    publish();
+}
+
+Trail::Trail(const Settings& settings, Hooks hooks)
+    : state_(std::make_unique<State>(settings, std::move(hooks), failing_)) {
+    state_->thread = start_thread([state = state_.get()] { state->run(); });
+}
+
+Trail::~Trail() { close(); }
+
+Position Trail::close() {
+    if (state_->thread.joinable()) {
+        {
+            const std::scoped_lock lock(state_->mutex);
+            state_->stop = true;
+        }
+        state_->wake.notify_one();
+        state_->thread.join();
+    }
+    return state_->writer.last();
+}
+
+void Trail::add(std::string_view body) {
+    State& state = *state_;
+    bool wakes = false;
+    {
+        const std::scoped_lock lock(state.mutex);
+        if (state.pending.size() + body.size() >= state.settings.buffer) {
+            ++state.lost;
+            ++state.counters.lost;
+            return;
+        }
+        const std::size_t before = state.pending.size();
+        state.pending += body;
+        state.pending += '\n';
+        const std::size_t half = state.settings.buffer / 2;
+        wakes = before == 0 || (before <= half && state.pending.size() > half);
+    }
+    if (wakes) state.wake.notify_one();
+}
+
+void Trail::apply(const Settings& settings) {
+    {
+        const std::scoped_lock lock(state_->mutex);
+        if (settings == state_->settings) return;
+        state_->next = settings;
+    }
+    state_->wake.notify_one();
+}
+
+Counters Trail::counters() const {
+    const std::scoped_lock lock(state_->mutex);
+    Counters counters = state_->counters;
+    counters.waiting_bytes = state_->pending.size();
+    return counters;
+}
+
+}  // namespace panelgate::audit

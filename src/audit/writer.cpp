@@ -1,0 +1,305 @@
+#include "writer.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <utility>
+#include <vector>
+
+namespace panelgate::audit {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t kTail = 256 * 1024;   // of a file, to find its last record
+constexpr std::size_t kChunk = 128 * 1024;  // written at once
+constexpr std::size_t kTornShown = 512;
+constexpr std::size_t kDigits = 12;
+
+/// Reads `count` bytes at `from`; fewer at the end of the file.
+std::string read_at(int file, off_t from, std::size_t count) {
+    std::string text(count, '\0');
+    std::size_t got = 0;
+    while (got < count) {
+        const ssize_t more =
+            ::pread(file, text.data() + got, count - got, from + static_cast<off_t>(got));
+        if (more < 0 && errno == EINTR) continue;
+        if (more <= 0) break;
+        got += static_cast<std::size_t>(more);
+    }
+    text.resize(got);
+    return text;
+}
+
+/// The rotated files, oldest first: their numbers have leading zeros.
+std::vector<std::string> rotated_files(const std::string& file) {
+    const fs::path path(file);
+    const std::string begin = path.filename().string() + '.';
+    std::vector<std::string> found;
+    std::error_code error;
+    const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+    for (const auto& entry : fs::directory_iterator(folder, error)) {
+        const std::string name = entry.path().filename().string();
+        if (name.size() < begin.size() + kDigits || !name.starts_with(begin)) continue;
+        const std::string_view digits = std::string_view(name).substr(begin.size(), kDigits);
+        if (std::ranges::all_of(digits, [](char c) { return c >= '0' && c <= '9'; }))
+            found.push_back(entry.path().string());
+    }
+    std::ranges::sort(found);
+    return found;
+}
+
+/// Renames without ever replacing another file: "NAME", or "NAME-2", ... Returns the name; "" if
+/// it failed.
+std::string rename_aside(const std::string& from, const std::string& to) {
+    constexpr int kTries = 1000;
+    for (int i = 1; i <= kTries; ++i) {
+        const std::string name = i == 1 ? to : to + '-' + std::to_string(i);
+        if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, name.c_str(), RENAME_NOREPLACE) == 0)
+            return name;
+        if (errno != EEXIST) return {};
+    }
+    return {};
+}
+
+/// A new name is on the disk only when its folder is.
+void sync_folder(const std::string& file) {
+    const fs::path folder = fs::path(file).parent_path();
+    const int handle =
+        ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (handle < 0) return;
+    ::fsync(handle);
+    ::close(handle);
+}
+
+}  // namespace
+
+std::string rotated_name(const std::string& file, std::uint64_t first) {
+    std::string digits = std::to_string(first);
+    if (digits.size() < kDigits) digits.insert(0, kDigits - digits.size(), '0');
+    return file + '.' + digits;
+}
+
+Writer::Writer(Settings settings, Wall wall, std::string start)
+    : settings_(std::move(settings)), wall_(std::move(wall)), start_(std::move(start)) {}
+
+Writer::~Writer() { close(); }
+
+void Writer::close() {
+    if (file_ >= 0) ::close(file_);
+    file_ = -1;
+}
+
+void Writer::apply(const Settings& settings) {
+    const bool other = settings.file != settings_.file;
+    settings_ = settings;
+    if (!other) return;
+    close();
+    chain_ = Chain();
+    safe_ = {};
+    known_ = begun_ = unclean_ = false;
+    batch_.clear();
+    out_.clear();
+    at_ = sent_ = 0;
+    torn_bytes_ = 0;
+}
+
+void Writer::take(std::string& bodies) {
+    batch_.clear();
+    std::swap(batch_, bodies);
+    at_ = 0;
+}
+
+bool Writer::fail(const std::string& what) {
+    why_ = what + ": " + std::strerror(errno);
+    return false;
+}
+
+bool Writer::is_moved() const {
+    struct stat named{};
+    struct stat open{};
+    if (::stat(settings_.file.c_str(), &named) != 0) return errno == ENOENT;
+    return ::fstat(file_, &open) == 0 &&
+           (named.st_ino != open.st_ino || named.st_dev != open.st_dev);
+}
+
+bool Writer::ensure_open() {
+    if (file_ >= 0 && is_moved()) close();  // by a log rotation that is not ours
+    if (file_ >= 0) return true;
+    if (!open() || !resume()) {
+        close();
+        return false;
+    }
+    if (!begun_) begin_run();
+    return true;
+}
+
+bool Writer::open() {
+    constexpr mode_t kMode = S_IRUSR | S_IWUSR | S_IRGRP;
+    const char* name = settings_.file.c_str();
+    file_ = ::open(name, O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, kMode);
+    if (file_ < 0) return fail("cannot open " + settings_.file);
+    struct stat found{};
+    if (::fstat(file_, &found) != 0) return fail("cannot open " + settings_.file);
+    if (!S_ISREG(found.st_mode)) {
+        why_ = settings_.file + " is no regular file";
+        return false;
+    }
+    if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
+        why_ = "another process writes to " + settings_.file;
+        return false;
+    }
+    size_ = static_cast<std::size_t>(found.st_size);
+    return true;
+}
+
+/// Finds out where the chain stands, and goes on there.
+bool Writer::resume() {
+    if (size_ > 0) {
+        const std::size_t count = std::min(size_, kTail);
+        const std::string end = read_at(file_, static_cast<off_t>(size_ - count), count);
+        if (!resume_from(end, count == size_)) return false;
+    }
+    if (size_ > 0) {
+        const std::string first = read_at(file_, 0, kTail);
+        const auto record = parse_line(std::string_view(first).substr(0, first.find('\n')));
+        first_ = record ? record->number : chain_.last().number;
+        return true;
+    }
+    if (!known_) {
+        const auto older = rotated_files(settings_.file);
+        const int file = older.empty() ? -1 : ::open(older.back().c_str(), O_RDONLY | O_CLOEXEC);
+        struct stat found{};
+        if (file >= 0 && ::fstat(file, &found) == 0) {
+            const auto size = static_cast<std::size_t>(found.st_size);
+            const std::size_t count = std::min(size, kTail);
+            const std::string end = read_at(file, static_cast<off_t>(size - count), count);
+            const Tail tail = parse_tail(end);
+            chain_ = Chain(tail.last);
+            unclean_ = tail.last.number > 0 && !tail.ended;
+        }
+        if (file >= 0) ::close(file);
+        known_ = true;
+    }
+    begin_file();
+    return true;
+}
+
+/// Takes the end of the file that is there. A torn line is cut off, and told in the record `start`.
+bool Writer::resume_from(std::string_view end, bool is_whole) {
+    const Tail tail = parse_tail(end);
+    const bool has_record = tail.last.number > 0;
+    const bool is_torn_only = tail.continuable && !has_record && is_whole;
+    if (!has_record && !is_torn_only) return set_aside("its last line is no record");
+    if (known_ && tail.last != chain_.last())
+        return set_aside("it is not the one that was written");
+    if (!tail.torn.empty()) {
+        torn_bytes_ = tail.torn.size();
+        torn_ = tail.torn.substr(0, kTornShown);
+        size_ -= tail.torn.size();
+        if (::ftruncate(file_, static_cast<off_t>(size_)) != 0) return fail("cannot mend the end");
+    }
+    if (!has_record) return true;
+    unclean_ = !tail.ended;
+    chain_ = Chain(tail.last);
+    safe_ = tail.last;
+    known_ = true;
+    return true;
+}
+
+bool Writer::set_aside(const char* why) {
+    const std::string name = rename_aside(settings_.file, settings_.file + ".aside");
+    if (name.empty()) return fail("cannot rename " + settings_.file);
+    remark_ = settings_.file + " is kept as " + name + ", and a new one begins: " + why;
+    close();
+    return open() && size_ == 0;
+}
+
+void Writer::begin_file() {
+    composer_.begin(wall_(), Kind::file).text("previous", text_of(chain_.last().hash));
+    first_ = chain_.last().number + 1;
+    if (sent_ == out_.size()) {
+        chain_.append(out_, composer_.body());
+        ++sealed_;
+    }
+}
+
+void Writer::begin_run() {
+    begun_ = true;
+    composer_.begin(wall_(), Kind::start);
+    if (unclean_) composer_.flag("unclean", true);
+    if (torn_bytes_ > 0) composer_.number("torn_bytes", torn_bytes_).text("torn", torn_);
+    composer_.text("remark", remark_);
+    chain_.append(out_, std::string(composer_.body()) + start_);
+    ++sealed_;
+}
+
+void Writer::seal() {
+    while (at_ < batch_.size() && out_.size() < kChunk && size_ + out_.size() < settings_.rotate) {
+        const std::size_t end = std::min(batch_.find('\n', at_), batch_.size());
+        chain_.append(out_, std::string_view(batch_).substr(at_, end - at_));
+        ++sealed_;
+        at_ = std::min(end + 1, batch_.size());
+    }
+}
+
+bool Writer::flush() {
+    while (sent_ < out_.size()) {
+        const ssize_t done = ::write(file_, out_.data() + sent_, out_.size() - sent_);
+        if (done < 0 && errno == EINTR) continue;
+        if (done < 0) return fail("cannot write " + settings_.file);
+        sent_ += static_cast<std::size_t>(done);
+        size_ += static_cast<std::size_t>(done);
+        unsynced_ = true;
+    }
+    out_.clear();
+    sent_ = 0;
+    return true;
+}
+
+bool Writer::sync() {
+    if (unsynced_ && ::fdatasync(file_) != 0) return fail("cannot synchronize " + settings_.file);
+    unsynced_ = false;
+    records_ += std::exchange(sealed_, 0);
+    safe_ = chain_.last();
+    return true;
+}
+
+bool Writer::work() {
+    if (!ensure_open()) return false;
+    do {
+        if (!flush()) return false;
+        if (size_ >= settings_.rotate && at_ < batch_.size() && !rotate()) return false;
+        seal();
+    } while (sent_ < out_.size() || at_ < batch_.size());
+    return sync();
+}
+
+bool Writer::rotate() {
+    if (!sync()) return false;
+    if (rename_aside(settings_.file, rotated_name(settings_.file, first_)).empty())
+        return fail("cannot rename " + settings_.file);
+    close();
+    ++rotations_;
+    drop_oldest();
+    if (!open() || !resume()) {
+        close();
+        return false;
+    }
+    sync_folder(settings_.file);
+    return true;
+}
+
+void Writer::drop_oldest() const {
+    const auto older = rotated_files(settings_.file);
+    for (std::size_t i = 0; i + settings_.keep < older.size(); ++i) std::remove(older[i].c_str());
+}
+
+}  // namespace panelgate::audit

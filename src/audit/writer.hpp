@@ -1,0 +1,91 @@
+#pragma once
+
+#include <sys/types.h>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "panelgate/audit/chain.hpp"
+#include "panelgate/audit/record.hpp"
+#include "panelgate/audit/settings.hpp"
+#include "panelgate/base/time.hpp"
+
+namespace panelgate::audit {
+
+/// A file's name behind which the number of its first record stands: FILE.000000000001.
+std::string rotated_name(const std::string& file, std::uint64_t first);
+
+/// Writes a chain to a file and its successors, synchronously. Nothing that was given to it is
+/// dropped when the disk fails: work() goes on where it stopped. One thread.
+class Writer {
+  public:
+    using Wall = std::function<WallTime()>;
+
+    /// `start`: members of the record `start` behind its time, such as `,"version":"1.0.0"`.
+    Writer(Settings settings, Wall wall, std::string start);
+    ~Writer();
+    Writer(const Writer&) = delete;
+    Writer& operator=(const Writer&) = delete;
+
+    /// Another file begins with a record `start` of its own; the chain is that file's.
+    void apply(const Settings& settings);
+    /// Takes bodies, one a line; only when idle().
+    void take(std::string& bodies);
+    bool idle() const { return at_ == batch_.size() && out_.size() == sent_; }
+    /// Writes and synchronizes what was taken. False: the disk does not take it now; see why().
+    bool work();
+    const std::string& why() const { return why_; }
+    /// The last record that is on the disk.
+    const Position& last() const { return safe_; }
+    std::uint64_t records() const { return records_; }
+    std::uint64_t rotations() const { return rotations_; }
+    /// What should be said of the file that was found at the start; told once.
+    std::string remark() { return std::exchange(remark_, {}); }
+
+  private:
+    bool ensure_open();
+    bool open();
+    bool resume();
+    bool resume_from(std::string_view end, bool is_whole);
+    bool set_aside(const char* why);
+    bool is_moved() const;
+    bool rotate();
+    void drop_oldest() const;
+    void begin_file();
+    void begin_run();
+    void seal();
+    bool flush();
+    bool sync();
+    bool fail(const std::string& what);
+    void close();
+
+    Settings settings_;
+    Wall wall_;
+    std::string start_;
+    Composer composer_;
+    Chain chain_;
+    Position safe_;
+    bool known_ = false;  ///< the chain's position is known
+    bool begun_ = false;  ///< the record `start` is written
+    bool unclean_ = false;
+    std::uint64_t torn_bytes_ = 0;
+    std::string torn_;
+    std::string remark_;
+    int file_ = -1;
+    std::size_t size_ = 0;
+    std::uint64_t first_ = 0;  ///< number of the file's first record
+    std::string batch_;
+    std::size_t at_ = 0;  ///< of batch_, sealed so far
+    std::string out_;
+    std::size_t sent_ = 0;  ///< of out_, written so far
+    bool unsynced_ = false;
+    std::string why_;
+    std::uint64_t records_ = 0;
+    std::uint64_t sealed_ = 0;
+    std::uint64_t rotations_ = 0;
+};
+
+}  // namespace panelgate::audit

@@ -1,0 +1,253 @@
+#include "writer.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "panelgate/audit/verify.hpp"
+#include "support/temp_dir.hpp"
+
+namespace panelgate::audit {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string read(const std::string& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::vector<std::string> lines_of(const std::string& file) {
+    std::ifstream in(file, std::ios::binary);
+    std::vector<std::string> lines;
+    for (std::string line; std::getline(in, line);) lines.push_back(line);
+    return lines;
+}
+
+class AuditWriter : public testing::Test {
+  protected:
+    Settings settings() const {
+        Settings settings;
+        settings.file = file;
+        return settings;
+    }
+    std::unique_ptr<Writer> make(const Settings& settings) const {
+        return std::make_unique<Writer>(
+            settings, [] { return WallTime(); }, R"(,"version":"1.0.0")");
+    }
+    static std::string body(int i) {
+        return R"("time":"T","kind":"write","value":)" + std::to_string(i);
+    }
+    /// Writes the numbers [from, to).
+    static bool write(Writer& writer, int from, int to) {
+        std::string bodies;
+        for (int i = from; i < to; ++i) bodies += body(i) + '\n';
+        writer.take(bodies);
+        return writer.work();
+    }
+    std::vector<std::string> files() const {
+        std::vector<std::string> all;
+        for (const auto& entry : fs::directory_iterator(folder.path()))
+            all.push_back(entry.path().string());
+        return in_order(all, [](const std::string& name) { return lines_of(name).at(0); });
+    }
+    static Report verify(const std::vector<std::string>& files) {
+        Verifier verifier;
+        for (const std::string& one : files) {
+            verifier.begin_file(one);
+            const std::string text = read(one);
+            for (const std::string& line : lines_of(one)) verifier.take(line, true);
+            if (!text.empty() && text.back() != '\n') verifier.take("", false);
+        }
+        return verifier.finish();
+    }
+
+    test::TempDir folder;
+    std::string file = (folder.path() / "audit.jsonl").string();
+};
+
+TEST_F(AuditWriter, BeginsAFileWithWhatItFollowsAndARunWithItsStart) {
+    const auto writer = make(settings());
+    ASSERT_TRUE(write(*writer, 1, 3)) << writer->why();
+    const auto lines = lines_of(file);
+    ASSERT_EQ(lines.size(), 4U);
+    EXPECT_NE(lines[0].find(R"("kind":"file","previous":"0000)"), std::string::npos);
+    EXPECT_NE(lines[1].find(R"("kind":"start","version":"1.0.0")"), std::string::npos);
+    EXPECT_NE(lines[3].find(R"("value":2)"), std::string::npos);
+    EXPECT_EQ(writer->last().number, 4U);
+    EXPECT_EQ(writer->records(), 4U);
+    EXPECT_FALSE(verify({file}).fault);
+}
+
+TEST_F(AuditWriter, GoesOnWithNumberAndChainAfterARestart) {
+    ASSERT_TRUE(write(*make(settings()), 1, 3));
+    const auto writer = make(settings());
+    ASSERT_TRUE(write(*writer, 3, 5));
+    EXPECT_EQ(writer->last().number, 7U);
+    const Report report = verify({file});
+    EXPECT_FALSE(report.fault);
+    EXPECT_EQ(report.records, 7U);
+    ASSERT_EQ(report.remarks.size(), 1U);  // no record `end`
+    EXPECT_NE(report.remarks[0].find("did not end in order"), std::string::npos);
+}
+
+TEST_F(AuditWriter, ARunThatEndedInOrderIsNotCalledOtherwise) {
+    const auto first = make(settings());
+    std::string bodies = body(1) + "\n\"time\":\"T\",\"kind\":\"end\"\n";
+    first->take(bodies);
+    ASSERT_TRUE(first->work());
+    const auto second = make(settings());
+    EXPECT_FALSE(second->work()) << "the first one still holds the file";
+    EXPECT_EQ(second->why(), "another process writes to " + file);
+}
+
+TEST_F(AuditWriter, AfterAnEndInOrderNothingIsMissing) {
+    {
+        const auto first = make(settings());
+        std::string bodies = body(1) + "\n\"time\":\"T\",\"kind\":\"end\"\n";
+        first->take(bodies);
+        ASSERT_TRUE(first->work());
+    }
+    ASSERT_TRUE(make(settings())->work());
+    const Report report = verify({file});
+    EXPECT_FALSE(report.fault);
+    EXPECT_TRUE(report.remarks.empty());
+}
+
+TEST_F(AuditWriter, ATornLineIsCutOffAndQuoted) {
+    ASSERT_TRUE(write(*make(settings()), 1, 3));
+    const std::string torn = R"({"n":5,"time":"T","ki)";
+    std::ofstream(file, std::ios::app) << torn;
+    ASSERT_TRUE(make(settings())->work());
+    const auto lines = lines_of(file);
+    ASSERT_EQ(lines.size(), 5U);
+    EXPECT_NE(lines[4].find(R"("kind":"start","unclean":true,"torn_bytes":21,)"
+                            R"("torn":"{\"n\":5,\"time\":\"T\",\"ki","version")"),
+              std::string::npos)
+        << lines[4];
+    EXPECT_FALSE(verify({file}).fault);
+}
+
+TEST_F(AuditWriter, AFileThatIsOnlyATornLineBeginsAnew) {
+    std::ofstream(file) << R"({"n":1)";
+    ASSERT_TRUE(make(settings())->work());
+    EXPECT_EQ(lines_of(file).size(), 2U);
+    EXPECT_FALSE(verify({file}).fault);
+}
+
+TEST_F(AuditWriter, TheChainGoesOnOverItsFilesAndTheOldestGo) {
+    Settings small = settings();
+    small.rotate = 2000;
+    small.keep = 3;
+    for (int run = 0; run < 4; ++run) {
+        const auto writer = make(small);
+        ASSERT_TRUE(write(*writer, 0, 40)) << writer->why();
+        EXPECT_GE(writer->rotations(), 2U);
+    }
+    const auto all = files();
+    EXPECT_EQ(all.size(), 4U);
+    EXPECT_EQ(all.back(), file);
+    const Report report = verify(all);
+    EXPECT_FALSE(report.fault) << report.fault->text;
+    EXPECT_GT(report.first, 1U);
+    EXPECT_EQ(all[0], rotated_name(file, report.first));
+    for (const std::string& one : all) EXPECT_LT(fs::file_size(one), 2400U);
+}
+
+TEST_F(AuditWriter, AMissingFileIsFollowedFromTheNewestOneBeforeIt) {
+    ASSERT_TRUE(write(*make(settings()), 1, 3));
+    fs::rename(file, rotated_name(file, 1));
+    ASSERT_TRUE(make(settings())->work());
+    const auto lines = lines_of(file);
+    ASSERT_EQ(lines.size(), 2U);
+    EXPECT_EQ(lines[0].substr(0, 7), R"({"n":5,)");
+    EXPECT_FALSE(verify(files()).fault);
+}
+
+TEST_F(AuditWriter, AnotherRotationMayTakeTheFileAway) {
+    const auto writer = make(settings());
+    ASSERT_TRUE(write(*writer, 1, 3));
+    fs::rename(file, (folder.path() / "elsewhere").string());
+    ASSERT_TRUE(write(*writer, 3, 5));
+    EXPECT_EQ(lines_of(file).size(), 3U);
+    EXPECT_FALSE(verify(files()).fault);
+    fs::remove(file);
+    ASSERT_TRUE(write(*writer, 5, 6));
+    EXPECT_EQ(lines_of(file).size(), 2U);
+}
+
+TEST_F(AuditWriter, WhatCannotBeContinuedIsKeptUnderAnotherName) {
+    std::ofstream(file) << "something else\n";
+    const auto writer = make(settings());
+    ASSERT_TRUE(write(*writer, 1, 2));
+    EXPECT_NE(writer->remark().find("is kept as " + file + ".aside"), std::string::npos);
+    EXPECT_EQ(read(file + ".aside"), "something else\n");
+    EXPECT_FALSE(verify({file}).fault);
+}
+
+/// Limits what files of this process may become, as a full disk would.
+class FullDisk {
+  public:
+    explicit FullDisk(rlim_t bytes) {
+        ::getrlimit(RLIMIT_FSIZE, &before_);
+        handler_ = std::signal(SIGXFSZ, SIG_IGN);
+        rlimit less = before_;
+        less.rlim_cur = bytes;
+        ::setrlimit(RLIMIT_FSIZE, &less);
+    }
+    ~FullDisk() {
+        ::setrlimit(RLIMIT_FSIZE, &before_);
+        std::signal(SIGXFSZ, handler_);
+    }
+    FullDisk(const FullDisk&) = delete;
+    FullDisk& operator=(const FullDisk&) = delete;
+
+  private:
+    rlimit before_{};
+    void (*handler_)(int) = nullptr;
+};
+
+TEST_F(AuditWriter, AFullDiskLosesNothingThatWasTaken) {
+    const auto writer = make(settings());
+    ASSERT_TRUE(writer->work());
+    const auto size = fs::file_size(file);
+    {
+        const FullDisk full(size + 50);  // in the middle of a line
+        EXPECT_FALSE(write(*writer, 1, 50));
+        EXPECT_EQ(writer->why(), "cannot write " + file + ": File too large");
+        EXPECT_FALSE(writer->idle());
+        EXPECT_FALSE(writer->work());
+        EXPECT_EQ(writer->last().number, 2U);
+    }
+    EXPECT_TRUE(writer->work());
+    const Report report = verify({file});
+    EXPECT_FALSE(report.fault);
+    EXPECT_EQ(report.records, 51U);
+}
+
+TEST_F(AuditWriter, SaysWhyAFileCannotBeOpened) {
+    Settings nowhere = settings();
+    nowhere.file = (folder.path() / "no" / "audit.jsonl").string();
+    const auto writer = make(nowhere);
+    EXPECT_FALSE(write(*writer, 1, 2));
+    EXPECT_EQ(writer->why(), "cannot open " + nowhere.file + ": No such file or directory");
+    fs::create_directory(folder.path() / "no");
+    EXPECT_TRUE(writer->work());
+    EXPECT_EQ(lines_of(nowhere.file).size(), 3U);
+    Settings device = settings();
+    device.file = "/dev/null";
+    const auto other = make(device);
+    EXPECT_FALSE(other->work());
+    EXPECT_EQ(other->why(), "/dev/null is no regular file");
+}
+
+}  // namespace
+}  // namespace panelgate::audit
