@@ -127,18 +127,6 @@ struct OutputFile {
 };
 /// The `yaml` option is ignored.
 ExitCode init(const ScanOptions& options, const OutputFile& output);
-/// The command line of `cert` as typed.
-struct CertificateOptions {
-    std::vector<std::string> names;  ///< of the certificate; of `revoke`, its file
-    std::string role;
-    std::string dir = ".";  ///< of the files, the CA's included
-    int days = 0;
-    bool force = false;  ///< replace files
-};
-ExitCode new_certificate_authority(const CertificateOptions& options);
-ExitCode new_server_certificate(const CertificateOptions& options);
-ExitCode new_client_certificate(const CertificateOptions& options);
-ExitCode revoke_certificate(const CertificateOptions& options);
 /// Converts another gateway's configuration; "-" for standard input.
 ExitCode import_conf(const std::string& file);
 /// Lists all profiles, or describes one; `dir` as in address().

@@ -320,16 +320,6 @@ void load_allow(Loading& loading, MapReader& in, std::vector<Network>& allow) {
 
 constexpr std::string_view kNoNetwork = "name at least one network, or leave it out for all";
 
-constexpr std::uint16_t kSecurePort = 802;  // Modbus/TCP Security
-
-void load_secure(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
-    settings.tls = load_tls(loading, in);
-    if (!settings.tls) return;
-    if (!in.has("listen")) settings.port = kSecurePort;
-    if (settings.udp)
-        in.problem("udp", "datagrams are not encrypted by tls; leave one of them out");
-}
-
 /// Keys that users write as for the serial lines of other programs.
 constexpr std::array<yaml::Elsewhere, 5> kServerKeysElsewhere{
     {{"type", {}, {}, "remove it: serial lines are listed in 'lines'"},
@@ -347,7 +337,7 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     load_framing(in, settings);
     load_diagnostics(loading, in, settings);
     load_allow(loading, in, settings.allow);
-    load_secure(loading, in, settings);
+    load_modbus_security(loading, in, settings);
     refuse_empty_access(in);
     refuse_empty(in, "allow", kNoNetwork);
     in.finish();

@@ -85,4 +85,21 @@ std::optional<tls::Settings> load_tls(Loading& loading, MapReader& in) {
     return settings;
 }
 
+void load_modbus_security(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
+    constexpr std::uint16_t kSecurePort = 802;
+    settings.tls = load_tls(loading, in);
+    if (!settings.tls) return;
+    if (!in.has("listen")) settings.port = kSecurePort;
+    if (settings.udp)
+        in.problem("udp", "datagrams are not encrypted by tls; leave one of them out");
+}
+
+void show_tls(const SettingWriter& listener, const std::optional<tls::Settings>& settings) {
+    if (!settings) return;
+    const SettingWriter section = listener.item("tls");
+    tls_keys().show(section, *settings);
+    const tls::Material& files = settings->material;
+    section.put_secret("files", files.certificate + files.key + files.ca + files.crl);
+}
+
 }  // namespace panelgate::config

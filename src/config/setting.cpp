@@ -1,11 +1,11 @@
 #include "panelgate/config/setting.hpp"
 
 #include <algorithm>
-#include <optional>
 #include <ranges>
 #include <span>
 #include <string>
 
+#include "load_tls.hpp"
 #include "panelgate/config/describe.hpp"
 #include "setting_writer.hpp"
 #include "tables.hpp"
@@ -76,14 +76,6 @@ void show_access(const SettingWriter& section, const tcp_server::Settings& setti
     for (const auto& [unit, target] : settings.units)
         section.below("units").put(std::to_string(unit),
                                    target.line + '/' + std::to_string(target.station));
-}
-
-void show_tls(const SettingWriter& listener, const std::optional<tls::Settings>& settings) {
-    if (!settings) return;
-    const SettingWriter section = listener.item("tls");
-    tls_keys().show(section, *settings);
-    const tls::Material& files = settings->material;
-    section.put_secret("files", files.certificate + files.key + files.ca + files.crl);
 }
 
 void show_http(const SettingWriter& top, const web::Settings& settings) {

@@ -1,14 +1,13 @@
 #include "panelgate/tcp_server/dispatch.hpp"
 
 #include <algorithm>
-#include <array>
 #include <stdexcept>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
+#include "panelgate/tls/peer.hpp"
 
 namespace panelgate::tcp_server {
 
@@ -77,10 +76,7 @@ void Caller::certify(std::string subject, std::optional<std::string> role) {
     who.certificate = std::move(subject);
     by_certificate_ = role.has_value();
     if (role) {
-        constexpr std::array kRoles{Role::viewer, Role::operator_, Role::engineer, Role::admin};
-        const auto known =
-            std::ranges::find(kRoles, std::string_view(*role), [](Role one) { return label(one); });
-        who.role = known == kRoles.end() ? Role::none : *known;
+        who.role = tls::role_named(*role);
         who.certificate_role = std::move(*role);
     }
     who_ = make_who(std::move(who));

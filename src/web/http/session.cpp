@@ -169,7 +169,17 @@ asio::awaitable<bool> HttpSession::secure() {
         turn_.expires_at(asio::steady_timer::time_point::max());
         co_await turn_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
     }
+    if (secure) take_certificate();
     co_return secure;
+}
+
+void HttpSession::take_certificate() {
+    const tls::Peer& peer = stream_.peer();
+    const auto& tls = shared_->site->settings.tls;
+    const bool counts = tls && tls->role_from_certificate && peer.role;
+    std::optional<Role> role;
+    if (counts) role = tls::role_named(*peer.role);
+    caller_->certify(peer.subject, counts ? *peer.role : "", role);
 }
 
 asio::awaitable<bool> HttpSession::serve_one() {
@@ -371,6 +381,15 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
     co_return !error && keep_alive;
 }
 
+std::string HttpSession::head_of_events() const {
+    return "HTTP/1.1 200 OK\r\nServer: " + shared_->site->product +
+           "\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n"
+           "X-Content-Type-Options: nosniff\r\n" +
+           (handshakes_ ? "Strict-Transport-Security: " + std::string(kStrictTransport) + "\r\n"
+                        : "") +
+           "Connection: close\r\n\r\n: panelgate\n\n";
+}
+
 /// Streams events until the client leaves or the server stops. A comment every 15 s keeps
 /// middleboxes from dropping the connection and detects a lost client.
 asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listener> listener) {
@@ -387,13 +406,7 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
         wake_timer.cancel();
     });
     listener_ = listener;
-    std::string text =
-        "HTTP/1.1 200 OK\r\nServer: " + shared_->site->product +
-        "\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n"
-        "X-Content-Type-Options: nosniff\r\n" +
-        (handshakes_ ? "Strict-Transport-Security: " + std::string(kStrictTransport) + "\r\n"
-                     : "") +
-        "Connection: close\r\n\r\n: panelgate\n\n";
+    std::string text = head_of_events();
     ErrorCode error;
     while (!error) {
         stream_.expires_after(time_to_read_);

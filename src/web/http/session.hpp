@@ -85,6 +85,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     boost::asio::awaitable<bool> secure();
     boost::asio::awaitable<ErrorCode> receive();
     bool speaks_tls() const;
+    void take_certificate();
+    std::string head_of_events() const;
     boost::asio::awaitable<ErrorCode> receive_body();
     boost::asio::awaitable<bool> serve_one();
     boost::asio::awaitable<HttpResponse> answer(BeastRequest message);
