@@ -18,7 +18,8 @@ ADDED = {"log_client": ("info", ["client"]), "shared_->log": ("", ["listener"]),
 ELSEWHERE = {"write": ("", ["line", "station", "client", "at", "pdu", "outcome", "transaction"]),
              "listening": ("", ["modbus_tcp", "http"]), "listener waits": ("", ["modbus_tcp", "http"]),
              "log lines left out": ("", ["of", "client", "clients", "count"]),
-             "log lines dropped": ("", ["count"]), "connection closed": ("info, warn", []),
+             "log lines dropped": ("", ["count"]), "tls handshake failed": ("info, warn", []),
+             "connection closed": ("info, warn", []),
              "connection gives way": ("info, warn", []),
              "datagram refused": ("debug, info, warn", [])}
 MEANINGS = {
