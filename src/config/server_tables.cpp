@@ -189,7 +189,7 @@ const Keys<tls::Settings>& tls_keys() {
          {"optional", ClientCertificate::optional},
          {"required", ClientCertificate::required}}};
     static constexpr Words<Version, 2> kVersions{
-        {{"1.2", Version::tls12}, {"1.3", Version::tls13}}};
+        {{"TLSv1.2", Version::tls12}, {"TLSv1.3", Version::tls13}}};
     static constexpr Words<bool, 1> kRoles{{{"certificate", true}}};
     const auto text = [](std::string Settings::* member) {
         return [member](const Settings& settings) { return settings.*member; };
@@ -212,7 +212,7 @@ const Keys<tls::Settings>& tls_keys() {
                   "one it only reads.")
             .initially("")
             .word("min_version", &Settings::lowest, kVersions,
-                  "Oldest version of TLS that is spoken: 1.2 or 1.3.");
+                  "Oldest version that is spoken: TLSv1.2 or TLSv1.3.");
     return kKeys;
 }
 

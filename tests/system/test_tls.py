@@ -206,7 +206,7 @@ class Versions(Tls):
             self.assertTrue(self.connects(port, "-tls1_3"))
 
     def test_min_version_1_3_refuses_1_2(self):
-        with served(self.made, self.made.tls(min_version="1.3")) as program:
+        with served(self.made, self.made.tls(min_version="TLSv1.3")) as program:
             self.assertIsNone(self.connects(program.modbus_port(), "-tls1_2"))
             self.assertTrue(self.connects(program.modbus_port(), "-tls1_3"))
             program.log.wait_for("outcome=version .*no version that is allowed")
