@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -15,6 +16,7 @@
 #include "difference.hpp"
 #include "panelgate/config/describe.hpp"
 #include "panelgate/tls/issue.hpp"
+#include "panelgate/yaml/map_reader.hpp"
 #include "running_line.hpp"
 #include "support/yaml_text.hpp"
 #include "unit/config/memory_files.hpp"
@@ -24,11 +26,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
+const fs::path kGeneric = fs::path(SOURCE_ROOT) / "config/profiles/generic.yaml";
+
+std::string text_of(const fs::path& path) {
+    std::ifstream in(path);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
 config::MemoryFiles all_files() {
     const tls::Issued ca = tls::issue_ca("CA", {0, 1});
     const tls::Issued gateway = tls::issue_server(ca, {"gateway"}, {0, 1});
     std::map<std::string, std::string> texts{{"/run/secrets/ops", "secret-0123456789"},
-                                             {"/run/secrets/other", "other-0123456789"}};
+                                             {"/run/secrets/other", "other-0123456789"},
+                                             {"/profiles/own.yaml", text_of(kGeneric)}};
     for (const std::string name : {"/tls/a", "/tls/b"}) {
         texts[name + ".crt"] = gateway.certificate;
         texts[name + ".key"] = gateway.key;
@@ -74,11 +84,6 @@ log: {level: warn, format: json}
 realtime: {priority: 20, lock_memory: true}
 )";
 
-std::string text_of(const fs::path& path) {
-    std::ifstream in(path);
-    return {std::istreambuf_iterator<char>(in), {}};
-}
-
 /// Has what every_key.yaml has in only one way, or not at all.
 constexpr const char* kFurther = R"(lines:
   - name: a
@@ -111,12 +116,21 @@ serial_masters:
      serial: {baud: 9600, data_bits: 7, parity: none, stop_bits: 1}, rs485: {mode: off},
      broadcast: silent, on_failure: silence, echo: auto, response_timeout: 2s}
   - {name: hmi, device: /dev/ttyS3, lines: [a], framing: rtu}
-http: {tokens: [{name: ops, role: operator, file: /run/secrets/ops}]}
+http:
+  tokens: [{name: ops, role: operator, file: /run/secrets/ops}]
+  tls: {certificate: /tls/a.crt, key: /tls/a.key, ca: /tls/a-ca.crt, client: optional}
 mqtt: {broker: "mqtts://b:8883", topic: x, qos: 1, client_id: x, username: x, store: 200,
        password_file: /run/secrets/ops, keep_alive: 60s, write: none, ca: /run/secrets/ops,
        certificate: /run/secrets/ops, key: /run/secrets/ops}
 relays: [{from: a-1/400001, to: a-1/400101, on_change: true, refresh: 60s}]
 realtime: {priority: 20, lock_memory: true}
+)";
+
+/// Keys that the values of their neighbours there rule out.
+constexpr const char* kApart = R"(lines: [{name: a, device: sim}]
+serial_masters:
+  - {name: plc, device: /dev/ttyS2, rs485: {mode: kernel, receive_during_send: false}}
+mqtt: {broker: "mqtt://b:1883", format: sparkplug, group: x, node: x}
 )";
 
 constexpr const char* kWords =
@@ -125,8 +139,8 @@ constexpr const char* kWords =
     "refuse read_only high_first master line station pass deny silent exception "
     "viewer operator warn json u16 i16 BADC UW120 GDT220 UB190 400009 400109 "
     "a-1/400209 panasonic-gt b 127.0.0.1:99 10.0.0.0/8 /dev/ttyS9 press/UW140 oven/GDT300 "
-    "a/2 floor1/20 /run/secrets/other /tls/b.crt /tls/b.key /tls/b-ca.crt /tls/b.crl optional "
-    "TLSv1.3 ";
+    "a/2 floor1/20 /run/secrets/other /profiles /tls/b.crt /tls/b.key /tls/b-ca.crt /tls/b.crl "
+    "optional TLSv1.3 ";
 
 /// Alternative values, likely ones first.
 std::vector<std::string> others(const yaml::Node& value) {
@@ -187,27 +201,6 @@ bool makes_a_difference(const yaml::Node& tree, const Leaf& leaf, const config::
     return differs;
 }
 
-TEST(EveryKey, OfAConfigurationMakesADifference) {
-    std::map<std::string, bool> keys;
-    const std::string most = text_of(fs::path(TEST_DATA) / "every_key.yaml");
-    for (const std::string& text : {std::string(kFurther), std::string(kPlain), most}) {
-        yaml::Problems problems("x.yaml");
-        yaml::Node tree = yaml::parse(text, problems);
-        const auto before = load(text);
-        ASSERT_TRUE(before && load(yaml_text(tree)) &&
-                    differences(*before, *load(yaml_text(tree))).empty())
-            << yaml_text(tree);
-        std::vector<Leaf> leaves;
-        find_leaves(tree, "", leaves);
-        for (const Leaf& leaf : leaves) {
-            bool& differs = keys[leaf.key];
-            differs = differs || makes_a_difference(tree, leaf, *before);
-        }
-    }
-    EXPECT_GE(keys.size(), 120U);
-    for (const auto& [key, differs] : keys) EXPECT_TRUE(differs) << key;
-}
-
 std::string generic_path(const std::string& path, const std::string& key) {
     return path.empty() ? key : path + '/' + key;
 }
@@ -237,6 +230,66 @@ std::optional<config::Config> load_with(const char* base, const std::string& pat
     scalar.scalar = value;
     if (!value.empty()) maps[0]->entries.push_back({key, {}, scalar});
     return load(yaml_text(tree));
+}
+
+/// Values that the key may have, by what the table says of it.
+std::vector<std::string> values_of(const yaml::KeyShape& key) {
+    std::vector<std::string> all = key.words;
+    if (key.kind == yaml::KeyShape::Kind::boolean) return {"true", "false"};
+    if (key.kind == yaml::KeyShape::Kind::integer)
+        for (const std::int64_t value : {key.min, key.max, key.min + 1, key.max - 1})
+            all.push_back(std::to_string(value));
+    if (key.kind == yaml::KeyShape::Kind::duration)
+        for (const Duration value : {key.shortest, key.longest, Duration(20ms), Duration(2s)})
+            all.push_back(yaml::format_duration(value));
+    std::istringstream words(kWords);
+    for (std::string word; words >> word;) all.push_back(word);
+    return all;
+}
+
+/// True if some value of the key is not what leaving it out, or another value, means: of a key that
+/// none of these texts has.
+bool shows(const yaml::KeyShape& key) {
+    for (const char* base : {kPlain, kFurther}) {
+        std::optional<config::Config> first = load_with(base, key.path, "");
+        for (const std::string& value : values_of(key)) {
+            const auto other = load_with(base, key.path, value);
+            if (other && first && !differences(*first, *other).empty()) return true;
+            if (!first) first = other;  // it cannot be left out
+        }
+    }
+    return false;
+}
+
+/// A key that is new in a table is here without another line: it is loaded, and `--diff`, a reload
+/// and `config get` know it. What the documents and the schema have of it: test_reference.
+TEST(EveryKey, OfAConfigurationMakesADifference) {
+    using Kind = yaml::KeyShape::Kind;
+    std::map<std::string, bool> keys;
+    const std::string most = text_of(fs::path(TEST_DATA) / "every_key.yaml");
+    for (const std::string& text :
+         {std::string(kFurther), std::string(kPlain), std::string(kApart), most}) {
+        yaml::Problems problems("x.yaml");
+        yaml::Node tree = yaml::parse(text, problems);
+        const auto before = load(text);
+        ASSERT_TRUE(before && load(yaml_text(tree)) &&
+                    differences(*before, *load(yaml_text(tree))).empty())
+            << yaml_text(tree);
+        std::vector<Leaf> leaves;
+        find_leaves(tree, "", leaves);
+        for (const Leaf& leaf : leaves) {
+            bool& differs = keys[leaf.key];
+            differs = differs || makes_a_difference(tree, leaf, *before);
+        }
+    }
+    EXPECT_GE(keys.size(), 120U);
+    for (const auto& [key, differs] : keys) EXPECT_TRUE(differs) << key;
+    for (const yaml::KeyShape& key : config::describe().keys) {
+        const bool has_value = key.kind != Kind::map && key.kind != Kind::list;
+        const bool is_template = key.path.find("template") != std::string::npos;
+        if (has_value && !is_template && !keys.contains(key.path))
+            EXPECT_TRUE(shows(key)) << key.path;
+    }
 }
 
 TEST(EveryKey, MeansItsDefaultWhereItIsLeftOut) {
