@@ -55,6 +55,13 @@ constexpr std::array kExamples{
     Example{"schema", "schema > panelgate.schema.json"},
     Example{"import", "import /etc/mbusd.conf > panelgate.yaml"},
     Example{"address", "address panasonic-gt GDT108\naddress autonics-gplp-s coil/288"},
+    Example{"cert",
+            "cert new-ca\ncert new-server gateway.plant 10.0.0.5\n"
+            "cert new-client scada --role operator\ncert revoke scada.crt"},
+    Example{"new-ca", "cert new-ca"},
+    Example{"new-server", "cert new-server gateway.plant 10.0.0.5"},
+    Example{"new-client", "cert new-client scada --role operator"},
+    Example{"revoke", "cert revoke scada.crt"},
     Example{"profiles", "profiles\nprofiles autonics-gplp-s\nprofiles --check acme-meter.yaml"},
 };
 

@@ -41,7 +41,8 @@ class CommandLine(unittest.TestCase):
         listed = self.expect(0, "help").stdout.split("\nExamples:")[0].split("\nBegin:")[1]
         commands = [[name] for name in re.findall(r"(?m)^  (\w+)", listed) if name not in ("help", "version")]
         self.assertGreater(len(commands), 18)
-        for command in [[], *commands, ["config", "get"], ["config", "keys"]]:
+        for command in [[], *commands, ["config", "get"], ["config", "keys"],
+                        *(["cert", name] for name in ("new-ca", "new-server", "new-client", "revoke"))]:
             text = self.expect(0, *command, "--help").stdout
             self.assertLessEqual(max(map(len, text.splitlines())), 80, text)
             self.assertRegex(text, rf"\nExamples?:\n  panelgate {' '.join(command)}")
