@@ -49,6 +49,10 @@ bool write(const OutputFile& output, const std::string& text) {
     std::FILE* file = std::fopen(output.file.c_str(), output.force ? "w" : "wx");
     const bool written = file != nullptr && std::fputs(text.c_str(), file) >= 0;
     const bool closed = file != nullptr && std::fclose(file) == 0;
+    const int why = errno;
+    const bool is_part = file != nullptr && !(written && closed);
+    if (is_part && !output.force) ::unlink(output.file.c_str());
+    errno = why;
     return written && closed;
 }
 

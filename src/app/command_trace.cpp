@@ -261,10 +261,13 @@ ExitCode write_new(const std::string& file, const std::string& text) {
         written = now > 0;
         if (written) done += static_cast<std::size_t>(now);
     }
-    if (!written)
-        std::cerr << "panelgate: cannot write " << file << ": " << std::strerror(errno) << '\n';
-    if (fd >= 0) ::close(fd);
-    return written ? kFine : kInternal;
+    const int why = errno;
+    const bool closed = fd < 0 || ::close(fd) == 0;
+    if (written && closed) return kFine;
+    std::cerr << "panelgate: cannot write " << file << ": " << std::strerror(written ? errno : why)
+              << '\n';
+    if (fd >= 0) ::unlink(file.c_str());  // a part of it is no report
+    return kInternal;
 }
 
 }  // namespace

@@ -41,9 +41,8 @@ constexpr const char* kExamples =
     "  panelgate address panasonic-gt GDT108            where a notation is in Modbus\n";
 constexpr const char* kFirstSteps =
     "To begin:\n"
-    "  panelgate demo                                   look at it: simulated panels, no hardware\n"
-    "  panelgate init /dev/ttyUSB0 -o panelgate.yaml    find the panels of a line, and write a\n"
-    "                                                   configuration (scan only looks)\n"
+    "  panelgate demo                                   simulated panels, no hardware\n"
+    "  panelgate init /dev/ttyUSB0 -o panelgate.yaml    find panels, write a file\n"
     "  panelgate run -c panelgate.yaml                  serve them\n";
 
 /// The command line; parsing it runs the command.

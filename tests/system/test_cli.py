@@ -142,6 +142,13 @@ class CommandLine(unittest.TestCase):
             finally:
                 program.terminate()
 
+    def test_a_port_that_is_taken_is_told_before_a_panel_is_asked(self):
+        with socket.create_server(("127.0.0.1", 0)) as taken:
+            ended = self.expect(UNAVAILABLE, "demo", "--http", "127.0.0.1:0", "--modbus",
+                                f"127.0.0.1:{taken.getsockname()[1]}")
+        self.assertIn("cannot start", ended.stderr)
+        self.assertNotIn("line up", ended.stderr)
+
     def test_a_service_whose_stdout_is_closed_runs_and_ends_like_any_other(self):
         start = 'exec "$0" demo --http 127.0.0.1:0 --modbus 127.0.0.1:0 >&-'
         with subprocess.Popen(["sh", "-c", start, harness.PANELGATE], stderr=subprocess.PIPE,

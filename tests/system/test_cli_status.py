@@ -3,6 +3,7 @@ import json
 import os
 import pathlib
 import pty
+import resource
 import signal
 import stat
 import subprocess
@@ -147,6 +148,15 @@ class State(unittest.TestCase):
         named = self.ask("report", cwd=self.folder)
         self.assertEqual(named.returncode, 0, named.stderr)
         self.assertEqual(len(list(self.folder.glob("panelgate-report-*Z.json"))), 1)
+
+    def test_a_report_that_finds_no_room_is_an_error_and_leaves_no_part(self):
+        def small():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+        file = self.folder / "report.json"
+        told = self.ask("report", "-o", str(file), preexec_fn=small, restore_signals=False)
+        self.assertEqual((told.returncode, file.exists()), (INTERNAL, False), told.stderr)
+        self.assertIn(f"cannot write {file}: File too large", told.stderr)
 
     def test_names_are_printed_for_the_shell(self):
         self.assertEqual(self.ask("names").stdout.split(), ["press", "mixer", "io", "oven", "filler"])
