@@ -47,6 +47,7 @@ relays: [{from: press/UW100, to: press/UW200, count: 8, every: 1s}]
 mqtt: {broker: "mqtt://broker.plant:1883"}
 log: {level: info}
 realtime: {priority: 20}
+audit: {file: /var/log/panelgate/audit.jsonl}
 )";
 
 /// Every file holds a token.

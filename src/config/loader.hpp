@@ -81,5 +81,6 @@ void load_modbus_tcp(Loading& loading, yaml::MapReader& root);
 void load_serial_masters(Loading& loading, yaml::MapReader& root);
 void load_http(Loading& loading, yaml::MapReader& root);
 void load_mqtt(Loading& loading, yaml::MapReader& root);
+void load_audit(Loading& loading, yaml::MapReader& root);
 
 }  // namespace panelgate::config

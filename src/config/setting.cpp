@@ -156,6 +156,7 @@ std::vector<Setting> all_settings(const Config& config) {
         relay_keys().show(top.item("relays", relay.name()), relay);
     log_keys().show(top.below("log"), config.log);
     realtime_keys().show(top.below("realtime"), config.realtime);
+    if (config.audit) audit_keys().show(top.below("audit"), *config.audit);
     find_idle(all);
     return all;
 }

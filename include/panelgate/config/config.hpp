@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/audit/settings.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/points/settings.hpp"
@@ -75,6 +76,7 @@ struct Config {
     std::optional<mqtt::Settings> mqtt;  ///< empty: values go to no broker
     rt::LogSettings log;
     rt::RealtimeSettings realtime;
+    std::optional<audit::Settings> audit{};  ///< empty: nothing is recorded
     /// Where each line's name stands, by that name.
     std::map<std::string, yaml::Mark> line_marks;
     /// Warnings of legal but questionable settings ("8N1 is outside the standard"), as

@@ -99,6 +99,7 @@ mqtt: {broker: "mqtts://b:8883", topic: x, qos: 1, client_id: x, username: x, st
        certificate: /run/secrets/ops, key: /run/secrets/ops}
 relays: [{from: a-1/400001, to: a-1/400101, on_change: true, refresh: 60s}]
 realtime: {priority: 20, lock_memory: true}
+audit: {file: /var/log/audit.jsonl, rotate: 10MiB, keep: 5, on_failure: refuse_writes, syslog: true}
 )";
 
 constexpr const char* kWords =
@@ -107,7 +108,7 @@ constexpr const char* kWords =
     "refuse read_only high_first master line station pass deny silent exception "
     "viewer operator warn json u16 i16 BADC UW120 GDT220 UB190 400009 400109 "
     "a-1/400209 panasonic-gt b 127.0.0.1:99 10.0.0.0/8 /dev/ttyS9 press/UW140 oven/GDT300 "
-    "a/2 floor1/20 /run/secrets/other ";
+    "a/2 floor1/20 /run/secrets/other 20MiB continue ";
 
 /// Alternative values, likely ones first.
 std::vector<std::string> others(const yaml::Node& value) {
