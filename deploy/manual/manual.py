@@ -141,6 +141,9 @@ def completion(commands, about):
               for command in commands for names, words in command.options() if words]
     options = [case(f"{command.name}:*", " ".join(name for names, _ in command.options()
                                                   for name in names)) for command in commands]
+    values += [case(f"{command.name}:{command.name}", " ".join(
+        left for left, _ in command.entries if not left.startswith("-")))
+        for command in commands if command.usage[-1] == "SUBCOMMAND"]
     helped = case("help:*", " ".join(command.name for command in commands))
     asking = [command.name for command in commands if "STATION" in command.usage]
     described = [f"            {quoted(f'{name}:{what}')}" for name, what in about.items()]

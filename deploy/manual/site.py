@@ -2,8 +2,9 @@
 """site.py OUT VERSION [--inside]: docs/*.md as pages of HTML in OUT, with contents, search and pictures.
 
 Without --inside OUT is a site of its own, for a web server or a USB stick: no page needs a server. With it,
-OUT is what the program serves below /docs/, and the page of REST is what it serves at /docs. A link, an
-anchor or a picture that is not there ends it. Wants python3-markdown-it.
+OUT is what the program serves below /docs/, and the page of REST is what it serves at /docs. A page may
+have `<!-- words: ... -->`: what people call it who do not know our word; the search finds it by them. A link,
+an anchor or a picture that is not there ends it. Wants python3-markdown-it.
 """
 import html
 import json
@@ -24,6 +25,7 @@ ROOT = HERE.parents[1]
 DOCS = ROOT / "docs"
 THEME = HERE / "site"
 PALETTE = ROOT / "src/web/page/page.css"
+WORDS = re.compile(r"<!-- words: (.+?) -->")
 FEW = 8       # headings of a page that are listed without a click
 REST = "rest.html"
 
@@ -63,11 +65,14 @@ class Page:
         """Collects what is searched, and where links lead."""
         headings = iter(self.headings)
         heading = False
+        called = []
         for token in self.tokens:
             if token.type == "heading_open":
                 heading = True
                 level, text, name = next(headings)
                 self.parts.append([name if level > 1 else "", text, []])
+            elif token.type == "html_block":
+                called += WORDS.findall(token.content)
             elif token.type in ("fence", "code_block"):
                 self.parts[-1][2].append(token.content)
             elif token.type == "inline":
@@ -77,6 +82,7 @@ class Page:
                 for one in token.children:
                     self.targets += [one.attrGet("href") or one.attrGet("src")] \
                         if one.type in ("link_open", "image") else []
+        self.parts[0][2] += called  # behind the text, of which the search shows a piece
 
     def ids(self):
         return {name for _, _, name in self.headings}

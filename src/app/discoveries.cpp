@@ -58,6 +58,7 @@ LineDiscovery::LineDiscovery(rt::Clock& clock, bus::BusClient& bus,
       share_percent_(static_cast<unsigned>(std::lround(settings.share * kHundred))),
       on_step_(std::move(on_step)),
       client_(bus::next_client_id()),
+      who_(own_task(kName)),
       alarm_(clock.make_alarm()),
       began_(clock.now()),
       ended_(began_) {}
@@ -83,6 +84,7 @@ void LineDiscovery::ask(const scan::ReadRequest& request) {
         .station = request.station(),
         .request = *modbus::Request::make(std::move(pdu), modbus::QuantityCheck::wide),
         .client = client_,
+        .who = who_,
         .poll = true,
         .patience = kScanPatience,
         .search = true};

@@ -54,6 +54,7 @@ class LineDiscovery : public std::enable_shared_from_this<LineDiscovery> {
     unsigned share_percent_;
     std::function<void()> on_step_;
     bus::ClientId client_;
+    WhoRef who_;
     std::unique_ptr<rt::Alarm> alarm_;
     State state_ = State::running;
     std::string why_;

@@ -331,14 +331,18 @@ std::string text_of(const serial_server::Settings& master) {
     return text + text_of(master.access.units);
 }
 
-std::string text_of(web::Role role) {
+std::string text_of(Role role) {
     switch (role) {
-        case web::Role::none:
+        case Role::none:
             return "nothing";
-        case web::Role::viewer:
+        case Role::viewer:
             return "read";
-        case web::Role::operator_:
+        case Role::operator_:
             return "read and write";
+        case Role::engineer:
+            return "read, write, raw, broadcast, discover and simulator";
+        case Role::admin:
+            return "everything";
     }
     std::abort();
 }

@@ -83,6 +83,11 @@ BrokerSession::BrokerSession(boost::asio::any_io_executor executor, rt::Clock& c
       publisher_(settings_, subjects_of(*snapshot->config)),
       alarm_(clock.make_alarm()),
       rebirth_alarm_(clock.make_alarm()),
+      who_(make_who({.face = Face::mqtt,
+                     .name = kMqttName,
+                     .listener = settings_.broker(),
+                     .role = Role::operator_,
+                     .user = settings_.username})),
       writes_(std::make_shared<Writes>(Writes{this, bus::next_client_id()})),
       client_(std::move(executor), clock, settings_, publisher_,
               [this](const mqtt::Command& command) { on_command(command); }) {
@@ -263,6 +268,7 @@ void BrokerSession::write(const mqtt::WriteCommand& command) {
     }
     bus::Request request = order->request;
     request.client = writes_->client;
+    request.who = who_;
     station.bus->name_client(writes_->client, kMqttName);
     ++writes_->open;
     auto made = std::make_shared<const Order>(

@@ -98,6 +98,7 @@ class BrokerSession {
     TimePoint next_rebirth_{};                  ///< earliest time of the next rebirth
     bool rebirth_waits_ = false;
     mqtt::Counters counters_;         ///< of writes, and of earlier sessions
+    WhoRef who_;                      ///< who writes: whoever may publish at the broker
     std::shared_ptr<Writes> writes_;  ///< null once another session has taken them over
     mqtt::Client client_;
 };

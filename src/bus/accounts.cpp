@@ -93,32 +93,29 @@ std::string place_of(const modbus::Request& request) {
 
 }  // namespace
 
-std::optional<WriteRecord> write_record_of(const Request& request,
-                                           const arbiter::ClientNames& names) {
+std::optional<WriteRecord> write_record_of(const Request& request) {
     if (request.poll || !may_write(request.request.pdu())) return std::nullopt;
-    return WriteRecord{names.of(request.client), place_of(request.request),
-                       hex_of(request.request.pdu()), 0};
+    return WriteRecord{request.who, place_of(request.request), hex_of(request.request.pdu()), 0};
 }
 
-std::optional<WriteRecord> write_record_of(ByteView pdu, ClientId client,
-                                           const arbiter::ClientNames& names) {
+std::optional<WriteRecord> write_record_of(ByteView pdu, const WhoRef& who) {
     if (!may_write(pdu)) return std::nullopt;
     const auto request =
         modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
-    return WriteRecord{names.of(client), request ? place_of(*request) : std::string(), hex_of(pdu),
-                       0};
+    return WriteRecord{who, request ? place_of(*request) : std::string(), hex_of(pdu), 0};
 }
 
 void log_write(const Settings& settings, std::uint8_t station, const WriteRecord& write,
                Outcome outcome) {
     const std::string name =
         station == 0 ? std::string("broadcast") : name_of(settings.stations, station);
-    const std::string client = without_port(write.client);
+    const std::string full_name = text_of(write.who);
+    const std::string client = without_port(full_name);
     const std::string place = settings.name + '/' + name + ' ' + write.place;
     const std::string ended(label(outcome));
     const bool accepted = is_accepted(write, outcome);
     std::vector<rt::LogField> fields{
-        {"line", settings.name}, {"station", name}, {"client", write.client}};
+        {"line", settings.name}, {"station", name}, {"client", full_name}};
     if (!write.place.empty()) fields.push_back({"at", write.place});
     fields.push_back({"pdu", accepted ? write.pdu : shortened(write.pdu)});
     fields.push_back({"outcome", ended});
@@ -382,10 +379,9 @@ void Account::add(std::uint8_t station, std::uint8_t function,
     observe(settings_, TransactionEvent{station, function, outcome, took});
 }
 
-void Account::add_refused(std::uint8_t station, ByteView pdu, ClientId client,
-                          const arbiter::ClientNames& names) {
+void Account::add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) {
     if (pdu.empty()) return;
-    add(station, pdu[0], write_record_of(pdu, client, names), Outcome::refused, Duration::zero());
+    add(station, pdu[0], write_record_of(pdu, who), Outcome::refused, Duration::zero());
 }
 
 }  // namespace panelgate::bus

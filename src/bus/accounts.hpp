@@ -14,6 +14,7 @@
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/who.hpp"
 #include "panelgate/base/words.hpp"
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/bus/bus_client.hpp"
@@ -27,19 +28,17 @@ void log_event(const Settings& settings, const arbiter::StationEvent& event);
 
 /// What is logged of a client's write when it ends.
 struct WriteRecord {
-    std::string client;
+    WhoRef who;
     std::string place;  ///< "holding-registers/100", or empty
     std::string pdu;    ///< hex
     /// The last transaction made for it, as in the trace; 0: none.
     arbiter::Transaction transaction = 0;
 };
 
-/// Returns nullopt for reads and for requests without a client (polls, relays).
-std::optional<WriteRecord> write_record_of(const Request& request,
-                                           const arbiter::ClientNames& names);
+/// Returns nullopt for reads and for the gateway's own requests (polls, relays).
+std::optional<WriteRecord> write_record_of(const Request& request);
 /// The same for a PDU that was never submitted; without `place` if it is not a valid request.
-std::optional<WriteRecord> write_record_of(ByteView pdu, ClientId client,
-                                           const arbiter::ClientNames& names);
+std::optional<WriteRecord> write_record_of(ByteView pdu, const WhoRef& who);
 /// Logs at info. Every transmitted write is logged with its whole PDU (rt::log_each); writes that
 /// were refused or abandoned before are rate-limited.
 void log_write(const Settings& settings, std::uint8_t station, const WriteRecord& write,
@@ -183,8 +182,7 @@ class Account {
     void add(std::uint8_t station, std::uint8_t function, const std::optional<WriteRecord>& write,
              Outcome outcome, Duration took);
     /// Counts a request that a server refused before submitting it. An empty PDU is ignored.
-    void add_refused(std::uint8_t station, ByteView pdu, ClientId client,
-                     const arbiter::ClientNames& names);
+    void add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who);
 
     RequestCounters& counters() { return counters_; }
     const RequestCounters& counters() const { return counters_; }

@@ -185,7 +185,7 @@ void Bus::State::on_bytes(ByteView bytes) {
 void Bus::State::transact(Request request, AnswerHandler handler) {
     const modbus::Request& what = request.request;
     Pending entry{std::move(handler), request.station, what.function(), clock.now()};
-    entry.write = write_record_of(request, arbiter.client_names());
+    entry.write = write_record_of(request);
     entry.client = request.client;
     clients.count_request(request.client);
     const bool broadcast = request.station == 0;
@@ -205,7 +205,7 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     arbiter::Job job{.station = request.station,
                      .request = std::move(request.request),
                      .client = request.client,
-                     .host = request.host,
+                     .host = request.who ? request.who->host : 0,
                      .priority = priority,
                      .asked_function = entry.sent_as == 0 ? std::uint8_t{0} : entry.function,
                      .within = request.within,
@@ -338,8 +338,8 @@ void Bus::transact(Request request, AnswerHandler handler) {
     state_->call([&] { state_->transact(std::move(request), std::move(handler)); });
 }
 
-void Bus::count_refused(std::uint8_t station, ByteView pdu, ClientId client) {
-    state_->account.add_refused(station, pdu, client, state_->arbiter.client_names());
+void Bus::count_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) {
+    state_->account.add_refused(station, pdu, who);
 }
 
 /// Keeps a disconnecting client's use of the line in the list of clients.

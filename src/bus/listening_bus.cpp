@@ -345,7 +345,7 @@ Refusal ListeningBus::State::refusal(std::uint8_t station) const {
 
 void ListeningBus::State::refuse(Request request, AnswerHandler handler) {
     const std::uint8_t function = request.request.function();
-    account.add(request.station, function, write_record_of(request, names), Outcome::refused,
+    account.add(request.station, function, write_record_of(request), Outcome::refused,
                 Duration::zero());
     Answer answer;
     answer.refusal = refusal(request.station);
@@ -398,8 +398,8 @@ void ListeningBus::transact(Request request, AnswerHandler handler) {
     state_->refuse(std::move(request), std::move(handler));
 }
 
-void ListeningBus::count_refused(std::uint8_t station, ByteView pdu, ClientId client) {
-    state_->account.add_refused(station, pdu, client, state_->names);
+void ListeningBus::count_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) {
+    state_->account.add_refused(station, pdu, who);
 }
 
 void ListeningBus::cancel(ClientId client) { state_->names.forget(client); }

@@ -131,10 +131,13 @@ web::Token load_token(Loading& loading, const Node& node) {
     });
     web::Token token;
     token.name = in.required_text("name").value_or("");
-    constexpr std::array<std::pair<std::string_view, web::Role>, 2> kRoles{
-        {{"viewer", web::Role::viewer}, {"operator", web::Role::operator_}}};
+    constexpr std::array<std::pair<std::string_view, Role>, 4> kRoles{
+        {{"viewer", Role::viewer},
+         {"operator", Role::operator_},
+         {"engineer", Role::engineer},
+         {"admin", Role::admin}}};
     if (in.required_text("role"))
-        token.role = in.choice<web::Role>("role", kRoles).value_or(web::Role::viewer);
+        token.role = in.choice<Role>("role", kRoles).value_or(Role::viewer);
     token.secret = load_secret(loading, in, elsewhere, token);
     token_keys().read(in, token);
     in.finish();

@@ -146,10 +146,12 @@ const Keys<serial_server::Settings>& master_keys() {
 }
 
 const Keys<web::Settings>& http_keys() {
-    using web::Role;
     using web::Settings;
-    static constexpr Words<Role, 3> kRoles{
-        {{"none", Role::none}, {"viewer", Role::viewer}, {"operator", Role::operator_}}};
+    static constexpr Words<Role, 5> kRoles{{{"none", Role::none},
+                                            {"viewer", Role::viewer},
+                                            {"operator", Role::operator_},
+                                            {"engineer", Role::engineer},
+                                            {"admin", Role::admin}}};
     static const auto kKeys =
         Keys<Settings>()
             .other("listen", "ADDR:PORT or [ADDR]:PORT.",
@@ -157,7 +159,8 @@ const Keys<web::Settings>& http_keys() {
             .initially("127.0.0.1:8080")
             .change_needs(kListensAnew)
             .word("anonymous", &Settings::anonymous, kRoles,
-                  "Role without a token: none, viewer (reads), operator (reads and writes).")
+                  "Role without a token: none, viewer (reads), operator (reads and writes), "
+                  "engineer (also raw, broadcast, discover, simulator), admin (also reload).")
             .other("hosts",
                    "Its names in URLs, besides its addresses and localhost; another name "
                    "is answered 421. Without it the machine's name.",
@@ -179,7 +182,9 @@ const Keys<web::Token>& token_keys() {
         Keys<web::Token>()
             .other("name", "Name that is in the log; unique.",
                    [](const web::Token& token) { return token.name; })
-            .other("role", "viewer reads, operator reads and writes.",
+            .other("role",
+                   "viewer reads, operator writes, engineer also raw, broadcast, discover and "
+                   "simulator, admin also reload.",
                    [](const web::Token& token) { return std::string(label(token.role)); })
             .other("file", "File that holds the token, and nothing else.",
                    [](const web::Token& token) { return token.file; });

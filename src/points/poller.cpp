@@ -4,6 +4,8 @@
 #include <optional>
 #include <utility>
 
+#include "panelgate/base/who.hpp"
+
 namespace panelgate::points {
 
 struct Poller::State : std::enable_shared_from_this<Poller::State> {
@@ -12,6 +14,7 @@ struct Poller::State : std::enable_shared_from_this<Poller::State> {
         std::string name;
         bus::ClientId client =
             bus::next_client_id();  ///< one client each, so that stations take turns
+        WhoRef who;
         PlanLimits limits;
         std::shared_ptr<StationPolls> polls;
     };
@@ -22,7 +25,7 @@ struct Poller::State : std::enable_shared_from_this<Poller::State> {
     void send_due();
     StationPtr make(PolledStation wanted) const;
     void apply(std::vector<PolledStation> wanted);
-    void set_client_name(const Station& station);
+    void set_client_name(Station& station);
     void ask(const StationPtr& station, StationPolls::Due due);
     void on_answer(Station& station, std::size_t read, const bus::Answer& answer, TimePoint asked);
     void on_write(const bus::WriteEvent& write);
@@ -48,6 +51,7 @@ void Poller::State::ask(const StationPtr& station, StationPolls::Due due) {
     bus::Request request{.station = station->id,
                          .request = std::move(due.request),
                          .client = station->client,
+                         .who = station->who,
                          .poll = true};
     bus.transact(std::move(request),
                  [weak = weak_from_this(), of = std::weak_ptr(station), read = due.read,
@@ -77,10 +81,11 @@ Poller::State::StationPtr Poller::State::make(PolledStation wanted) const {
     return made;
 }
 
-void Poller::State::set_client_name(const Station& station) {
+void Poller::State::set_client_name(Station& station) {
     const std::string called =
         station.name.empty() ? "station " + std::to_string(station.id) : station.name;
-    bus.name_client(station.client, "poll of " + called);
+    station.who = own_task("poll of " + called);
+    bus.name_client(station.client, station.who->name);
 }
 
 void Poller::State::apply(std::vector<PolledStation> wanted) {

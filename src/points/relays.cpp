@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "panelgate/base/who.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
@@ -79,12 +80,14 @@ struct Relays::State : std::enable_shared_from_this<Relays::State> {
     struct Entry : std::enable_shared_from_this<Entry> {
         Entry(rt::Clock& clock, RelayRoute r) : route(std::move(r)), alarm(clock.make_alarm()) {
             status.name = route.relay.name();
+            who = own_task("relay " + status.name);
         }
         RelayRoute route;
         std::unique_ptr<rt::Alarm> alarm;
         TimePoint due;
         RelayStatus status;
         bus::ClientId client = bus::next_client_id();
+        WhoRef who;
         Bytes writing;              ///< the write in progress
         Bytes written;              ///< the last confirmed write
         TimePoint written_turn;     ///< its turn
@@ -135,7 +138,11 @@ void Relays::State::ask(Entry& entry, bus::BusClient& bus, std::uint8_t station,
     auto request = modbus::Request::make(std::move(pdu), modbus::QuantityCheck::wide);
     if (!request) return (this->*then)(entry, bus::Answer{.pdu = request.error()});
     bus.transact(
-        {.station = station, .request = std::move(*request), .client = entry.client, .poll = true},
+        {.station = station,
+         .request = std::move(*request),
+         .client = entry.client,
+         .who = entry.who,
+         .poll = true},
         [weak = weak_from_this(), kept = entry.weak_from_this(), then](const bus::Answer& answer) {
             const auto self = weak.lock();
             const auto alive = kept.lock();
@@ -261,7 +268,7 @@ void Relays::State::apply(std::vector<RelayRoute> routes) {
 void Relays::State::begin(Entry& entry, TimePoint due) {
     entry.due = due;
     for (bus::BusClient* bus : {entry.route.from, entry.route.to})
-        bus->name_client(entry.client, "relay " + entry.status.name);
+        bus->name_client(entry.client, entry.who->name);
     arm(entry);
 }
 

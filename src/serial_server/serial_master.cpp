@@ -31,6 +31,15 @@ bool is_failure(modbus::ExceptionCode code) {
            code == gateway_target_failed;
 }
 
+/// Both callers of one master share its turns.
+WhoRef known_as(const std::string& master) {
+    return make_who({.face = Face::serial_master,
+                     .name = std::string(kProtocol) + ' ' + master,
+                     .listener = master,
+                     .role = Role::operator_,
+                     .host = host_number(kProtocol + master)});
+}
+
 }  // namespace
 
 class SerialMaster::Core final : public line::Line::Events,
@@ -42,8 +51,8 @@ class SerialMaster::Core final : public line::Line::Events,
           map_(std::move(units)),
           clock_(clock),
           line_(std::move(line)),
-          request_caller_(settings_.name, bus::host_of(kProtocol + settings_.name), kProtocol),
-          broadcast_caller_(settings_.name, bus::host_of(kProtocol + settings_.name), kProtocol),
+          request_caller_(settings_.name, known_as(settings_.name)),
+          broadcast_caller_(settings_.name, known_as(settings_.name)),
           conversation_(settings_, served_by(map_)),
           drive_(clock, *line_, conversation_, *this) {}
 

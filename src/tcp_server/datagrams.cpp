@@ -15,6 +15,7 @@
 #include <variant>
 
 #include "panelgate/base/network.hpp"
+#include "panelgate/base/who.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/modbus/framing.hpp"
 #include "panelgate/modbus/function.hpp"
@@ -261,7 +262,13 @@ Datagrams::Peer* Datagrams::peer(const Endpoint& from) {
     if (const auto known = peers_.find(from); known != peers_.end()) return &known->second;
     if (!make_room(from)) return nullptr;
     const std::string address = from.address().to_string();
-    Caller caller(endpoint_text(address, from.port()) + " udp", bus::host_of(address));
+    std::string name = endpoint_text(address, from.port()) + " udp";
+    WhoRef who = make_who({.face = Face::udp,
+                           .name = "modbus_tcp " + name,
+                           .address = address,
+                           .listener = shared_->settings.name(),
+                           .role = Role::operator_});
+    Caller caller(std::move(name), std::move(who));
     const auto on_answer = [weak = weak_from_this(), from] {
         if (const auto self = weak.lock()) self->answer(from);
     };

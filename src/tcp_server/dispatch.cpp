@@ -68,25 +68,24 @@ std::vector<bus::BusClient*> UnitMap::broadcast_lines(std::uint8_t unit) const {
     return lines_;
 }
 
-Caller::Caller(std::string name, bus::Host host, std::string protocol)
-    : name_(std::move(name)), protocol_(std::move(protocol)), host_(host) {}
+Caller::Caller(std::string name, WhoRef who) : name_(std::move(name)), who_(std::move(who)) {}
 
 void Caller::transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,
                       bus::AnswerHandler handler) {
     use(bus);
     bus->transact(
-        {.station = station, .request = std::move(request), .client = client_, .host = host_},
+        {.station = station, .request = std::move(request), .client = client_, .who = who_},
         std::move(handler));
 }
 
 void Caller::count_refused(bus::RequestPort* bus, std::uint8_t station, ByteView pdu) {
     use(bus);
-    bus->count_refused(station, pdu, client_);
+    bus->count_refused(station, pdu, who_);
 }
 
 /// Names the client on the bus before its first request.
 void Caller::use(bus::RequestPort* bus) {
-    if (used_.insert(bus).second) bus->name_client(client_, protocol_ + ' ' + name_);
+    if (used_.insert(bus).second) bus->name_client(client_, who_->name);
 }
 
 void Caller::withdraw() {

@@ -159,7 +159,7 @@ bool Listener::Core::make_room(const tcp::endpoint& peer) {
     for (const auto& session : sessions_) guests.push_back(session->guest());
     const Settings& settings = shared_->settings;
     const PlaceLimits limits{settings.max_connections, settings.max_connections_per_address};
-    const Place place = find_place(guests, bus::host_of(peer.address().to_string()), limits);
+    const Place place = find_place(guests, host_number(peer.address().to_string()), limits);
     if (!place.found) {
         ++shared_->counters.refused;
         count_refused(peer, place);
@@ -201,7 +201,12 @@ void Listener::Core::admit(tcp::socket socket, const tcp::endpoint& peer) {
             if (const auto self = weak.lock()) self->on_closed(closed);
         });
     sessions_.insert(session);
-    session->start(Caller(text(peer), bus::host_of(peer.address().to_string())));
+    WhoRef who = make_who({.face = Face::modbus_tcp,
+                           .name = "modbus_tcp " + text(peer),
+                           .address = peer.address().to_string(),
+                           .listener = shared_->settings.name(),
+                           .role = Role::operator_});
+    session->start(Caller(text(peer), std::move(who)));
 }
 
 void Listener::Core::on_closed(const std::shared_ptr<Session>& session) {

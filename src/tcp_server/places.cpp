@@ -23,16 +23,16 @@ std::optional<std::size_t> first_to_give_way(std::span<const Guest> guests, May 
     return first;
 }
 
-std::optional<std::size_t> longest_idle_of(std::span<const Guest> guests, bus::Host host) {
+std::optional<std::size_t> longest_idle_of(std::span<const Guest> guests, std::uint64_t host) {
     return first_to_give_way(guests,
                              [host](const Guest& one) { return one.idle && one.host == host; });
 }
 
 /// Chooses for an address that has `own` of the places. Of several with as many, the first to give
 /// way loses its place.
-std::optional<std::size_t> one_of_the_most(std::span<const Guest> guests, bus::Host newcomer,
+std::optional<std::size_t> one_of_the_most(std::span<const Guest> guests, std::uint64_t newcomer,
                                            std::size_t own) {
-    std::map<bus::Host, std::size_t> counts;
+    std::map<std::uint64_t, std::size_t> counts;
     std::size_t most = 0;
     for (const Guest& guest : guests) most = std::max(most, ++counts[guest.host]);
     if (most <= own) return longest_idle_of(guests, newcomer);
@@ -44,7 +44,7 @@ std::optional<std::size_t> one_of_the_most(std::span<const Guest> guests, bus::H
 
 }  // namespace
 
-Place find_place(std::span<const Guest> guests, bus::Host newcomer, const PlaceLimits& limits) {
+Place find_place(std::span<const Guest> guests, std::uint64_t newcomer, const PlaceLimits& limits) {
     Place place;
     place.own = static_cast<std::size_t>(std::ranges::count(guests, newcomer, &Guest::host));
     place.share_used = place.own >= limits.of_address;

@@ -1,19 +1,19 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 
 #include "panelgate/base/time.hpp"
-#include "panelgate/bus/bus_client.hpp"
 
 namespace panelgate::tcp_server {
 
 /// An open connection, as far as its place is concerned.
 struct Guest {
-    bus::Host host = 0;  ///< its address
-    bool idle = false;   ///< nothing is outstanding, or only half a request that does not go on
-    TimePoint heard{};   ///< its last input
+    std::uint64_t host = 0;  ///< its address
+    bool idle = false;       ///< nothing is outstanding, or only half a request that does not go on
+    TimePoint heard{};       ///< its last input
 };
 
 struct PlaceLimits {
@@ -40,6 +40,6 @@ struct Place {
 ///   turns. Not the newest, because that is the one that a leaking client uses: the others have no
 ///   reader any more, or wait for a line that another connection will not make faster.
 /// So an address without a connection always finds a place. Pure.
-Place find_place(std::span<const Guest> guests, bus::Host newcomer, const PlaceLimits& limits);
+Place find_place(std::span<const Guest> guests, std::uint64_t newcomer, const PlaceLimits& limits);
 
 }  // namespace panelgate::tcp_server

@@ -73,8 +73,8 @@ class Session : public std::enable_shared_from_this<Session> {
     std::shared_ptr<Shared> shared_;
     ClosedHandler on_closed_;
     std::shared_ptr<Pipeline> pipeline_;
-    bus::Host host_{};  ///< bus::host_of() its address
-    TimePoint active_;  ///< its last input
+    std::uint64_t host_{};  ///< bus::host_of() its address
+    TimePoint active_;      ///< its last input
 
     Input input_state_ = Input::served;
     std::array<std::uint8_t, 4096> input_{};

@@ -44,11 +44,12 @@ class BusAllocations : public testing::Test {
                                     std::make_unique<test::AnsweringLine>(clock, 1ms));
         bus->start();
     }
+    const WhoRef who = make_who({.face = Face::http, .address = "10.0.0.7"});
     void ask(ClientId client) {
         bus->transact({.station = static_cast<std::uint8_t>(1 + client % 2),
                        .request = request,
                        .client = client,
-                       .host = 1},
+                       .who = who},
                       [this, client](const Answer& answer) {
                           EXPECT_TRUE(answer.pdu.has_value());
                           ++answered;

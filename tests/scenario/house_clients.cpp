@@ -29,7 +29,9 @@ bool HouseClients::idle() const {
 
 void HouseClients::connect(Client& client) {
     const std::uint64_t host = client.plan.host != 0 ? client.plan.host : 1000 + connections_;
-    tcp_server::Caller caller("client " + std::to_string(++connections_), host);
+    const std::string name = "client " + std::to_string(++connections_);
+    tcp_server::Caller caller(
+        name, make_who({.face = Face::modbus_tcp, .name = "modbus_tcp " + name, .host = host}));
     client.pipeline = std::make_shared<tcp_server::Pipeline>(
         shared_, std::move(caller), [this, &client] { take_soon(client); });
 }

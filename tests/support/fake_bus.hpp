@@ -38,7 +38,7 @@ class FakeBus : public bus::BusClient {
         }
     }
 
-    void count_refused(std::uint8_t, ByteView, bus::ClientId) override { ++told_refused; }
+    void count_refused(std::uint8_t, ByteView, const WhoRef&) override { ++told_refused; }
 
     void cancel(bus::ClientId client) override {
         cancelled.push_back(client);

@@ -196,6 +196,14 @@ class Served(unittest.TestCase):
                 self.assertTrue(heading)
                 self.assertTrue(not id_ or id_ in page.ids, (name, id_))
 
+    def test_the_index_has_what_people_call_a_page_who_do_not_know_our_word(self):
+        rows = {name: parts[0][2].split() for name, _, parts in json.loads(self.fetch("/docs/search.js")[1][7:-3])}
+        called = {source: re.findall(r"<!-- words: (.+?) -->", (DOCS / source).read_text()) for source in SOURCES}
+        self.assertGreater(sum(map(bool, called.values())), 10)
+        for source, found in called.items():
+            for words in found:
+                self.assertEqual(rows[re.sub(r"\.md$", ".html", source)][-len(words.split()):], words.split(), source)
+
     def test_rest_has_a_line_of_curl_for_each_call_and_every_member(self):
         text = self.fetch("/docs")[1].decode()
         document = json.loads((ROOT / "src/web/api/openapi/paths.json").read_text())
@@ -306,6 +314,17 @@ class Keys(unittest.TestCase):
                     f"field.value = {json.dumps(title)}; field.dispatchEvent(new Event('input')); "
                     "setTimeout(() => done([...document.querySelectorAll('#site-found a')].map((one) => one.pathname)), 0); })")
                 self.assertIn(page_of(source), found[:3])
+
+    def test_search_finds_by_other_names_and_by_most_of_the_words(self):
+        page = self.open("/docs/")
+        page.script("document.querySelector('#site-words').focus()")
+        page.key("dongle")
+        page.wait("document.querySelector('#site-found a')?.pathname === '/docs/wiring/adapters.html'")
+        page.key(" zebra")
+        page.wait("document.querySelector('#site-count').textContent.endsWith(', with 1 of 2 words')")
+        page.script("document.querySelector('#site-words').value = ''")
+        page.key("zebra")
+        page.wait("document.querySelector('#site-count').textContent === 'Nothing is found.'")
 
     def test_contents_and_next_page(self):
         page = self.open("/docs/start/demo.html")

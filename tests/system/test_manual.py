@@ -98,6 +98,9 @@ class Manual(unittest.TestCase):
                           "_describe() { print -l ${commands%%:*} }; "
                           f"words=({' '.join(words)}); CURRENT=$#words; source {self.folder}/panelgate.zsh")
 
+    def completed_by_fish(self, line):
+        return self.shell("fish", "-c", f"source {self.folder}/panelgate.fish; complete -C '{line}' | cut -f1")
+
     def test_bash_completes_commands_options_and_their_values(self):
         self.assertEqual(self.completed("panelgate", "che"), ["check"])
         self.assertEqual(self.completed("panelgate", "run", "--s"), ["--simulate"])
@@ -111,10 +114,26 @@ class Manual(unittest.TestCase):
             at = ("--http", f"127.0.0.1:{gateway.http_port()}")
             self.assertEqual(self.completed("panelgate", "read", *at, "o"), ["oven"])
             self.assertEqual(self.completed("panelgate", "watch", *at, "oven", "t"), ["temperature"])
+            self.assertEqual(self.completed("panelgate", "read", *at, "oven/t"), ["oven/temperature"])
+            self.assertEqual(self.completed("panelgate", "watch", *at, "oven/mode", "pr"), ["press"])
+            self.assertEqual(self.completed("panelgate", "write", *at, "oven/mode", '""'), [])
+            self.assertEqual(self.completed("panelgate", "trace", *at, "--station", "mi"), ["mixer"])
             self.assertIn("--token-file", self.completed("panelgate", "write", *at, "oven", "--to"))
             if shutil.which("zsh"):
                 self.assertEqual(self.completed_by_zsh("panelgate", "read", *at, "oven", "t"),
-                                 ["temperature", "mode", "files"])
+                                 ["temperature", "mode"])
+                self.assertIn("oven/mode", self.completed_by_zsh("panelgate", "watch", *at, "press/running", "oven/m"))
+            if shutil.which("fish"):
+                self.assertEqual(self.completed_by_fish(f"panelgate read {' '.join(at)} oven/t"), ["oven/temperature"])
+                self.assertEqual(self.completed_by_fish(f"panelgate watch {' '.join(at)} oven/mode pr"), ["press"])
+                self.assertEqual(self.completed_by_fish(f"panelgate trace {' '.join(at)} --station mi"), ["mixer"])
+
+    def test_config_is_completed(self):
+        self.assertEqual(self.completed("panelgate", "config", "k"), ["keys"])
+        self.assertEqual(self.completed("panelgate", "config", "keys", "lines.serial.b"), ["lines.serial.baud"])
+        if shutil.which("fish"):
+            self.assertEqual(self.completed_by_fish("panelgate config k"), ["keys"])
+            self.assertEqual(self.completed_by_fish("panelgate config keys lines.serial.b"), ["lines.serial.baud"])
 
     @unittest.skipUnless(shutil.which("zsh"), "no zsh here")
     def test_zsh_completes_the_same(self):
@@ -125,8 +144,7 @@ class Manual(unittest.TestCase):
 
     @unittest.skipUnless(shutil.which("fish"), "no fish here")
     def test_fish_completes_the_same(self):
-        def completed(line):
-            return self.shell("fish", "-c", f"source {self.folder}/panelgate.fish; complete -C '{line}' | cut -f1")
+        completed = self.completed_by_fish
         self.assertIn("check", completed("panelgate che"))
         self.assertEqual(completed("panelgate check --format "), ["json", "text"])
         self.assertIn("--simulate", completed("panelgate run --s"))

@@ -37,29 +37,31 @@
     const letters = (text) => text.toLowerCase();
     const literally = (word) => word.replace(/[.*+?^${}()|[\]\\/]/g, '\\$&');
 
-    /** How well a part of a page fits: 0 where it lacks a word. */
+    /** Of a part of a page: how many of the words it has, and how well it fits. */
     function score(words, title, heading, text) {
-        let sum = 0;
+        let sum = 0, has = 0;
         for (const word of words) {
             const there = (where) => where.includes(word) ? (new RegExp('(^|[^\\p{L}\\p{N}])' + literally(word), 'u').test(where) ? 2 : 1) : 0;
             const found = 20 * there(heading) + 8 * there(title) + there(text);
-            if (found === 0) return 0;
+            if (found > 0) ++has;
             sum += found;
         }
-        return sum;
+        return [has, sum];
     }
 
+    /** The parts that have all words; where there is none, those that have the most of them. */
     function search(words) {
         const found = [];
         for (const [name, title, parts] of pages) {
             for (const [id, heading, text] of parts) {
-                const fits = score(words, letters(title), letters(heading), letters(text));
+                const [has, fits] = score(words, letters(title), letters(heading), letters(text));
                 // A page is found before its parts, where its title has all the words.
                 const whole = id === '' ? (words.every((word) => letters(title).includes(word)) ? 10 * words.length : 4) : 0;
-                if (fits > 0) found.push({way: base + name + (id ? '#' + id : ''), title, heading, text, fits: fits + whole});
+                if (has > 0) found.push({way: base + name + (id ? '#' + id : ''), title, heading, text, has, fits: fits + whole});
             }
         }
-        return found.sort((one, other) => other.fits - one.fits);
+        const most = Math.max(...found.map((one) => one.has));
+        return found.filter((one) => one.has === most).sort((one, other) => other.fits - one.fits);
     }
 
     /** Some words around the first one that was found, with all of them marked. */
@@ -89,13 +91,19 @@
         return item;
     }
 
+    function counted(all, words) {
+        if (all.length === 0) return 'Nothing is found.';
+        const count = all.length > MOST ? `The first ${MOST} of ${all.length}` : `${all.length} found`;
+        return all[0].has < words.length ? `${count}, with ${all[0].has} of ${words.length} words` : count;
+    }
+
     const close = () => { of('site-found').hidden = true; };
 
     function look() {
         const words = letters(of('site-words').value).split(/\s+/).map((word) => word.replace(/^[^\p{L}\p{N}\/_-]+|[^\p{L}\p{N}\/_#+-]+$/gu, '')).filter(Boolean);
         if (words.length === 0 || pages.length === 0) return close();
         const all = search(words);
-        of('site-count').textContent = all.length === 0 ? 'Nothing is found.' : all.length > MOST ? `The first ${MOST} of ${all.length}` : `${all.length} found`;
+        of('site-count').textContent = counted(all, words);
         of('site-found').querySelector('ol').replaceChildren(...all.slice(0, MOST).map((one) => row(one, words)));
         of('site-found').hidden = false;
         of('site-found').scrollTop = 0;

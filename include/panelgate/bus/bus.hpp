@@ -64,7 +64,7 @@ class Bus final : public LineBus {
                std::shared_ptr<void> far_end) override;
 
     void transact(Request request, AnswerHandler handler) override;
-    void count_refused(std::uint8_t station, ByteView pdu, ClientId client) override;
+    void count_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) override;
     void cancel(ClientId client) override;
     LineStatus status() const override;
     std::vector<ClientShare> clients() const override;

@@ -14,6 +14,7 @@
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/inline_function.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/who.hpp"
 #include "panelgate/base/words.hpp"
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/bus/rights.hpp"
@@ -49,17 +50,13 @@ struct WriteEvent {
 /// Identifies a TCP connection, an HTTP session or an internal task. 0: no client.
 using ClientId = std::uint64_t;
 ClientId next_client_id();
-/// The same for all clients at one address; 0: the client is a host of its own.
-using Host = arbiter::Host;
-/// Returns the host number of an address without its port ("10.0.0.7"); never 0.
-Host host_of(std::string_view address);
 
 /// One request to one station; station 0 is a broadcast.
 struct Request {
     std::uint8_t station = 0;  ///< 0..247
     modbus::Request request;
     ClientId client = 0;
-    Host host = 0;      ///< from host_of(the client's address); 0: a host of its own
+    WhoRef who{};       ///< null: nobody has said; then neither rights nor records know it
     bool poll = false;  ///< lowest priority, after clients' requests
     /// The client's own deadline, from arrival; the line's queue deadline applies if it is sooner.
     Duration within = Duration::max();
@@ -179,10 +176,10 @@ class RequestPort {
     }
     /// Counts (and logs, if it is a write) a request that the caller refused before submitting it:
     /// a PDU that contradicts its function, or a write on a read-only listener.
-    virtual void count_refused(std::uint8_t station, ByteView pdu, ClientId client) {
+    virtual void count_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) {
         static_cast<void>(station);
         static_cast<void>(pdu);
-        static_cast<void>(client);
+        static_cast<void>(who);
     }
     /// Removes a client: its waiting requests are answered Fault::cancelled and never transmitted;
     /// a request on the wire completes and is answered normally.

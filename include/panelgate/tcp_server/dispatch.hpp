@@ -10,6 +10,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
+#include "panelgate/base/who.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
@@ -65,12 +66,13 @@ class UnitMap {
 /// One client as seen by the buses: its identity and the buses it has used.
 class Caller {
   public:
-    /// `name` is its address with port, or its serial port; connections from one address share a
-    /// host. The buses show it as "PROTOCOL NAME".
-    Caller(std::string name, bus::Host host, std::string protocol = "modbus_tcp");
+    /// `who` is never null. `name` is its address with port, or its serial port, for logs; the
+    /// buses show it as `who->name`.
+    Caller(std::string name, WhoRef who);
 
     const std::string& name() const { return name_; }
-    bus::Host host() const { return host_; }
+    const WhoRef& who() const { return who_; }
+    std::uint64_t host() const { return who_->host; }
     /// Passes the request to a bus for one of its stations; station 0: broadcast.
     void transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,
                   bus::AnswerHandler handler);
@@ -84,8 +86,7 @@ class Caller {
     void use(bus::RequestPort* bus);
 
     std::string name_;
-    std::string protocol_;
-    bus::Host host_;
+    WhoRef who_;
     bus::ClientId client_ = bus::next_client_id();
     std::set<bus::RequestPort*> used_;
 };

@@ -110,7 +110,7 @@ std::uint64_t number_of(const HttpRequest& request) {
 /// sent, and one that is on a wire is completed and remembered.
 std::shared_ptr<Caller> worker_for(Caller& client) {
     auto worker = std::make_shared<Caller>(client.id(), client.address());
-    worker->uses_token(client.token());
+    worker->acts_for(client);
     return worker;
 }
 

@@ -76,7 +76,7 @@ asio::awaitable<bus::Answer> ask(std::shared_ptr<Caller> caller, bus::RequestPor
         const bool changes = !request.request.is_read();
         introduce(*caller, bus);
         request.client = caller->id();
-        if (!caller->address().empty()) request.host = bus::host_of(caller->address());
+        request.who = caller->who();
         asio::awaitable<bus::Answer> pending = start_transact(bus, std::move(request));
         bus::Answer answer = co_await std::move(pending);
         answer.transactions.for_each(

@@ -255,7 +255,7 @@ void count_refused(Caller& caller, bus::RequestPort& bus, const json::object& bo
     const auto pdu = hex ? from_hex(*hex) : std::nullopt;
     if (!station || !pdu || pdu->empty() || pdu->size() > modbus::kMaxPdu) return;
     introduce(caller, &bus);
-    bus.count_refused(static_cast<std::uint8_t>(*station), *pdu, caller.id());
+    bus.count_refused(static_cast<std::uint8_t>(*station), *pdu, caller.who());
 }
 
 /// A panel's exception reply is a normal answer here.

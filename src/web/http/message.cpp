@@ -7,6 +7,18 @@
 
 namespace panelgate::web {
 
+void Caller::identify(std::string token, Role role, std::string listener) {
+    if (who_ && who_->token == token && who_->role == role && who_->listener == listener) return;
+    Who who = who_ ? *who_ : Who{.face = Face::http, .address = address_};
+    who.name = "http";
+    if (!address_.empty()) who.name += ' ' + address_;
+    if (!token.empty()) who.name += " token " + token;
+    who.token = std::move(token);
+    who.role = role;
+    who.listener = std::move(listener);
+    who_ = make_who(std::move(who));
+}
+
 void log_client(const Caller& caller, std::string_view event,
                 std::initializer_list<std::pair<std::string_view, std::string>> fields) {
     std::vector<rt::LogField> all{{"client", caller.name()}};

@@ -263,7 +263,9 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     if (found.route == nullptr) co_return to_response(not_found(found));
     const auto refused = co_await admit(&request, found.route->needed, shared);
     if (request.caller->has_left()) co_return HttpResponse();
-    if (request.caller) request.caller->uses_token(token_name(request, site->settings));
+    request.role = role_of(request, site->settings);
+    request.caller->identify(token_name(request, site->settings), request.role,
+                             site->settings.name());
     if (refused) {
         count_refused(request, *refused);
         co_return to_response(*refused);
@@ -272,7 +274,6 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     auto mistaken = probe ? std::nullopt : check_queries(request, found.route->queries);
     if (!mistaken) mistaken = check_encoding(request);
     if (mistaken) co_return to_response(*mistaken);
-    request.role = role_of(request, site->settings);
     request.arguments = std::move(found.arguments);
     Handling handling = found.route->handler(std::move(request));
     HttpResponse response = co_await std::move(handling);

@@ -58,9 +58,12 @@ class BusCase : public testing::Test {
     /// Sends a request; its answer is added to `answers`.
     void send(std::uint8_t station, const Bytes& pdu, std::vector<Answer>& answers,
               ClientId client = 1, bool poll = false) {
-        bus->transact(
-            {.station = station, .request = test::request_of(pdu), .client = client, .poll = poll},
-            [&answers](Answer answer) { answers.push_back(std::move(answer)); });
+        bus->transact({.station = station,
+                       .request = test::request_of(pdu),
+                       .client = client,
+                       .who = who,
+                       .poll = poll},
+                      [&answers](Answer answer) { answers.push_back(std::move(answer)); });
     }
     /// Sends a request and runs the loop until it is answered.
     Answer ask(std::uint8_t station, const Bytes& pdu = kRead, ClientId client = 1,
@@ -87,6 +90,7 @@ class BusCase : public testing::Test {
     test::ManualClock clock;
     Settings settings;
     test::MemoryLine* line = nullptr;
+    WhoRef who;  ///< who asks
     std::unique_ptr<Bus> bus;
 };
 

@@ -57,10 +57,10 @@ TEST_F(BusReportsTest, P6TellsOfEveryWriteBeforeItsAnswer) {
 
 TEST_F(BusReportsTest, CountsAndLogsAWriteThatWasRefusedBeforeItWasARequest) {
     const rt::LogTap log;
-    bus->name_client(1, "modbus_tcp 10.0.0.5:1");
-    bus->count_refused(17, "06 00"_hex, 1);
-    bus->count_refused(0, "05 00 01 FF 00"_hex, 1);
-    bus->count_refused(17, "03 00"_hex, 1);
+    const WhoRef who = make_who({.face = Face::modbus_tcp, .name = "modbus_tcp 10.0.0.5:1"});
+    bus->count_refused(17, "06 00"_hex, who);
+    bus->count_refused(0, "05 00 01 FF 00"_hex, who);
+    bus->count_refused(17, "03 00"_hex, who);
     ASSERT_EQ(log.lines().size(), 2u) << "nobody asks who has read what";
     EXPECT_EQ(log.lines()[0],
               "info write line=floor1 station=press client=\"modbus_tcp 10.0.0.5:1\" "
@@ -76,20 +76,20 @@ TEST_F(BusReportsTest, CountsAndLogsAWriteThatWasRefusedBeforeItWasARequest) {
 
 TEST_F(BusReportsTest, WhatIsNoFunctionIsNoWrite) {
     const rt::LogTap log;
-    bus->count_refused(17, "00"_hex, 1);
-    bus->count_refused(17, "83 02"_hex, 1);
+    bus->count_refused(17, "00"_hex, {});
+    bus->count_refused(17, "83 02"_hex, {});
     EXPECT_EQ(log.count("write"), 0u);
-    bus->count_refused(17, "41 02"_hex, 1);
+    bus->count_refused(17, "41 02"_hex, {});
     EXPECT_EQ(log.count("write"), 1u) << "nobody knows what it does";
 }
 
 TEST_F(BusReportsTest, EveryAcceptedWriteIsInTheLogWhoeverElseHasWritten) {
     line->reply = kWrite;
     const rt::LogTap log;
-    bus->name_client(1, "http ::1 token alice");
+    who = make_who({.face = Face::http, .name = "http ::1 token alice"});
     for (int i = 0; i < 100; ++i) ask(17, kWrite);
     EXPECT_EQ(log.count("token alice"), 1u) << "the same again is gathered";
-    bus->name_client(1, "http ::1 token bob");
+    who = make_who({.face = Face::http, .name = "http ::1 token bob"});
     ask(17, kWrite);
     EXPECT_EQ(log.count("token bob"), 1u);
     EXPECT_EQ(log.count("repeated=99 first="), 1u) << "in one line, before what follows it";

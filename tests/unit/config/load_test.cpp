@@ -191,10 +191,10 @@ TEST(ConfigLoad, ReadsByWhichNamesAndFromWhereAndWithWhichTokensHttpMayBeAsked) 
     ASSERT_EQ(config.http->allow.size(), 2U);
     EXPECT_EQ(config.http->allow[0].address, "10.0.0.0");
     EXPECT_EQ(config.http->allow[0].prefix, 8U);
-    EXPECT_EQ(config.http->anonymous, web::Role::none);
+    EXPECT_EQ(config.http->anonymous, Role::none);
     ASSERT_EQ(config.http->tokens.size(), 1U);
     EXPECT_EQ(config.http->tokens[0].name, "ops");
-    EXPECT_EQ(config.http->tokens[0].role, web::Role::operator_);
+    EXPECT_EQ(config.http->tokens[0].role, Role::operator_);
     EXPECT_EQ(config.http->tokens[0].secret, "s3cret");
     EXPECT_EQ(config.log.level, rt::LogLevel::trace);
     EXPECT_EQ(config.log.format, rt::LogFormat::json);
@@ -470,7 +470,7 @@ TEST(ConfigShipped, TheDemoHasTheFivePanelsOfTheContract) {
               "oven 20 panasonic-gt\nfiller 1 omron-cp2e\n");
     EXPECT_EQ(config.modbus_tcp.at(0).name(), "127.0.0.1:1502");
     EXPECT_EQ(config.http->name(), "127.0.0.1:8080");
-    EXPECT_EQ(config.http->anonymous, web::Role::operator_);
+    EXPECT_EQ(config.http->anonymous, Role::operator_);
 }
 
 }  // namespace

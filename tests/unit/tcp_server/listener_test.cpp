@@ -80,10 +80,10 @@ TEST_F(ListenerTest, P9PassesTheClientAndItsAddressToTheBuses) {
     second.request(1, 0, "06 0000 0001"_hex);
     ASSERT_TRUE(run_until_pending(2));
     read(other, 1, 3);
-    EXPECT_EQ(bus1.seen[0].host, bus::host_of("127.0.0.1"));
-    EXPECT_EQ(bus1.seen[1].host, bus1.seen[0].host);
-    EXPECT_EQ(bus1.seen[2].host, bus::host_of("127.0.0.2"));
-    EXPECT_NE(bus1.seen[2].host, bus1.seen[0].host);
+    EXPECT_EQ(bus1.seen[0].who->address, "127.0.0.1");
+    EXPECT_EQ(bus1.seen[1].who->host, bus1.seen[0].who->host);
+    EXPECT_EQ(bus1.seen[2].who->address, "127.0.0.2");
+    EXPECT_NE(bus1.seen[2].who->host, bus1.seen[0].who->host);
     EXPECT_THAT(bus1.names[bus1.seen[0].client], HasSubstr("modbus_tcp 127.0.0.1:"));
     EXPECT_THAT(bus1.names[bus1.seen[1].client], HasSubstr("modbus_tcp 127.0.0.1:"))
         << "a broadcast is somebody's too";
@@ -99,7 +99,7 @@ TEST_F(ListenerTest, P9TakesIpv4ForTheSameAddressOnAnIpv6Listener) {
     }
     Client client = connect();
     EXPECT_TRUE(is_served(client));
-    EXPECT_EQ(bus1.seen[0].host, bus::host_of("127.0.0.1"));
+    EXPECT_EQ(bus1.seen[0].who->address, "127.0.0.1");
 }
 
 TEST_F(ListenerTest, RefusesTheNewestWhenItIsFullAndNoneIsIdle) {
@@ -293,13 +293,13 @@ TEST_F(ListenerTest, RestsWhileThereAreNoDescriptors) {
 using Guests = std::vector<Guest>;
 
 /// Heard in this second.
-Guest idle(bus::Host host, int second) { return {host, true, TimePoint(1h) + 1s * second}; }
-Guest busy(bus::Host host, int second) { return {host, false, TimePoint(1h) + 1s * second}; }
+Guest idle(std::uint64_t host, int second) { return {host, true, TimePoint(1h) + 1s * second}; }
+Guest busy(std::uint64_t host, int second) { return {host, false, TimePoint(1h) + 1s * second}; }
 
 struct PlaceCase {
     const char* why;
     Guests guests;
-    bus::Host newcomer;
+    std::uint64_t newcomer;
     std::optional<std::size_t> gives_way;
     PlaceLimits limits = {4, 4};
 };

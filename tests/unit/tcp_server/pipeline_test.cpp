@@ -95,7 +95,11 @@ class SmallPipeline : public ::testing::Test {
     std::shared_ptr<Shared> shared = std::make_shared<Shared>(Shared{
         small(), UnitMap(small(), {{"floor1", &bus, {1}, true}}), {}, clock, {}, {}, own_answers});
     std::shared_ptr<Pipeline> pipeline = std::make_shared<Pipeline>(
-        shared, Caller("10.0.0.7:5000", bus::host_of("10.0.0.7")), [this] { ++told; });
+        shared,
+        Caller("10.0.0.7:5000", make_who({.face = Face::modbus_tcp,
+                                          .name = "modbus_tcp 10.0.0.7:5000",
+                                          .address = "10.0.0.7"})),
+        [this] { ++told; });
 };
 
 TEST_F(SmallPipeline, P9WhatTheClientHasNotTakenIsStillInFlight) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/who.hpp"
 #include "panelgate/web/http/event_hub.hpp"
 #include "panelgate/web/http/settings.hpp"
 
@@ -22,20 +23,21 @@ namespace panelgate::web {
 class Caller {
   public:
     /// `id` is unique to this connection; `address` has no port, "" if unknown.
-    Caller(std::uint64_t id, std::string address) : id_(id), address_(std::move(address)) {}
+    Caller(std::uint64_t id, std::string address) : id_(id), address_(std::move(address)) {
+        identify({}, Role::none, {});
+    }
 
     std::uint64_t id() const { return id_; }
     const std::string& address() const { return address_; }
-    /// Returns its display name: "http 10.0.0.9", "http 10.0.0.9 token ops".
-    std::string name() const {
-        std::string text = "http";
-        if (!address_.empty()) text += ' ' + address_;
-        if (!token_.empty()) text += " token " + token_;
-        return text;
-    }
-    /// Sets the name of the current request's token; "" for none.
-    void uses_token(std::string token) { token_ = std::move(token); }
-    const std::string& token() const { return token_; }
+    /// Who makes the current request. Its name is "http 10.0.0.9" or "http 10.0.0.9 token ops".
+    const WhoRef& who() const { return who_; }
+    const std::string& name() const { return who_->name; }
+    const std::string& token() const { return who_->token; }
+    /// Sets what the current request has shown: the name of its token ("": none), its role, and
+    /// where it came in.
+    void identify(std::string token, Role role, std::string listener);
+    /// Asks on behalf of another caller.
+    void acts_for(const Caller& client) { who_ = client.who_; }
     /// True once the connection is over: no reply is wanted, and the site's objects may be gone.
     bool has_left() const { return left_; }
     /// Registers a callback for the connection's end; of several for one `whom` only the first
@@ -76,7 +78,7 @@ class Caller {
   private:
     std::uint64_t id_;
     std::string address_;
-    std::string token_;
+    WhoRef who_;
     bool left_ = false;
     bool hung_up_ = false;
     bool has_effect_ = false;

@@ -1,23 +1,15 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "panelgate/base/network.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/who.hpp"
 
 namespace panelgate::web {
-
-enum class Role : std::uint8_t { none, viewer, operator_ };
-/// Returns its name in the configuration.
-inline std::string_view label(Role role) {
-    constexpr std::array<std::string_view, 3> kWords{"none", "viewer", "operator"};
-    return kWords[static_cast<std::size_t>(role)];
-}
 
 struct Token {
     std::string name;

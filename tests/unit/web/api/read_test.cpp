@@ -298,7 +298,8 @@ TEST_F(Ask, AsksAsTheCaller) {
     ASSERT_EQ(bus.requests.size(), 1u);
     EXPECT_EQ(bus.requests[0].client, 12u);
     EXPECT_EQ(bus.names[12], "http 10.0.0.7");
-    EXPECT_EQ(bus.requests[0].host, bus::host_of("10.0.0.7"));
+    EXPECT_EQ(bus.requests[0].who->address, "10.0.0.7");
+    EXPECT_EQ(bus.requests[0].who->host, host_number("10.0.0.7"));
     EXPECT_EQ(bus.requests[0].station, 5u);
     bus.release(test::FakeBus::reply({3, 2, 0, 7}));
     run();
@@ -306,7 +307,7 @@ TEST_F(Ask, AsksAsTheCaller) {
     EXPECT_EQ(*got->pdu, (Bytes{3, 2, 0, 7}));
     caller = std::make_shared<Caller>(13, "");
     ask_once();
-    EXPECT_EQ(bus.requests[1].host, 0u) << "no address, no host";
+    EXPECT_EQ(bus.requests[1].who->host, 0u) << "no address, no host";
 }
 
 TEST_F(Ask, TakesBackOnceWhatACallerThatLeavesHasAskedForAndSendsNothingMore) {

@@ -191,8 +191,7 @@ TEST_F(WebServer, P9GivesEverySessionItsOwnClientIdAndTellsTheBusesItsAddress) {
     ASSERT_EQ(bus.requests.size(), 4u);
     EXPECT_NE(bus.requests[0].client, bus.requests[1].client);
     EXPECT_EQ(bus.requests[0].client, bus.requests[2].client);
-    for (const bus::Request& request : bus.requests)
-        EXPECT_EQ(request.host, bus::host_of("127.0.0.1"));
+    for (const bus::Request& request : bus.requests) EXPECT_EQ(request.who->address, "127.0.0.1");
 }
 
 TEST_F(WebServer, P3AnswersARunningRequestBeforeItStops) {

@@ -1,0 +1,71 @@
+#include "panelgate/base/who.hpp"
+
+#include <cstdlib>
+#include <functional>
+#include <utility>
+
+namespace panelgate {
+
+namespace {
+
+/// An IPv4 client as a listener on [::] sees it (RFC 4291, 2.5.5.2).
+std::string_view without_mapping(std::string_view address) {
+    constexpr std::string_view kMapped = "::ffff:";
+    const bool mapped = address.starts_with(kMapped) && address.find('.') != address.npos;
+    return mapped ? address.substr(kMapped.size()) : address;
+}
+
+}  // namespace
+
+std::string_view label(Face face) {
+    switch (face) {
+        case Face::modbus_tcp:
+            return "modbus_tcp";
+        case Face::udp:
+            return "udp";
+        case Face::serial_master:
+            return "serial_master";
+        case Face::http:
+            return "http";
+        case Face::mqtt:
+            return "mqtt";
+        case Face::gateway:
+            return "gateway";
+    }
+    std::abort();
+}
+
+std::string_view label(Role role) {
+    switch (role) {
+        case Role::none:
+            return "none";
+        case Role::viewer:
+            return "viewer";
+        case Role::operator_:
+            return "operator";
+        case Role::engineer:
+            return "engineer";
+        case Role::admin:
+            return "admin";
+    }
+    std::abort();
+}
+
+std::uint64_t host_number(std::string_view address) {
+    const auto number = std::hash<std::string_view>{}(without_mapping(address));
+    return number == 0 ? 1 : number;
+}
+
+WhoRef make_who(Who who) {
+    who.address = std::string(without_mapping(who.address));
+    if (!who.address.empty()) who.host = host_number(who.address);
+    return std::make_shared<const Who>(std::move(who));
+}
+
+WhoRef own_task(std::string name) {
+    return make_who({.face = Face::gateway, .name = std::move(name), .role = Role::admin});
+}
+
+std::string text_of(const WhoRef& who) { return who ? who->name : "a client without a name"; }
+
+}  // namespace panelgate
