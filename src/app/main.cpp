@@ -18,6 +18,7 @@
 #include "commands.hpp"
 #include "panelgate/base/text.hpp"
 #include "panelgate/cli/adapters.hpp"
+#include "security_commands.hpp"
 
 namespace panelgate::app {
 
@@ -117,6 +118,7 @@ class CommandLine {
         add_import();
         add_address();
         add_profiles();
+        add_security_commands(cli_, code_);
         add_help();
         add_groups();
     }

@@ -80,7 +80,9 @@ bool Trail::State::wait(std::unique_lock<std::mutex>& lock) {
 
 /// Call with the lock.
 void Trail::State::take_over() {
-    if (next) {
+    // What was added before belongs to the file before, if that takes it.
+    const bool is_drained = pending.empty() && lost == 0 && writer.idle();
+    if (next && (is_drained || failing || next->file == settings.file)) {
         settings = *std::exchange(next, std::nullopt);
         writer.apply(settings);
         anchored = 0;

@@ -68,6 +68,7 @@ struct Bus::State final : public line::Line::Events {
     void transact(Request request, AnswerHandler handler);
     void record_departure(ClientId client);
     void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
+    bool is_unrecordable() const { return settings.refuses_writes && settings.refuses_writes(); }
     void act(arbiter::Transmit& transmit) {
         line->write(transmit.adu);
         arbiter.set_latency(line->latency());
@@ -196,6 +197,11 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
         Result<Bytes> reply = answer_to(*refusal, what.function());
         return refuse(std::move(entry), std::move(reply), std::move(refusal));
     }
+    if (entry.write && is_unrecordable()) {
+        auto refusal = unrecorded(name_of(settings.stations, request.station));
+        Result<Bytes> reply = answer_to(refusal, what.function());
+        return refuse(std::move(entry), std::move(reply), std::move(refusal));
+    }
     const PriorityClass priority = priority_of(request);
     if (auto other = translated(settings.stations, request.station, what)) {
         entry.original_pdu = what.pdu();
@@ -284,7 +290,7 @@ void Bus::State::answer(Pending entry, Answer result) {
     const TimePoint now = clock.now();
     const Duration took = now - entry.arrived;
     const Outcome outcome = outcome_of(result);
-    if (entry.write) entry.write->transaction = result.transactions.last();
+    if (entry.write) complete(*entry.write, result);
     account.add(entry.station, entry.function, entry.write, outcome, took);
     clients.count_outcome(entry.client, outcome, now);
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
@@ -399,7 +405,9 @@ OutcomeCounts Bus::outcomes(std::uint8_t station) const {
 }
 
 std::optional<Refusal> Bus::write_refusal(std::uint8_t station) const {
-    return state_->rights.judge_write(station);
+    if (auto refusal = state_->rights.judge_write(station)) return refusal;
+    if (!state_->is_unrecordable()) return std::nullopt;
+    return unrecorded(name_of(state_->settings.stations, station));
 }
 
 TracePart Bus::trace(std::size_t last) const { return state_->book.store().part(last); }

@@ -115,6 +115,23 @@ void add_mqtt(Families& out, const Snapshot& snapshot) {
     add_writes(out, mqtt);
 }
 
+void add_audit(Families& out, const Snapshot& snapshot) {
+    if (!snapshot.audit) return;
+    const audit::Counters& audit = *snapshot.audit;
+    Family up = make_gauge("panelgate_audit_up", "1 while records of the audit reach the disk.");
+    up.gauge({}, audit.failing ? 0 : 1);
+    out.push_back(up.take());
+    add_counter(out, "panelgate_audit_records_total", "Records of the audit that are on the disk.",
+                audit.records);
+    add_counter(out, "panelgate_audit_lost_total",
+                "Records lost because the disk took nothing for longer than the buffer lasts.",
+                audit.lost);
+    add_counter(out, "panelgate_audit_failures_total", "Times that writing the audit has failed.",
+                audit.failures);
+    add_counter(out, "panelgate_audit_rotations_total", "Files of the audit that have been filled.",
+                audit.rotations);
+}
+
 void add_points(Families& out, const Snapshot& snapshot) {
     Family value = make_gauge("panelgate_point_value",
                               "Value of a point; absent when the last attempt to read it failed.");

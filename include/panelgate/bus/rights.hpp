@@ -25,8 +25,10 @@ enum class Rule : std::uint8_t {
     range,            ///< some items are outside the panel's memory
     listening,        ///< the line is in listen mode
     write_protected,  ///< the items are read-only in the panel
+    unrecorded,       ///< no write is sent while it cannot be recorded (audit.on_failure)
 };
-/// Returns "access", "function", "quantity", "range", "listen" or "read-only": stable identifiers.
+/// Returns "access", "function", "quantity", "range", "listen", "read-only" or "audit": stable
+/// identifiers.
 std::string_view label(Rule rule);
 inline bool is_access(Rule rule) {
     return rule == Rule::read_only || rule == Rule::broadcast_over_read_only;
@@ -78,6 +80,9 @@ struct Refusal {
 
     friend bool operator==(const Refusal&, const Refusal&) = default;
 };
+
+/// Refuses a write that could not be recorded: a client should try again later.
+Refusal unrecorded(std::string station);
 
 /// Returns the answer to a refused request: Fault::denied, or for a guard the exception that the
 /// panel would have returned.

@@ -244,6 +244,33 @@ asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, Role n
     co_return refused;
 }
 
+/// What an audit needs of a request that its handler takes away.
+class Witness {
+  public:
+    Witness(const HttpRequest& request, const Site& site)
+        : site_(&site), changes_(request.method != "GET" && request.method != "HEAD") {
+        if (!site.record) return;
+        method_ = request.method;
+        for (const std::string& segment : request.path) path_ += '/' + segment;
+        if (changes_) body_ = request.body.substr(0, Deed::kMostOfBody);
+        caller_ = request.caller;
+    }
+    /// Refusals are recorded whatever was asked for.
+    void record(const HttpResponse& response) const {
+        const bool is_refusal = response.status == 401 || response.status == 403;
+        if (!site_->record || (!changes_ && !is_refusal)) return;
+        site_->record({caller_->who(), method_, path_, body_, response.status, response.body});
+    }
+
+  private:
+    const Site* site_;
+    bool changes_;
+    std::string method_;
+    std::string path_;
+    std::string body_;
+    std::shared_ptr<Caller> caller_;
+};
+
 }  // namespace
 
 Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> barred) {
@@ -266,9 +293,12 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     request.role = role_of(request, site->settings);
     request.caller->identify(token_name(request, site->settings), request.role,
                              site->settings.name());
+    const Witness witness(request, *site);
     if (refused) {
         count_refused(request, *refused);
-        co_return to_response(*refused);
+        HttpResponse response = to_response(*refused);
+        witness.record(response);
+        co_return response;
     }
     // Probes are answered with any query.
     auto mistaken = probe ? std::nullopt : check_queries(request, found.route->queries);
@@ -278,6 +308,7 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     Handling handling = found.route->handler(std::move(request));
     HttpResponse response = co_await std::move(handling);
     response.probe = probe;
+    witness.record(response);
     co_return response;
 }
 

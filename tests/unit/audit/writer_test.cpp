@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "panelgate/audit/files.hpp"
 #include "panelgate/audit/verify.hpp"
 #include "support/temp_dir.hpp"
 
