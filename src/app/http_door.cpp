@@ -247,13 +247,10 @@ std::optional<std::string> listen_in(const std::string& file, const std::string&
     yaml::Problems faults(file);
     const yaml::Node tree = yaml::parse(text, faults);
     if (!faults.empty()) return http_listen_in(text);
-    for (const yaml::Entry& top : tree.entries) {
-        if (top.key != "http") continue;
-        for (const yaml::Entry& entry : top.value.entries)
-            if (entry.key == "listen") return entry.value.scalar;
-        return "";
-    }
-    return std::nullopt;
+    const yaml::Node* http = tree.find("http");
+    if (http == nullptr) return std::nullopt;
+    const yaml::Node* listen = http->find("listen");
+    return listen == nullptr ? "" : listen->scalar;
 }
 
 /// The endpoint from a file with faults. No endpoint is guessed: it might be another program's.

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "panelgate/config/deadlines.hpp"
+#include "panelgate/config/endpoint.hpp"
 #include "panelgate/profile/judge.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
@@ -108,7 +109,7 @@ json::object relay_json(const points::Relay& relay) {
 json::value text_json(const std::string& text) { return json::value(text); }
 
 json::value network_json(const Network& network) {
-    return json::value(network.address + '/' + std::to_string(network.prefix));
+    return json::value(config::network_text(network));
 }
 
 json::value unit_json(std::optional<std::uint8_t> unit) {
@@ -284,9 +285,8 @@ std::string text_of(const points::Relay& relay) {
 
 std::string text_of(const std::vector<Network>& allow) {
     std::string text;
-    for (const Network& network : allow) {
-        text += (text.empty() ? "" : " ") + network.address + '/' + std::to_string(network.prefix);
-    }
+    for (const Network& network : allow)
+        text += (text.empty() ? "" : " ") + config::network_text(network);
     return text.empty() ? "everybody" : text;
 }
 

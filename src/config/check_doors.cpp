@@ -82,14 +82,9 @@ using tcp_server::UnitTarget;
 using yaml::Mark;
 using yaml::Node;
 
-const Node* find(const Node& map, std::string_view key) {
-    const auto found = std::ranges::find(map.entries, key, &yaml::Entry::key);
-    return found == map.entries.end() ? nullptr : &found->value;
-}
-
 /// Mark of the key's value, or of the map if it is absent.
 Mark mark_of(const Node& map, std::string_view key) {
-    const Node* value = find(map, key);
+    const Node* value = map.find(key);
     return value != nullptr ? value->mark : map.mark;
 }
 
@@ -156,8 +151,7 @@ std::string in_networks(const std::vector<Network>& allow) {
         return " in the " + std::to_string(allow.size()) + " networks of allow";
     std::string text;
     for (const Network& network : allow)
-        text +=
-            (text.empty() ? " in " : ", ") + network.address + '/' + std::to_string(network.prefix);
+        text += (text.empty() ? " in " : ", ") + network_text(network);
     return text;
 }
 
@@ -224,7 +218,7 @@ void warn_of_unit(Loading& loading, const Node& node, const tcp_server::Settings
             return '\'' + station.name + "' (station " + std::to_string(station.id) + ')';
         };
         const std::string text = "unit " + std::to_string(unit) + " is " + named(*reached);
-        const Mark mark = mark_of(*find(node, "units"), std::to_string(unit));
+        const Mark mark = mark_of(*node.find("units"), std::to_string(unit));
         if (other == listener.units.end()) {
             loading.warn(mark, text + ", so no unit is " + named(*hidden) +
                                    "; give it one, such as " + free_unit(listener) + ": " + line +
@@ -243,7 +237,7 @@ bool is_container_secret(std::string_view path) {
 }
 
 void warn_of_token(Loading& loading, const Node& node, const web::Token& token) {
-    const Node* file = find(node, "file");
+    const Node* file = node.find("file");
     if (token.secret.size() < kShortToken)
         loading.warn(file->mark, "the token in " + file->scalar + " has " +
                                      std::to_string(token.secret.size()) + " characters; take " +
@@ -289,7 +283,7 @@ void warn_of_plain_tokens(Loading& loading, const Node& node, const web::Setting
 void warn_of_anonymous(Loading& loading, const Node& node, const web::Settings& http) {
     if (!is_reachable_from_outside(http.address, http.allow)) return;
     // Anybody is a viewer by default: then the address is what was typed.
-    const bool typed = find(node, "anonymous") != nullptr;
+    const bool typed = node.find("anonymous") != nullptr;
     const Mark mark = mark_of(node, typed ? "anonymous" : "listen");
     const std::string instead =
         ", or list the networks that may, such as allow: [192.168.10.0/24], or listen on "
@@ -316,7 +310,7 @@ void warn_of_http(Loading& loading, const Node& node, const web::Settings& http)
         loading.warn(mark_of(node, "anonymous"),
                      "clients can use only /healthz and /readyz: anonymous is none and there is no "
                      "token; add tokens, or set anonymous: viewer");
-    const Node* tokens = find(node, "tokens");
+    const Node* tokens = node.find("tokens");
     for (std::size_t i = 0; i < http.tokens.size(); ++i)
         warn_of_token(loading, tokens->items[i], http.tokens[i]);
 }
@@ -326,7 +320,7 @@ void warn_of_http(Loading& loading, const Node& node, const web::Settings& http)
 void warn_of_listeners(Loading& loading, const Node& tree) {
     std::vector<ListenAddress> listeners;
     for (std::size_t i = 0; i < loading.config.modbus_tcp.size(); ++i) {
-        const Node& node = find(tree, "modbus_tcp")->items[i];
+        const Node& node = tree.find("modbus_tcp")->items[i];
         const tcp_server::Settings& listener = loading.config.modbus_tcp[i];
         listeners.push_back(
             {mark_of(node, "listen"), listener.address, listener.port, listener.name()});
@@ -338,7 +332,7 @@ void warn_of_listeners(Loading& loading, const Node& tree) {
     }
     if (loading.config.http) {
         const web::Settings& http = *loading.config.http;
-        const Node& node = *find(tree, "http");
+        const Node& node = *tree.find("http");
         listeners.push_back({mark_of(node, "listen"), http.address, http.port, http.name()});
         warn_of_http(loading, node, http);
     }

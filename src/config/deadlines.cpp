@@ -156,11 +156,7 @@ using yaml::Mark;
 using yaml::Node;
 
 const Node* find(const Node* map, std::string_view key) {
-    if (map == nullptr) return nullptr;
-    for (const yaml::Entry& entry : map->entries) {
-        if (entry.key == key) return &entry.value;
-    }
-    return nullptr;
+    return map == nullptr ? nullptr : map->find(key);
 }
 
 /// Returns where the `timing` of a line or a station sets the longest wait, if it does.

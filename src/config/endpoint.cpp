@@ -68,16 +68,20 @@ bool is_any_address(const std::string& address) {
            std::ranges::all_of(buffer, [](unsigned char byte) { return byte == 0; });
 }
 
-std::string network_of(const Cidr& cidr) {
+std::string network_text(const Network& network) {
+    return network.address + '/' + std::to_string(network.prefix);
+}
+
+std::string network_of(const Network& typed) {
     AddressBytes bytes{};
-    const int family = is_ipv6(cidr.address) ? AF_INET6 : AF_INET;
-    if (inet_pton(family, cidr.address.c_str(), bytes.data()) != 1) return "";
-    const AddressBytes typed = bytes;
-    clear_behind(bytes, cidr.prefix);
-    if (bytes == typed) return "";
+    const int family = is_ipv6(typed.address) ? AF_INET6 : AF_INET;
+    if (inet_pton(family, typed.address.c_str(), bytes.data()) != 1) return "";
+    const AddressBytes before = bytes;
+    clear_behind(bytes, typed.prefix);
+    if (bytes == before) return "";
     std::array<char, INET6_ADDRSTRLEN> text{};
     inet_ntop(family, bytes.data(), text.data(), text.size());
-    return std::string(text.data()) + '/' + std::to_string(cidr.prefix);
+    return network_text({text.data(), typed.prefix});
 }
 
 bool is_in(const std::string& address, const std::string& network, unsigned prefix) {
@@ -172,9 +176,9 @@ bool is_reachable_from_outside(const std::string& address, const std::vector<Net
            (!is_ipv4 && public_share(networks, kAllOfIpv6) > kMostOfIpv6);
 }
 
-std::optional<Cidr> parse_cidr(std::string_view text) {
+std::optional<Network> parse_cidr(std::string_view text) {
     const std::size_t slash = text.find('/');
-    Cidr cidr{std::string(text.substr(0, slash)), 0};
+    Network cidr{std::string(text.substr(0, slash)), 0};
     const unsigned bits = bits_of_address(cidr.address);
     if (bits == 0) return std::nullopt;
     cidr.prefix = bits;

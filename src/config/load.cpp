@@ -31,11 +31,6 @@ namespace {
 using yaml::Entry;
 using yaml::Node;
 
-Node* find(Node& map, std::string_view key) {
-    const auto found = std::ranges::find(map.entries, key, &Entry::key);
-    return found == map.entries.end() ? nullptr : &found->value;
-}
-
 std::optional<Node> take(Node& map, std::string_view key) {
     const auto found = std::ranges::find(map.entries, key, &Entry::key);
     if (found == map.entries.end()) return std::nullopt;
@@ -44,32 +39,10 @@ std::optional<Node> take(Node& map, std::string_view key) {
     return value;
 }
 
-struct Size {
-    std::size_t values = 0;
-    std::size_t text = 0;
-
-    bool fits() const { return values <= kMaxTemplateValues && text <= kMaxTemplateText; }
-    Size& operator+=(const Size& other) {
-        values += other.values;
-        text += other.text;
-        return *this;
-    }
-};
-
-Size size_of(const Node& node) {
-    Size size{1, node.scalar.size()};
-    for (const Node& item : node.items) size += size_of(item);
-    for (const Entry& entry : node.entries) {
-        size.text += entry.key.size();
-        size += size_of(entry.value);
-    }
-    return size;
-}
-
 /// Adds the keys that `map` does not have.
 void add_missing(Node& map, const Node& from) {
     for (const Entry& entry : from.entries) {
-        Node* own = find(map, entry.key);
+        Node* own = map.find(entry.key);
         if (own == nullptr) {
             map.entries.push_back(entry);
         } else if (own->kind == Node::Kind::map && entry.value.kind == Node::Kind::map) {
@@ -87,7 +60,7 @@ template <class Do>
 void for_stations(Node* lines, const Do& todo) {
     if (lines == nullptr) return;
     for (Node& line : lines->items) {
-        Node* stations = find(line, "stations");
+        Node* stations = line.find("stations");
         if (stations == nullptr) continue;
         for (Node& station : stations->items) todo(station);
     }
@@ -96,7 +69,7 @@ void for_stations(Node* lines, const Do& todo) {
 struct Template {
     yaml::Mark mark;
     Node body;
-    Size size;
+    yaml::Size size;
     bool used = false;
 };
 
@@ -127,9 +100,10 @@ class Templates {
             return;
         }
         found->second.used = true;
-        const bool had_room = given_.fits();
-        given_ += found->second.size;
-        if (given_.fits()) {
+        const bool had_room = has_room();
+        given_.nodes += found->second.size.nodes;
+        given_.text += found->second.size.text;
+        if (has_room()) {
             add_missing(station, found->second.body);
         } else if (had_room) {
             loading_.problems.add(named->mark,
@@ -158,6 +132,9 @@ class Templates {
     }
 
   private:
+    bool has_room() const {
+        return given_.nodes <= kMaxTemplateValues && given_.text <= kMaxTemplateText;
+    }
     /// Reports a station's keys that follow a name without a body, and takes them as that body.
     void move_bodies(Node& list) {
         const std::vector<std::string_view> keys = station_keys().names();
@@ -200,7 +177,7 @@ class Templates {
                 "'" + std::string(own) + "' is a station's own: it cannot be in a template");
             body.entries.erase(key);
         }
-        const Size size = size_of(body);
+        const yaml::Size size = yaml::size_of(body);
         templates_[entry.key] = {entry.mark, std::move(body), size, false};
     }
 
@@ -216,7 +193,7 @@ class Templates {
 
     Loading& loading_;
     std::map<std::string, Template> templates_;
-    Size given_;
+    yaml::Size given_;
     std::set<std::string> opened_;  ///< names whose bodies are not indented
 };
 
@@ -225,7 +202,7 @@ class Templates {
 std::vector<Node> apply_templates(Loading& loading, Node& tree) {
     Templates templates(loading);
     if (auto list = take(tree, "templates")) templates.read(*list);
-    Node* lines = find(tree, "lines");
+    Node* lines = tree.find("lines");
     for_stations(lines, [&](Node& station) { templates.apply(station); });
     return templates.take_unused(lines);
 }
@@ -438,7 +415,7 @@ std::optional<bool> load_read_only(MapReader& in) {
 }
 
 void refuse_empty(MapReader& in, std::string_view key, std::string_view instead) {
-    in.may_be_null(key, false);
+    in.schema(key).may_be_null = false;
     if (!in.has(key) || in.child(key) != nullptr || in.is_mistyped(key)) return;
     in.problem(key, std::string(key) + " has no value; " + std::string(instead));
 }

@@ -38,7 +38,7 @@ std::string without_brackets(const std::string& text) {
 void load_hosts(Loading& loading, yaml::MapReader& in, web::Settings& settings) {
     const yaml::Node* list = in.sequence("hosts");
     in.looks_like("hosts", "^\\[?[A-Za-z0-9._:-]+\\]?$", true);
-    in.entries("hosts", 1, 0);
+    in.schema("hosts").fewest = 1;
     if (list == nullptr) return;
     for (const yaml::Node& item : list->items) {
         const std::string host = without_brackets(item.scalar);

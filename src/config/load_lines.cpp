@@ -280,9 +280,10 @@ void refuse_no_lines(Loading& loading, MapReader& root) {
 
 void load_lines(Loading& loading, MapReader& root) {
     const Node* list = root.sequence("lines", kLineListExample);
-    root.needed("lines");
-    root.may_be_null("lines", false);
-    root.entries("lines", 1, 0);
+    yaml::KeyShape& schema = root.schema("lines");
+    schema.required = true;
+    schema.may_be_null = false;
+    schema.fewest = 1;
     if (list == nullptr && root.is_mistyped("lines")) return;
     loading.names_missing = list == nullptr && root.child("lines") != nullptr;
     if (loading.names_missing) return;

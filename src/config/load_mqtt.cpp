@@ -87,7 +87,7 @@ void load_part(MapReader& in, std::string_view key, std::string_view forbidden,
     constexpr std::size_t kLongest = 128;
     const auto text = in.text(key);
     in.looks_like(key, "^(?![/$])(?!.*//)(?!.*/$)[^" + std::string(forbidden) + "]+$", true);
-    in.no_longer(key, kLongest);
+    in.schema(key).longest_text = kLongest;
     if (!text) return;
     const bool wrong_edge =
         text->starts_with('/') || text->ends_with('/') || text->starts_with('$');
@@ -167,7 +167,7 @@ void load_format(MapReader& in, mqtt::Settings& settings) {
 void load_session(Loading& loading, MapReader& in, mqtt::Settings& settings) {
     constexpr std::size_t kLongest = 128;
     settings.client_id = in.text("client_id").value_or("");
-    in.no_longer("client_id", kLongest);
+    in.schema("client_id").longest_text = kLongest;
     if (settings.client_id.size() > kLongest)
         in.problem("client_id", "client_id must have at most 128 characters");
     settings.username = in.text("username").value_or("");

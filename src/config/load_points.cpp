@@ -95,7 +95,7 @@ double exact_number(MapReader& in, std::string_view key, double otherwise) {
 
 void load_scale(MapReader& in, Point& point) {
     point.scale = exact_number(in, "scale", 1);
-    in.never("scale", 0);
+    in.schema("scale").never = 0;
     point.offset = exact_number(in, "offset", 0);
     if (point.scale == 0) {
         in.problem("scale", "scale must not be 0");
@@ -152,7 +152,7 @@ std::string labels_example(const Node* typed) {
 
 void load_labels(MapReader& in, Point& point) {
     const Node* labels = in.map("labels", labels_example(in.child("labels")));
-    in.keyed_by("labels", yaml::kIntegerPattern);
+    in.schema("labels").keys = yaml::kIntegerPattern;
     if (labels == nullptr || !is_integer(point.type)) return;
     if (labels->entries.size() > points::kMaxLabels) {
         in.problem("labels", "at most " + std::to_string(points::kMaxLabels) +
@@ -165,15 +165,9 @@ void load_labels(MapReader& in, Point& point) {
 
 void load_no_value(MapReader& in, Point& point) {
     const Node* list = in.sequence("no_value");
-    in.holds_integers("no_value");
-    in.entries("no_value", 0, points::kMaxNoValues);
-    if (list == nullptr || !is_number(point.type)) return;
-    if (list->items.size() > points::kMaxNoValues) {
-        in.problem("no_value", "at most " + std::to_string(points::kMaxNoValues) +
-                                   " values that mean none, not " +
-                                   std::to_string(list->items.size()));
-        return;
-    }
+    in.schema("no_value").holds_integers = true;
+    const bool few = in.at_most("no_value", points::kMaxNoValues, "values that mean none");
+    if (list == nullptr || !few || !is_number(point.type)) return;
     const RawRange range = no_value_range(point.type);
     for (const Node& item : list->items) {
         const bool plain = item.kind == Node::Kind::scalar && !item.is_text();
@@ -305,13 +299,7 @@ template <class Load>
 void load_list(Loading& loading, MapReader& in, std::string_view key, std::string_view example,
                std::size_t most, const Load& load) {
     const Node* list = in.sequence(key, example);
-    in.entries(key, 0, most);
-    if (list == nullptr) return;
-    if (list->items.size() > most) {
-        in.problem(key, "at most " + std::to_string(most) + ' ' + std::string(key) +
-                            " of one station, not " + std::to_string(list->items.size()));
-        return;
-    }
+    if (!in.at_most(key, most, std::string(key) + " of one station") || list == nullptr) return;
     for (const Node& item : list->items) load(loading, item);
 }
 

@@ -314,13 +314,7 @@ void load_relay(Loading& loading, const Node& node, std::vector<Route>& routes) 
 
 void load_relays(Loading& loading, MapReader& root) {
     const Node* list = root.sequence("relays", "[{from: press/UW100, to: oven/GDT200}]");
-    root.entries("relays", 0, points::kMaxRelays);
-    if (list == nullptr) return;
-    if (list->items.size() > points::kMaxRelays) {
-        root.problem("relays", "at most " + std::to_string(points::kMaxRelays) + " relays, not " +
-                                   std::to_string(list->items.size()));
-        return;
-    }
+    if (!root.at_most("relays", points::kMaxRelays, "relays") || list == nullptr) return;
     std::vector<Route> routes;
     for (const Node& node : list->items) load_relay(loading, node, routes);
 }

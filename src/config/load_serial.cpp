@@ -119,7 +119,7 @@ void check_device(Loading& loading, MapReader& in, const line::Settings& port) {
 }
 
 void check_units(MapReader& in, const Settings& settings) {
-    in.keyed_by("units", '^' + yaml::integer_pattern(1, modbus::kMaxStation) + '$');
+    in.schema("units").keys = '^' + yaml::integer_pattern(1, modbus::kMaxStation) + '$';
     for (const auto& [unit, target] : settings.access.units) {
         if (unit != 0 && unit <= modbus::kMaxStation) continue;
         in.problem("units",
@@ -187,9 +187,8 @@ void warn_of_no_stations(Loading& loading, MapReader& in, const Settings& settin
 
 /// Returns the mode set by `framing`; its table reports a wrong value.
 SerialMode mode_of(const Node& master) {
-    const auto framing = std::ranges::find(master.entries, "framing", &yaml::Entry::key);
-    const bool ascii =
-        framing != master.entries.end() && framing->value.scalar != modbus::label(Framing::rtu);
+    const Node* framing = master.find("framing");
+    const bool ascii = framing != nullptr && framing->scalar != modbus::label(Framing::rtu);
     return ascii ? SerialMode::ascii : SerialMode::rtu;
 }
 

@@ -126,7 +126,7 @@ void warn_of_refusals(Loading& loading, yaml::Mark mark, const Line& line) {
 void load_listener_lines(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
     const Node* list = in.sequence("lines");
     in.looks_like("lines", name_pattern(), true);
-    in.entries("lines", 1, 0);
+    in.schema("lines").fewest = 1;
     if (list == nullptr) {
         for (const Line& line : loading.config.lines) {
             if (!line.listens) settings.lines.push_back(line.name);
@@ -210,7 +210,7 @@ std::optional<tcp_server::UnitTarget> unit_target(Loading& loading, const Node& 
 
 void load_units(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
     const Node* map = in.map("units", "{101: floor1/31}");
-    in.keyed_by("units", '^' + yaml::integer_pattern(0, 255) + '$');
+    in.schema("units").keys = '^' + yaml::integer_pattern(0, 255) + '$';
     in.looks_like("units", "^[^/]+/.");
     if (map == nullptr) return;
     for (const yaml::Entry& entry : map->entries) {
@@ -262,7 +262,7 @@ void check_overlap(Loading& loading, MapReader& in, const tcp_server::Settings& 
 
 /// The gateway's own unit must not hide a station; the default one gives way to an alias.
 void load_diagnostics(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
-    in.may_be_null("diagnostics_unit", true);
+    in.schema("diagnostics_unit").may_be_null = true;
     const bool given_way =
         settings.diagnostics_unit && settings.units.contains(*settings.diagnostics_unit);
     const bool is_set = in.has("diagnostics_unit");
@@ -295,12 +295,11 @@ void load_diagnostics(Loading& loading, MapReader& in, tcp_server::Settings& set
 void load_allow(Loading& loading, MapReader& in, std::vector<Network>& allow) {
     const Node* list = in.sequence("allow");
     in.looks_like("allow", network_pattern());
-    in.entries("allow", 1, 0);
+    in.schema("allow").fewest = 1;
     if (list == nullptr) return;
     for (const Node& item : list->items) {
-        const auto cidr = parse_cidr(item.scalar);
-        if (cidr) {
-            allow.push_back({cidr->address, cidr->prefix});
+        if (const auto cidr = parse_cidr(item.scalar)) {
+            allow.push_back(*cidr);
             const std::string network = network_of(*cidr);
             if (!network.empty())
                 loading.warn(item.mark, item.scalar + " is all of " + network +

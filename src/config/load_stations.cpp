@@ -278,7 +278,7 @@ void warn_of_unused_key(Loading& loading, MapReader& in, std::string_view key) {
 }
 
 void check_template(Loading& loading, const Node& body) {
-    const bool named = std::ranges::count(body.entries, "profile", &yaml::Entry::key) > 0;
+    const bool named = body.find("profile") != nullptr;
     yaml::Problems least = faults_of(loading, body, nullptr);
     for (const auto& [name, profile] : loading.config.profiles->all()) {
         if (named || least.empty()) break;

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "panelgate/base/serial_format.hpp"
+#include "panelgate/config/endpoint.hpp"
 #include "panelgate/yaml/document.hpp"
 #include "tables.hpp"
 
@@ -16,9 +17,8 @@ std::string names_text(const std::vector<std::string>& names) {
 }
 
 std::string networks_text(const std::vector<Network>& allow) {
-    return listed(allow, [](const Network& network) {
-        return yaml::written(network.address + '/' + std::to_string(network.prefix));
-    });
+    return listed(allow,
+                  [](const Network& network) { return yaml::written(network_text(network)); });
 }
 
 }  // namespace

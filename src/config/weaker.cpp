@@ -15,10 +15,6 @@ namespace {
 
 using Lines = std::vector<std::string>;
 
-std::string text_of(const Network& network) {
-    return network.address + '/' + std::to_string(network.prefix);
-}
-
 /// Lists what a listener newly allows. An empty list allows all.
 void compare_allow(Lines& all, const std::string& endpoint, const std::vector<Network>& running,
                    const std::vector<Network>& next) {
@@ -27,7 +23,7 @@ void compare_allow(Lines& all, const std::string& endpoint, const std::vector<Ne
     for (const Network& network : next) {
         const auto was_allowed = [&](const Network& one) { return covers(one, network); };
         if (std::ranges::none_of(running, was_allowed))
-            all.push_back(endpoint + ": allow lets " + text_of(network) + " in");
+            all.push_back(endpoint + ": allow lets " + network_text(network) + " in");
     }
 }
 

@@ -71,64 +71,38 @@ void Description::add_nested(const Node& map, std::string_view key, const Node& 
     for (const Node& item : value.items) paths_[&item] = below;
 }
 
-KeyShape* MapReader::shape(std::string_view key) {
+KeyShape& MapReader::schema(std::string_view key) {
+    static thread_local KeyShape unrecorded;
     Description* description = problems_->description();
-    return description == nullptr ? nullptr : description->shape(*node_, key);
+    KeyShape* told = description == nullptr ? nullptr : description->shape(*node_, key);
+    return told == nullptr ? unrecorded : *told;
 }
 
 void MapReader::looks_like(std::string_view key, std::string_view pattern, bool number) {
-    KeyShape* told = shape(key);
-    if (told == nullptr) return;
-    told->pattern = pattern;
-    told->may_be_number = number;
+    if (problems_->description() == nullptr) return;
+    KeyShape& told = schema(key);
+    told.pattern = pattern;
+    told.may_be_number = number;
 }
 
 void MapReader::about(std::string_view key, std::string_view initial, std::string_view text,
                       std::string_view change) {
-    KeyShape* told = shape(key);
-    if (told == nullptr) return;
-    told->text = text;
-    told->initial = initial;
-    told->change = change;
-    told->order = ++order_;
+    if (problems_->description() == nullptr) return;
+    KeyShape& told = schema(key);
+    told.text = text;
+    told.initial = initial;
+    told.change = change;
+    told.order = ++order_;
 }
 
-void MapReader::no_longer(std::string_view key, std::size_t characters) {
-    if (KeyShape* told = shape(key)) told->longest_text = characters;
-}
-
-void MapReader::keyed_by(std::string_view key, std::string_view pattern) {
-    if (KeyShape* told = shape(key)) told->keys = pattern;
-}
-
-void MapReader::holds_integers(std::string_view key) {
-    if (KeyShape* told = shape(key)) told->holds_integers = true;
-}
-
-void MapReader::within(std::string_view key, std::int64_t min, std::int64_t max) {
-    KeyShape* told = shape(key);
-    if (told == nullptr) return;
-    told->min = min;
-    told->max = max;
-}
-
-void MapReader::never(std::string_view key, double number) {
-    if (KeyShape* told = shape(key)) told->never = number;
-}
-
-void MapReader::may_be_null(std::string_view key, bool may) {
-    if (KeyShape* told = shape(key)) told->may_be_null = may;
-}
-
-void MapReader::needed(std::string_view key) {
-    if (KeyShape* told = shape(key)) told->required = true;
-}
-
-void MapReader::entries(std::string_view key, std::size_t fewest, std::size_t most) {
-    KeyShape* told = shape(key);
-    if (told == nullptr) return;
-    told->fewest = fewest;
-    told->most_entries = most;
+bool MapReader::at_most(std::string_view key, std::size_t most, std::string_view what) {
+    schema(key).most_entries = most;
+    const Node* list = node_->find(key);
+    const std::size_t count = list == nullptr ? 0 : list->items.size();
+    if (count > most)
+        problem(key, "at most " + std::to_string(most) + ' ' + std::string(what) + ", not " +
+                         std::to_string(count));
+    return count <= most;
 }
 
 bool MapReader::lacks(std::string_view key, std::string_view word, std::string_view other) {
@@ -152,10 +126,8 @@ void MapReader::belongs(std::string_view key, std::string_view other,
 
 std::optional<double> MapReader::share(std::string_view key) {
     const auto value = number(key);
-    if (KeyShape* told = shape(key)) {
-        told->least = 0;
-        told->most = 1;
-    }
+    schema(key).least = 0;
+    schema(key).most = 1;
     if (!value || (*value >= 0 && *value <= 1)) return value;
     problem(key, std::string(key) + " must be a share from 0 to 1, such as 0.1 for 10 %");
     return std::nullopt;
@@ -249,14 +221,10 @@ std::string MapReader::place_of(const Entry& entry, bool exactly) const {
 }
 
 bool MapReader::refuse(std::string_view key, const std::string& why) {
-    bool given = false;
-    for (const Entry& entry : node_->entries) {
-        if (entry.key != key) continue;
-        problems_->add(entry.value.mark, std::string(key) + ' ' + why);
-        given = true;
-    }
     refused_.push_back(key);
-    return given;
+    const Node* value = node_->find(key);
+    if (value != nullptr) problems_->add(value->mark, std::string(key) + ' ' + why);
+    return value != nullptr;
 }
 
 void MapReader::finish() {

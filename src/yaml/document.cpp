@@ -24,15 +24,6 @@
 
 namespace panelgate::yaml {
 
-/// Size of a value, with all that is in it.
-struct Size {
-    std::size_t nodes = 1;
-    std::size_t text = 0;   ///< bytes of scalars and keys
-    std::size_t depth = 0;  ///< levels of lists and maps
-};
-
-Size size_of(const Node& node);
-
 /// Rewords a yaml-cpp error for the user, where no lint explains it.
 std::string reword_error(std::string_view refusal);
 
@@ -86,7 +77,7 @@ class Builder final : public YAML::EventHandler {
     void OnDocumentStart(const YAML::Mark& mark) override { start_ = mark_of(mark); }
     void OnDocumentEnd() override {}
     void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
-        charge(mark_of(mark), {});
+        charge(mark_of(mark), {1});
         Node node;
         node.mark = mark_of(mark);
         node.comma = source_.byte(mark.line, mark.column) == ',';
@@ -162,7 +153,7 @@ class Builder final : public YAML::EventHandler {
     }
     void open(Node::Kind kind, const YAML::Mark& mark, YAML::anchor_t anchor) {
         if (stack_.size() >= kMaxDepth) throw TooLarge{mark_of(mark), kTooDeep};
-        charge(mark_of(mark), {});
+        charge(mark_of(mark), {1});
         Open level;
         level.node.kind = kind;
         level.node.mark = mark_of(mark);
@@ -364,9 +355,13 @@ Node parse(std::string_view text, Problems& problems) {
     return causes.empty() ? root : Node();
 }
 
+Node* Node::find(std::string_view key) {
+    const auto found = std::ranges::find(entries, key, &Entry::key);
+    return found == entries.end() ? nullptr : &found->value;
+}
+
 Size size_of(const Node& node) {
-    Size size;
-    size.text = node.scalar.size();
+    Size size{1, node.scalar.size(), 0};
     const auto add = [&size](const Node& child) {
         const Size inner = size_of(child);
         size.nodes += inner.nodes;

@@ -88,10 +88,7 @@ MapReader::MapReader(const Node& node, Problems& problems, std::string what,
 
 const Node* MapReader::find(std::string_view key) {
     if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.emplace_back(key);
-    for (const Entry& entry : node_->entries) {
-        if (entry.key == key) return &entry.value;
-    }
-    return nullptr;
+    return node_->find(key);
 }
 
 bool MapReader::has(std::string_view key) { return find(key) != nullptr; }
@@ -287,16 +284,12 @@ const Node* MapReader::sequence(std::string_view key, std::string_view example) 
 }
 
 Mark MapReader::mark(std::string_view key) const {
-    for (const Entry& entry : node_->entries) {
-        if (entry.key == key) return entry.value.mark;
-    }
-    return node_->mark;
+    const Node* value = node_->find(key);
+    return value == nullptr ? node_->mark : value->mark;
 }
 
 void MapReader::problem(std::string_view key, std::string message) {
-    for (const Entry& entry : node_->entries) {
-        if (entry.key == key) message += origin_hint(entry.value, message);
-    }
+    if (const Node* value = node_->find(key)) message += origin_hint(*value, message);
     problems_->add(mark(key), std::move(message));
 }
 

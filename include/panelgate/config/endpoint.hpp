@@ -26,16 +26,13 @@ bool is_any_address(const std::string& address);
 /// True for an address that only programs on this machine reach: 127.0.0.0/8 and ::1.
 bool is_loopback(const std::string& address);
 
-/// A network: "10.0.0.0/8", or a bare address. parse_cidr() returns nothing for anything else, nor
-/// for a prefix below 96 of an IPv4 address written as IPv6 (::ffff:10.0.0.1), which would let all
-/// of IPv4 in.
-struct Cidr {
-    std::string address;
-    unsigned prefix = 0;
-};
-std::optional<Cidr> parse_cidr(std::string_view text);
+/// Parses "10.0.0.0/8", or a bare address. Returns nothing for anything else, nor for a prefix
+/// below 96 of an IPv4 address written as IPv6 (::ffff:10.0.0.1), which would let all of IPv4 in.
+std::optional<Network> parse_cidr(std::string_view text);
+/// "10.0.0.0/8"
+std::string network_text(const Network& network);
 /// Returns "192.168.0.0/24" for 192.168.0.5/24; "" if the address is the first of its network.
-std::string network_of(const Cidr& cidr);
+std::string network_of(const Network& typed);
 /// True if the network contains the address; IPv4 also matches its IPv6 form. False for invalid
 /// text.
 bool is_in(const std::string& address, const std::string& network, unsigned prefix);

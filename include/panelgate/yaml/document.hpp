@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -81,6 +82,9 @@ struct Node {
 
     /// True if typed in quotes: never a number, nor true or false.
     bool is_text() const { return quoted && variable.empty(); }
+    /// Returns the value of a map's key; nullptr if it has none.
+    Node* find(std::string_view key);
+    const Node* find(std::string_view key) const { return const_cast<Node*>(this)->find(key); }
 };
 
 struct Entry {
@@ -88,6 +92,14 @@ struct Entry {
     Mark mark;  ///< of the key
     Node value;
 };
+
+/// Size of a value, with all that is in it.
+struct Size {
+    std::size_t nodes = 0;
+    std::size_t text = 0;   ///< bytes of scalars and keys
+    std::size_t depth = 0;  ///< levels of lists and maps
+};
+Size size_of(const Node& node);
 
 /// Parses one YAML document in any Unicode encoding. Adds to `problems`: invalid text, syntax
 /// errors (at their cause, if it can be found), unclosed quotes, duplicate keys, non-scalar keys,

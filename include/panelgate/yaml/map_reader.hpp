@@ -95,18 +95,10 @@ class MapReader {
     /// it needs. The keys of a map are in the order of these calls.
     void about(std::string_view key, std::string_view initial, std::string_view text,
                std::string_view change);
-    void no_longer(std::string_view key, std::size_t characters);
-    /// Pattern for the keys of a map with free keys.
-    void keyed_by(std::string_view key, std::string_view pattern);
-    /// The list holds raw numbers.
-    void holds_integers(std::string_view key);
-    /// A narrower range than integer() was called with.
-    void within(std::string_view key, std::int64_t min, std::int64_t max);
-    void never(std::string_view key, double number);
-    void may_be_null(std::string_view key, bool may);
-    void needed(std::string_view key);
-    /// `most` 0: no limit.
-    void entries(std::string_view key, std::size_t fewest, std::size_t most);
+    /// What a Description records of a key, to be modified at once.
+    KeyShape& schema(std::string_view key);
+    /// Reports a list with more entries, "at most 64 relays, not 65", and returns false.
+    bool at_most(std::string_view key, std::size_t most, std::string_view what);
     /// True if `key` has this word and `other`, which it then needs, is absent.
     bool lacks(std::string_view key, std::string_view word, std::string_view other);
     /// `key` is allowed only if `other` has one of these words, or, with `absent`, is missing.
@@ -136,7 +128,6 @@ class MapReader {
         shape.kind = kind;
         describe(key, std::move(shape));
     }
-    KeyShape* shape(std::string_view key);
     const Node* below(std::string_view key, const Node* node);
     const Node* find(std::string_view key);
     const Node* scalar(std::string_view key, std::string_view wanted);
