@@ -18,7 +18,6 @@
 #include "commands.hpp"
 #include "panelgate/base/text.hpp"
 #include "panelgate/cli/adapters.hpp"
-#include "security_commands.hpp"
 
 namespace panelgate::app {
 

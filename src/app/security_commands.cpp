@@ -1,8 +1,8 @@
-#include "security_commands.hpp"
-
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
+
+#include "asking_commands.hpp"
 
 namespace panelgate::app {
 

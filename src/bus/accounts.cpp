@@ -106,6 +106,11 @@ std::optional<WriteRecord> write_record_of(ByteView pdu, const WhoRef& who) {
     return write;
 }
 
+std::optional<Refusal> unrecordable(const Settings& settings, std::uint8_t station) {
+    if (!settings.refuses_writes || !settings.refuses_writes()) return std::nullopt;
+    return unrecorded(name_of(settings.stations, station));
+}
+
 void complete(WriteRecord& write, const Answer& answer) {
     write.transmitted = answer.transmitted;
     write.transaction = answer.transactions.last();

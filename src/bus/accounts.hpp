@@ -43,6 +43,8 @@ struct WriteRecord {
 std::optional<WriteRecord> write_record_of(const Request& request);
 /// The same for a PDU that was never submitted; without `items` if it is not a valid request.
 std::optional<WriteRecord> write_record_of(ByteView pdu, const WhoRef& who);
+/// Refuses a write while none can be recorded.
+std::optional<Refusal> unrecordable(const Settings& settings, std::uint8_t station);
 /// Completes the record of a write that has ended.
 void complete(WriteRecord& write, const Answer& answer);
 /// Logs at info. Every transmitted write is logged with its whole PDU (rt::log_each); writes that

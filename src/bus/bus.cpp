@@ -68,7 +68,6 @@ struct Bus::State final : public line::Line::Events {
     void transact(Request request, AnswerHandler handler);
     void record_departure(ClientId client);
     void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
-    bool is_unrecordable() const { return settings.refuses_writes && settings.refuses_writes(); }
     void act(arbiter::Transmit& transmit) {
         line->write(transmit.adu);
         arbiter.set_latency(line->latency());
@@ -193,13 +192,10 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     if (broadcast ? !what.is_broadcastable() : what.is_never_answered()) {
         return refuse(std::move(entry), Fault::denied);
     }
-    if (auto refusal = rights.judge(request.station, what)) {
+    auto refusal = rights.judge(request.station, what);
+    if (!refusal && entry.write) refusal = unrecordable(settings, request.station);
+    if (refusal) {
         Result<Bytes> reply = answer_to(*refusal, what.function());
-        return refuse(std::move(entry), std::move(reply), std::move(refusal));
-    }
-    if (entry.write && is_unrecordable()) {
-        auto refusal = unrecorded(name_of(settings.stations, request.station));
-        Result<Bytes> reply = answer_to(refusal, what.function());
         return refuse(std::move(entry), std::move(reply), std::move(refusal));
     }
     const PriorityClass priority = priority_of(request);
@@ -405,9 +401,8 @@ OutcomeCounts Bus::outcomes(std::uint8_t station) const {
 }
 
 std::optional<Refusal> Bus::write_refusal(std::uint8_t station) const {
-    if (auto refusal = state_->rights.judge_write(station)) return refusal;
-    if (!state_->is_unrecordable()) return std::nullopt;
-    return unrecorded(name_of(state_->settings.stations, station));
+    auto refusal = state_->rights.judge_write(station);
+    return refusal ? refusal : unrecordable(state_->settings, station);
 }
 
 TracePart Bus::trace(std::size_t last) const { return state_->book.store().part(last); }
