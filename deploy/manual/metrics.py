@@ -33,7 +33,7 @@ GROUPS = [("Requests", ("requests", "translated", "request_duration", "queue"),
           ("Serial drivers", ("framing", "parity", "overruns", "breaks"),
            "Only of lines whose driver counts: a serial port of the machine, and some USB adapters."),
           ("Points", ("point",), "With `points`."), ("Relays", ("relay",), "With `relays`."),
-          ("Modbus/TCP", ("tcp",), "For each listener."), ("HTTP", ("http", "login"), ""),
+          ("Modbus/TCP", ("tcp",), "For each listener."), ("HTTP", ("http", "login", "token"), ""),
           ("MQTT", ("mqtt",), "With `mqtt`."), ("Audit", ("audit",), "With `audit`."),
           ("Serial masters", ("serial_master",), "With `serial_masters`."),
           ("The gateway", ("config", "loop", "build", "log"), "")]

@@ -162,7 +162,7 @@ void AuditBook::tell(const audit::Notice& notice) {
         case Notice::anchor:
             return rt::log(rt::LogLevel::info, "audit anchor",
                            {{"number", std::to_string(notice.at.number)},
-                            {"hash", std::string(audit::text_of(notice.at.hash))}});
+                            {"hash", std::string(text_of(notice.at.hash))}});
         case Notice::remark:
             return rt::log(rt::LogLevel::warn, "audit file",
                            {{"file", file_}, {"why", notice.text}});
@@ -348,6 +348,7 @@ void AuditBook::deed(const web::Deed& deed) {
             return;
         add_who(begin(Kind::login), deed.who);
         composer_.text("outcome", "failed").text("path", deed.path);
+        composer_.text("why", detail_of(deed.answer));
     } else if (deed.status >= 400) {
         return refusal(deed);
     } else if (discovers || simulates) {
@@ -394,6 +395,7 @@ void AuditBook::tokens(const std::vector<web::Token>& before, const std::vector<
     const auto tell_of = [this](const web::Token& token, std::string_view event) {
         begin(Kind::token).text("token", token.name).text("role", label(token.role));
         composer_.text("event", event);
+        if (token.expires) composer_.text("expires", web::expiry_text(*token.expires));
         record();
     };
     for (const web::Token& token : now) {
@@ -401,7 +403,10 @@ void AuditBook::tokens(const std::vector<web::Token>& before, const std::vector<
         if (old == before.end()) {
             tell_of(token, "added");
         } else if (*old != token) {
-            tell_of(token, old->role != token.role ? "role changed" : "changed");
+            const bool other = old->hash != token.hash;
+            tell_of(token, old->role != token.role ? "role changed"
+                           : other                 ? "replaced"
+                                                   : "changed");
         }
     }
     for (const web::Token& token : before)

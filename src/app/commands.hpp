@@ -58,6 +58,15 @@ struct AuditOptions {
 ExitCode audit_verify(const AuditOptions& options);
 /// Prints records.
 ExitCode audit_show(const AuditOptions& options);
+/// The command line of `token new`.
+struct TokenOptions {
+    std::string name;
+    std::string role = "operator";
+    std::string expires;  ///< "90d", "2027-12-31", or empty
+    std::string output;   ///< the file for its hash; empty: it is printed
+};
+/// Makes a token and prints it once, with what the configuration must say.
+ExitCode token_new(const TokenOptions& options);
 /// Checks whether the gateway is ready. `http`: "ADDR:PORT" of its REST API; if empty, the address
 /// from `file`, or the default if there is no readable file.
 ExitCode health(const std::string& file, const std::string& http);

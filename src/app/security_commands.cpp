@@ -48,8 +48,33 @@ void add_audit(CLI::App& cli, ExitCode& code) {
     show->callback([typed, &code] { code = audit_show(*typed); });
 }
 
+void add_token(CLI::App& cli, ExitCode& code) {
+    CLI::App* command = cli.add_subcommand("token", "make tokens for clients of REST");
+    command->group(kSecurity);
+    command->require_subcommand(1);
+    const auto typed = std::make_shared<TokenOptions>();
+    CLI::App* fresh = command->add_subcommand(
+        "new", "make a token: print it once, and what goes into the configuration");
+    fresh->add_option("--name", typed->name, "its name in logs and in the audit, such as scada")
+        ->required();
+    fresh->add_option("--role", typed->role, "what it may do")
+        ->check(CLI::IsMember({"viewer", "operator", "engineer", "admin"}))
+        ->capture_default_str();
+    fresh->add_option("--expires", typed->expires,
+                      "how long it is known, such as 90d or 2y, or its last day, 2027-12-31");
+    fresh->add_option("-o,--output", typed->output,
+                      "write its hash to this new file, which the configuration then names");
+    fresh->footer(
+        "The file holds the hash alone: who reads it cannot use the token.\nExit codes: 0 "
+        "it is made; 64 usage, or the file is there; 70 it cannot be written.");
+    fresh->callback([typed, &code] { code = token_new(*typed); });
+}
+
 }  // namespace
 
-void add_security_commands(CLI::App& cli, ExitCode& code) { add_audit(cli, code); }
+void add_security_commands(CLI::App& cli, ExitCode& code) {
+    add_audit(cli, code);
+    add_token(cli, code);
+}
 
 }  // namespace panelgate::app

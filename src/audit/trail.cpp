@@ -1,6 +1,11 @@
 #include "panelgate/audit/trail.hpp"
 
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <condition_variable>
 #include <csignal>
 #include <exception>
@@ -29,11 +34,84 @@ std::thread start_thread(std::function<void()> run) {
     return thread;
 }
 
+/// The local syslog, in the format of RFC 5424. Never waits: what it does not take is lost there,
+/// and counted.
+class Syslog {
+  public:
+    explicit Syslog(std::string socket) : path_(std::move(socket)) {
+        std::array<char, 256> name{};
+        if (::gethostname(name.data(), name.size() - 1) == 0) host_ = name.data();
+        if (host_.empty()) host_ = "-";
+    }
+    ~Syslog() { close(); }
+    Syslog(const Syslog&) = delete;
+    Syslog& operator=(const Syslog&) = delete;
+
+    /// Sends each of the bodies; returns how many were not taken.
+    std::uint64_t send(std::string_view bodies) {
+        std::uint64_t lost = 0;
+        while (!bodies.empty()) {
+            const std::size_t end = std::min(bodies.find('\n'), bodies.size());
+            if (!send_one(bodies.substr(0, end))) ++lost;
+            bodies.remove_prefix(std::min(end + 1, bodies.size()));
+        }
+        return lost;
+    }
+
+  private:
+    /// `"time":"T","kind":"K",...` becomes `<110>1 T HOST panelgate PID K - {...}`: 110 is the
+    /// facility "log audit" at level info.
+    bool send_one(std::string_view body) {
+        text_ = "<110>1 ";
+        text_ += quoted_behind(body, "\"time\":\"");
+        text_ += ' ' + host_ + " panelgate " + std::to_string(::getpid()) + ' ';
+        text_ += quoted_behind(body, "\"kind\":\"");
+        text_ += " - {";
+        text_ += body;
+        text_ += '}';
+        if (socket_ < 0 && !connect()) return false;
+        if (::send(socket_, text_.data(), text_.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0)
+            return true;
+        if (errno != EAGAIN && errno != ENOBUFS) close();  // it was restarted: the next one tries
+        return false;
+    }
+    static std::string_view quoted_behind(std::string_view body, std::string_view key) {
+        const auto at = body.find(key);
+        if (at == body.npos) return "-";
+        const std::string_view rest = body.substr(at + key.size());
+        return rest.substr(0, rest.find('"'));
+    }
+    bool connect() {
+        sockaddr_un address{};
+        address.sun_family = AF_UNIX;
+        if (path_.size() >= sizeof(address.sun_path)) return false;
+        std::ranges::copy(path_, address.sun_path);
+        socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+        const auto* where = reinterpret_cast<const sockaddr*>(&address);
+        if (socket_ >= 0 && ::connect(socket_, where, sizeof(address)) == 0) return true;
+        close();
+        return false;
+    }
+    void close() {
+        if (socket_ >= 0) ::close(socket_);
+        socket_ = -1;
+    }
+
+    std::string path_;
+    std::string host_;
+    std::string text_;
+    int socket_ = -1;
+};
+
 }  // namespace
 
 struct Trail::State {
     State(const Settings& s, Hooks h, std::atomic<bool>& f)
-        : settings(s), hooks(std::move(h)), failing(f), writer(s, hooks.wall, hooks.start) {
+        : settings(s),
+          hooks(std::move(h)),
+          failing(f),
+          writer(s, hooks.wall, hooks.start),
+          syslog(s.syslog_socket) {
         pending.reserve(std::min<std::size_t>(settings.buffer, 64 * 1024));
     }
 
@@ -58,6 +136,8 @@ struct Trail::State {
     Hooks hooks;
     std::atomic<bool>& failing;
     Writer writer;
+    Syslog syslog;
+    std::uint64_t syslog_lost = 0;
     Composer composer;
     std::string taken;
     std::uint64_t failures = 0;
@@ -112,6 +192,7 @@ void Trail::State::work() {
     bool good = false;
     std::string why;
     try {
+        if (!taken.empty() && settings.syslog) syslog_lost += syslog.send(taken);
         if (!taken.empty()) writer.take(taken);
         taken.clear();
         good = writer.work();
@@ -133,6 +214,7 @@ void Trail::State::publish() {
     counters.records = writer.records();
     counters.rotations = writer.rotations();
     counters.failures = failures;
+    counters.syslog_lost = syslog_lost;
     counters.failing = failing;
 }
 

@@ -186,8 +186,16 @@ const Keys<web::Token>& token_keys() {
                    "viewer reads, operator writes, engineer also raw, broadcast, discover and "
                    "simulator, admin also reload.",
                    [](const web::Token& token) { return std::string(label(token.role)); })
-            .other("file", "File that holds the token, and nothing else.",
-                   [](const web::Token& token) { return token.file; });
+            .other("file",
+                   "File that holds the token, or its hash as `panelgate token new` prints it, and "
+                   "nothing else.",
+                   [](const web::Token& token) { return token.file; })
+            .other("expires",
+                   "Last day of the token, such as 2027-12-31, or an instant, "
+                   "2027-12-31T18:00:00Z; in UTC. Without it none.",
+                   [](const web::Token& token) {
+                       return token.expires ? web::expiry_text(*token.expires) : std::string();
+                   });
     return kKeys;
 }
 

@@ -83,7 +83,7 @@ void show_http(const SettingWriter& top, const web::Settings& settings) {
     for (const web::Token& token : settings.tokens) {
         const SettingWriter one = section.item("tokens", token.name);
         token_keys().show(one, token);
-        one.put_secret("secret", token.secret);
+        one.put_secret("secret", token.hash);
     }
 }
 

@@ -207,7 +207,7 @@ void compare_relays(Lines& all, const Config& running, const Config& next) {
 
 void compare_tokens(Lines& all, const web::Settings& running, const web::Settings& next) {
     for (const web::Token& token : next.tokens) {
-        const auto was = std::ranges::find(running.tokens, token.secret, &web::Token::secret);
+        const auto was = std::ranges::find(running.tokens, token.hash, &web::Token::hash);
         if (was == running.tokens.end()) {
             all.push_back("http: token " + token.name + " is valid");
         } else if (token.role > was->role) {

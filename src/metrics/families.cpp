@@ -68,8 +68,13 @@ void add_http(Families& out, const Snapshot& snapshot) {
     Family failures =
         make_counter("panelgate_login_failures_total", "HTTP requests with an unknown token.");
     failures.counter({}, snapshot.http->login_failures);
+    Family uses = make_gauge("panelgate_token_last_use_timestamp_seconds",
+                             "When a request came with the token last; absent until the first.");
+    for (const auto& [token, when] : snapshot.http->token_uses)
+        uses.gauge({{"token", token}}, when);
     out.push_back(requests.take());
     out.push_back(failures.take());
+    out.push_back(uses.take());
 }
 
 namespace {
@@ -128,6 +133,8 @@ void add_audit(Families& out, const Snapshot& snapshot) {
                 audit.lost);
     add_counter(out, "panelgate_audit_failures_total", "Times that writing the audit has failed.",
                 audit.failures);
+    add_counter(out, "panelgate_audit_syslog_lost_total",
+                "Records that syslog did not take; they are in the file.", audit.syslog_lost);
     add_counter(out, "panelgate_audit_rotations_total", "Files of the audit that have been filled.",
                 audit.rotations);
 }

@@ -93,7 +93,7 @@ serial_masters:
      serial: {baud: 9600, data_bits: 7, parity: none, stop_bits: 1}, rs485: {mode: off},
      broadcast: silent, on_failure: silence, echo: auto, response_timeout: 2s}
   - {name: hmi, device: /dev/ttyS3, lines: [a], framing: rtu}
-http: {tokens: [{name: ops, role: operator, file: /run/secrets/ops}]}
+http: {tokens: [{name: ops, role: operator, file: /run/secrets/ops, expires: 2027-12-31}]}
 mqtt: {broker: "mqtts://b:8883", topic: x, qos: 1, client_id: x, username: x, store: 200,
        password_file: /run/secrets/ops, keep_alive: 60s, write: none, ca: /run/secrets/ops,
        certificate: /run/secrets/ops, key: /run/secrets/ops}
@@ -108,7 +108,7 @@ constexpr const char* kWords =
     "refuse read_only high_first master line station pass deny silent exception "
     "viewer operator warn json u16 i16 BADC UW120 GDT220 UB190 400009 400109 "
     "a-1/400209 panasonic-gt b 127.0.0.1:99 10.0.0.0/8 /dev/ttyS9 press/UW140 oven/GDT300 "
-    "a/2 floor1/20 /run/secrets/other 20MiB continue ";
+    "a/2 floor1/20 /run/secrets/other 20MiB continue 2028-01-31 ";
 
 /// Alternative values, likely ones first.
 std::vector<std::string> others(const yaml::Node& value) {

@@ -98,6 +98,7 @@ struct HttpRequest {
     std::vector<std::string> arguments;  ///< segments matched by the route's {}
     std::shared_ptr<Caller> caller;
     Role role = Role::none;  ///< of the client
+    WallTime at{};           ///< when it was judged: tokens expire
     bool folder = false;     ///< the path ends with '/'
 };
 /// The request headers that are read; each may occur once.
@@ -155,6 +156,7 @@ struct Site {
     std::function<std::uint64_t()> next_caller;  ///< returns connection ids
     std::function<TimePoint()> now;              ///< required unless all routes are public
     std::function<void(const Deed&)> record{};   ///< may be empty; must not throw
+    std::function<WallTime()> wall{};            ///< empty: no token expires
 };
 
 /// Logs at info what a client did or was refused: its name (address, token) first, as `client`.
