@@ -188,10 +188,8 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     entry.write = write_record_of(request);
     entry.client = request.client;
     clients.count_request(request.client);
-    const bool broadcast = request.station == 0;
-    if (broadcast ? !what.is_broadcastable() : what.is_never_answered()) {
+    if (request.station == 0 ? !what.is_broadcastable() : what.is_never_answered())
         return refuse(std::move(entry), Fault::denied);
-    }
     auto refusal = rights.judge(request.station, what);
     if (!refusal && entry.write) refusal = unrecordable(settings, request.station);
     if (refusal) {
