@@ -323,7 +323,7 @@ JobQueue::Test Schedule::runnable(TimePoint now, const Stations& stations,
 std::optional<Schedule::Next> Schedule::proof_before(TimePoint now, const Job& job,
                                                      const Stations& stations) const {
     const Station* station = stations.find(job.station);
-    if (job.station == kBroadcast || station == nullptr) return std::nullopt;
+    if (station == nullptr) return std::nullopt;
     const OutstandingRequests& book = station->requests();
     if (!book.is_ambiguous(job.request)) return std::nullopt;
     const bool is_in_transit = in_transit(*station);
@@ -336,37 +336,47 @@ std::optional<Schedule::Next> Schedule::proof_before(TimePoint now, const Job& j
     return Next{std::move(proof), false};
 }
 
+/// A read that no client asked for and that goes before this job: a proof (P1), or one that shows
+/// whether the line has an echo (P8).
+std::optional<Schedule::Next> Schedule::read_before(TimePoint now, const Job& job,
+                                                    Stations& stations, const EchoMemory& echo) {
+    if (job.station == kBroadcast) return std::nullopt;
+    if (auto proof = proof_before(now, job, stations)) return proof;
+    if (!echo.must_be_learned_before(job.request, job.ticket == learned_for_)) return std::nullopt;
+    learned_for_ = job.ticket;
+    return Next{learning_for(job, stations.of(job.station)), false};
+}
+
 Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quiet,
                                   const EchoMemory& echo) {
-    const bool others = others_go_first(now, stations, quiet);
+    struct {
+        bool others;
+        bool in_budget = true;
+        std::optional<std::uint8_t> reads_of{};  ///< only of this station
+    } wanted{others_go_first(now, stations, quiet)};
     const JobQueue::Test may_run = runnable(now, stations, quiet);
-    PoolSet<std::uint8_t> reads;  // stations whose reads go before their writes
-    backlog_.queue().any_first([&](const Job& job) {
-        if (job.request.is_read() && stations.has_read_turn(job.station) && may_run(job))
-            reads.insert(job.station);
-        return false;
-    });
-    const JobQueue::Test may = [&](const Job& job) {
-        return (!others || has_turn(job)) && may_run(job) &&
-               (job.request.is_read() || !reads.contains(job.station));
+    const JobQueue::Test test = [&](const Job& job) {
+        if (wanted.reads_of && (job.station != *wanted.reads_of || !job.request.is_read()))
+            return false;
+        return (!wanted.others || has_turn(job)) && may_run(job) &&
+               (!wanted.in_budget || stations.may_spend(now, job));
     };
-    const JobQueue::Test in_budget = [&](const Job& job) {
-        return may(job) && stations.may_spend(now, job);
-    };
+    const JobQueue& queue = backlog_.queue();
+    const Job* next = queue.peek(test);
     // A failing station waits for its share only while others want the line.
-    const Job* next = backlog_.queue().peek(in_budget);
-    const JobQueue::Test& test = next != nullptr ? in_budget : may;
-    if (next == nullptr) next = backlog_.queue().peek(may);
-    if (next == nullptr || !gap_is_over(now, next->station, stations, quiet)) return {};
-    const bool broadcast = next->station == kBroadcast;
-    if (auto proof = proof_before(now, *next, stations)) return std::move(*proof);
-    if (!broadcast && echo.must_be_learned_before(next->request, next->ticket == learned_for_)) {
-        learned_for_ = next->ticket;
-        return {learning_for(*next, stations.of(next->station)), false};
+    wanted.in_budget = next != nullptr;
+    if (next == nullptr) next = queue.peek(test);
+    // P9: in the turn of a station's write its read goes first, and the write is next.
+    if (next != nullptr && !next->request.is_read() && stations.has_read_turn(next->station)) {
+        wanted.reads_of = next->station;
+        if (const Job* read = queue.peek(test)) next = read;
+        if (!next->request.is_read()) wanted.reads_of.reset();
     }
+    if (next == nullptr || !gap_is_over(now, next->station, stations, quiet)) return {};
+    if (auto read = read_before(now, *next, stations, echo)) return std::move(*read);
     Job job = *backlog_.queue().pop(test);
     take_turn(job);
-    if (broadcast) {
+    if (job.station == kBroadcast) {
         Group group{.request = job.request};
         group.jobs.push_back(std::move(job));
         return {std::move(group), false};

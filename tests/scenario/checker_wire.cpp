@@ -51,7 +51,9 @@ void Checker::on_answered(TimePoint now) {
     if (attempt_.answered) return;
     attempt_.answered = true;
     attempt_.first = !watch_.has_answered(attempt_.station);
-    watch_.on_answered(now, attempt_.station, now - attempt_.sent);
+    const bool is_first = watch_.on_answered(now, attempt_.station, now - attempt_.sent);
+    // What the way held back may have reached the station only now.
+    if (is_first && settings_.may_stall) watch_.on_owed(attempt_.station, owed_until());
     // Of two attempts nobody knows which one the reply was for.
     if (attempt_.owed) watch_.on_owed(attempt_.station, owed_until());
     if (watch_.is_good(attempt_.station, now)) costs_.on_answered(now, attempt_);

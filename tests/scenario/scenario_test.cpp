@@ -139,6 +139,10 @@ TEST(Scenario, SeedsThatOnceBrokeAPromiseKeepThemAll) {
         {Kind::crowd, 228},
         // Reads of a station that rests after each reply starved behind its own writes.
         {Kind::wild, 129},
+        // Another's write waited for a read that was the last of a long round.
+        {Kind::loss, 545},
+        // What a line had held back came only when it was proved free.
+        {Kind::wild, 175},
     };
     for (const Known& known : kKnown) {
         const std::string violation = play(draw(known.kind, known.seed)).violation;

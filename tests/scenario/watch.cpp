@@ -28,13 +28,15 @@ void Watch::on_upset(TimePoint now) {
     }
 }
 
-void Watch::on_answered(TimePoint now, std::uint8_t station, Duration after) {
+bool Watch::on_answered(TimePoint now, std::uint8_t station, Duration after) {
     Station& s = stations_[station];
-    if (s.disturbed) s.settled = now;
+    const bool was_disturbed = s.disturbed;
+    if (was_disturbed) s.settled = now;
     s.disturbed = s.silent = s.failing = false;
     s.lately = static_cast<std::uint8_t>(s.lately << 1);
     s.slowest = std::max(s.slowest.value_or(after), after);
     slowest_ = std::max(slowest_.value_or(after), after);
+    return was_disturbed;
 }
 
 void Watch::on_unanswered(TimePoint now, std::uint8_t station, bool silent) {

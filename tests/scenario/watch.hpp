@@ -18,8 +18,9 @@ class Watch {
     void on_collision(TimePoint now, std::uint8_t station);
     /// The line, the way to it or the process were not there: that excuses everything for a while.
     void on_upset(TimePoint now);
-    /// It answered `after` the computed end of the request.
-    void on_answered(TimePoint now, std::uint8_t station, Duration after);
+    /// It answered `after` the computed end of the request. True if that is the first since a
+    /// disturbance.
+    bool on_answered(TimePoint now, std::uint8_t station, Duration after);
     void on_unanswered(TimePoint now, std::uint8_t station, bool silent);
     /// A reply of it may come until then that answers an earlier request.
     void on_owed(std::uint8_t station, TimePoint until);

@@ -144,6 +144,8 @@ class Schedule {
     std::optional<Group> next_probe(TimePoint now, Stations& stations, Quiet& quiet) const;
     Next next_job(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo);
     std::optional<Next> proof_before(TimePoint now, const Job& job, const Stations& stations) const;
+    std::optional<Next> read_before(TimePoint now, const Job& job, Stations& stations,
+                                    const EchoMemory& echo);
     TimePoint ready_at(const Stations& stations, const Job& job) const;
     bool can_prove(const Station& station) const;
     TimePoint repeat_from(const Group& group, const Stations& stations) const;

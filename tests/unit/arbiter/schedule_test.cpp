@@ -154,6 +154,35 @@ TEST_F(ScheduleTest, P9AReaderWaitsForFourWritesAlsoBesideARetry) {
     EXPECT_EQ(writes, 4);
 }
 
+/// Its station has had its writes in a row, so that a read of it is due, which is the last of a
+/// long round: that takes the write's turn, and does not hold it back until its own has come.
+TEST_F(ScheduleTest, P9AWriteIsNotHeldBackByAReadWhoseHostHasOtherReads) {
+    constexpr std::uint64_t kGreedy = 7;
+    const auto wait_of_host = [&](std::uint8_t station, bool write, std::uint64_t host) {
+        Job made = job(station, write);
+        made.host = host;
+        EXPECT_TRUE(schedule.backlog().queue().push(std::move(made)).taken);
+    };
+    for (int i = 0; i < 20; ++i) {
+        wait_of_host(2, false, kGreedy);
+        wait_of_host(3, true, kGreedy);
+    }
+    wait_of_host(1, false, kGreedy);
+    wait_of_host(1, true, kGreedy + 1);
+    for (int i = 0; i < Station::kWritesInARow; ++i)
+        stations.of(1).on_asked(now, test::group_of(1, "06 00 01 00 01"_hex));
+    std::string asked;
+    while (const auto group = next().group) {
+        if (group->station == 1) asked += group->request.is_read() ? "r" : "w";
+        stations.of(group->station).on_asked(now, *group);
+        if (asked.ends_with('w')) break;
+        asked += '.';
+        ASSERT_LT(asked.size(), 8u) << asked;
+    }
+    EXPECT_TRUE(asked.ends_with("w")) << asked;
+    EXPECT_NE(asked.find('r'), std::string::npos) << asked;
+}
+
 TEST_F(ScheduleTest, NothingElseGoesToAStationBeforeItsRetry) {
     wait(1, true);
     wait(1);
