@@ -49,6 +49,7 @@ class Syslog {
 
     /// Sends each of the bodies; returns how many were not taken.
     std::uint64_t send(std::string_view bodies) {
+        std::size_t of_last = 0;  ///< bytes of `pending` from before `next` was wanted
         std::uint64_t lost = 0;
         while (!bodies.empty()) {
             const std::size_t end = std::min(bodies.find('\n'), bodies.size());
@@ -158,16 +159,22 @@ bool Trail::State::wait(std::unique_lock<std::mutex>& lock) {
     return stop;
 }
 
-/// Call with the lock.
+/// Call with the lock. What was added before another file was wanted belongs to the one before, if
+/// that takes it.
 void Trail::State::take_over() {
-    // What was added before belongs to the file before, if that takes it.
-    const bool is_drained = pending.empty() && lost == 0 && writer.idle();
+    const bool is_drained = of_last == 0 && writer.idle();
     if (next && (is_drained || failing || next->file == settings.file)) {
         settings = *std::exchange(next, std::nullopt);
         writer.apply(settings);
         anchored = 0;
+        of_last = 0;
     }
     if (!writer.idle()) return;
+    if (next) {
+        taken.assign(pending, 0, of_last);
+        pending.erase(0, std::exchange(of_last, 0));
+        return;
+    }
     const std::uint64_t left_out = std::exchange(lost, 0);
     std::swap(taken, pending);
     if (left_out == 0) return;
@@ -229,12 +236,14 @@ void Trail::State::run() {
         lock.lock();
         publish();
     }
-    if (failing) return;
-    take_over();  // what came while the last try was going on
-    lock.unlock();
-    work();
-    lock.lock();
-    publish();
+    // What came while the last try was going on, and what belongs to another file.
+    for (int i = 0; i < 2 && !failing; ++i) {
+        take_over();
+        lock.unlock();
+        work();
+        lock.lock();
+        publish();
+    }
 }
 
 Trail::Trail(const Settings& settings, Hooks hooks)
@@ -278,7 +287,8 @@ void Trail::add(std::string_view body) {
 void Trail::apply(const Settings& settings) {
     {
         const std::scoped_lock lock(state_->mutex);
-        if (settings == state_->settings) return;
+        if (settings == state_->settings && !state_->next) return;
+        if (!state_->next) state_->of_last = state_->pending.size();
         state_->next = settings;
     }
     state_->wake.notify_one();

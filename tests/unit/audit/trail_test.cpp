@@ -116,18 +116,24 @@ TEST_F(AuditTrail, WhatFindsNoRoomIsCountedAndTheCountIsRecorded) {
     EXPECT_EQ(trail.counters().failures, 1U);
 }
 
-TEST_F(AuditTrail, AnotherFileHasAChainOfItsOwn) {
-    Trail trail(settings(), told.hooks());
-    told.wait_for(Notice::Kind::anchor);
-    Settings other = settings();
-    other.file += ".other";
-    trail.apply(other);
-    trail.add(body(1));
-    trail.close();
-    const Report report = verify(other.file);
-    EXPECT_FALSE(report.fault);
-    EXPECT_EQ(report.first, 1U);
-    EXPECT_FALSE(verify(file).fault);
+TEST_F(AuditTrail, AnotherFileHasAChainOfItsOwnAndWhatCameBeforeIsInTheFirst) {
+    for (const bool waits : {true, false}) {
+        Settings first = settings();
+        first.file += waits ? ".a" : ".b";
+        Trail trail(first, told.hooks());
+        if (waits) told.wait_for(Notice::Kind::anchor);
+        for (int i = 0; i < 10; ++i) trail.add(body(i));
+        Settings other = first;
+        other.file += ".other";
+        trail.apply(other);
+        trail.add(body(10));
+        trail.close();
+        EXPECT_EQ(verify(first.file).records, 12U);
+        const Report report = verify(other.file);
+        EXPECT_FALSE(report.fault);
+        EXPECT_EQ(report.records, 3U);
+        EXPECT_FALSE(verify(first.file).fault);
+    }
 }
 
 TEST_F(AuditTrail, SyslogGetsEachRecordAsWellAndMayBeAway) {
