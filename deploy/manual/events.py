@@ -18,7 +18,8 @@ ADDED = {"log_client": ("info", ["client"]), "shared_->log": ("", ["listener"]),
 ELSEWHERE = {"write": ("", ["line", "station", "client", "at", "pdu", "outcome", "transaction"]),
              "listening": ("", ["modbus_tcp", "http"]), "listener waits": ("", ["modbus_tcp", "http"]),
              "log lines left out": ("", ["of", "client", "clients", "count"]),
-             "log lines dropped": ("", ["count"]), "connection closed": ("info, warn", []),
+             "log lines dropped": ("", ["count"]), "tls handshake failed": ("info, warn", []),
+             "connection closed": ("info, warn", []),
              "connection gives way": ("info, warn", []),
              "datagram refused": ("debug, info, warn", [])}
 MEANINGS = {
@@ -29,6 +30,10 @@ MEANINGS = {
     "bytes behind its replies": "more bytes come after a panel's replies; the line waits for them",
     "cannot accept": "a client could not be let in: usually no descriptor is left",
     "cannot start": "a listener could not be opened; the program ends",
+    "certificate": "what `check` would say of a certificate: its end, its names, its purpose",
+    "certificate not renewed": "new files of a `tls` map cannot be used; the former ones stay in use",
+    "certificate renewed": "new files of a `tls` map are in use for new connections",
+    "certificate without a role": "the role in a client's certificate does not count, so it only reads",
     "collision": "another unit sent at the same time, or an echo is missing",
     "configuration": "what `check` would say of the file that is served",
     "configuration changed": "a reload took this change over",
@@ -84,6 +89,7 @@ MEANINGS = {
     "station online": "a panel answers again",
     "stopped at once": "a second signal ended the program before all was answered",
     "stopping": "the program ends: nothing more is accepted",
+    "tls handshake failed": "a client did not get in by TLS, and why",
     "write": "a write, by whom, where, its frame and its outcome",
     "write refused": "a write by REST that was not allowed, and why",
 }

@@ -20,7 +20,8 @@ audit: {file: /dev/shm/panelgate-manual-none/audit.jsonl}
 # What neither has: its labels, and what it takes.
 OTHERS = {"panelgate_findings": "line, station, cause", "panelgate_framing_errors_total": "line",
           "panelgate_parity_errors_total": "line", "panelgate_overruns_total": "line",
-          "panelgate_breaks_total": "line"}
+          "panelgate_breaks_total": "line", "panelgate_tls_handshakes_total": "listener, outcome",
+          "panelgate_certificate_expiry_timestamp_seconds": "listener"}
 # What a program that was built outside of a repository would not have.
 LABELS = {"panelgate_build_info": "version, commit, compiler"}
 GROUPS = [("Requests", ("requests", "translated", "request_duration", "queue"),
@@ -34,6 +35,7 @@ GROUPS = [("Requests", ("requests", "translated", "request_duration", "queue"),
            "Only of lines whose driver counts: a serial port of the machine, and some USB adapters."),
           ("Points", ("point",), "With `points`."), ("Relays", ("relay",), "With `relays`."),
           ("Modbus/TCP", ("tcp",), "For each listener."), ("HTTP", ("http", "login", "token"), ""),
+          ("TLS", ("tls", "certificate"), "For each listener with `tls`."),
           ("MQTT", ("mqtt",), "With `mqtt`."), ("Audit", ("audit",), "With `audit`."),
           ("Serial masters", ("serial_master",), "With `serial_masters`."),
           ("The gateway", ("config", "loop", "build", "log"), "")]

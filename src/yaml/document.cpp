@@ -356,8 +356,9 @@ Node parse(std::string_view text, Problems& problems) {
 }
 
 Node* Node::find(std::string_view key) {
-    const auto found = std::ranges::find(entries, key, &Entry::key);
-    return found == entries.end() ? nullptr : &found->value;
+    for (Entry& entry : entries)
+        if (entry.key == key) return &entry.value;
+    return nullptr;
 }
 
 Size size_of(const Node& node) {

@@ -51,17 +51,15 @@ std::optional<Duration> take_part(std::string_view& text) {
     const std::size_t number = std::min(text.find_first_not_of("0123456789.,"), text.size());
     std::string digits(text.substr(0, number));
     std::ranges::replace(digits, ',', '.');
-    double value = 0;
-    const char* end = digits.data() + digits.size();
-    const auto [stop, error] = std::from_chars(digits.data(), end, value);
-    if (digits.empty() || error != std::errc() || stop != end) return std::nullopt;
+    const auto value = parse_number(digits);
+    if (!value) return std::nullopt;
     text = trim(text.substr(number));
     const std::size_t unit = std::min(text.find_first_of("0123456789 "), text.size());
     const std::string name = lower(text.substr(0, unit));
     const auto word = std::ranges::find(kDurationUnits, std::string_view(name), &Word::word);
     if (word == kDurationUnits.end()) return std::nullopt;
     text = trim(text.substr(unit));
-    const double exact = value * static_cast<double>(word->length.count());
+    const double exact = *value * static_cast<double>(word->length.count());
     constexpr double kMost = 1e18;  // of the 9.2e18 ns that a Duration holds
     if (!(exact < kMost)) return std::nullopt;
     return Duration(std::llround(exact));
@@ -69,14 +67,11 @@ std::optional<Duration> take_part(std::string_view& text) {
 
 /// As from_chars reads it.
 std::optional<std::string> plain_number(std::string_view text, bool whole) {
-    double value = 0;
-    const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || stop != text.data() + text.size()) return std::nullopt;
-    if (!std::isfinite(value)) return std::nullopt;
-    if (!whole) return std::string(text);
+    const auto value = parse_number(text);
+    if (!value || !whole) return value ? std::optional(std::string(text)) : std::nullopt;
     constexpr double kMost = 1e15;  // whole numbers that a double holds exactly
-    if (value != std::floor(value) || std::fabs(value) > kMost) return std::nullopt;
-    return std::to_string(static_cast<std::int64_t>(value));
+    if (*value != std::floor(*value) || std::fabs(*value) > kMost) return std::nullopt;
+    return std::to_string(static_cast<std::int64_t>(*value));
 }
 
 std::optional<std::string> hexadecimal(std::string_view text) {
@@ -99,14 +94,11 @@ std::optional<std::string> kilo(std::string_view text) {
     const std::string_view thousands = text.substr(0, text.find_last_not_of(' ', k - 1) + 1);
     const std::string_view behind = text.substr(std::min(k + 1, text.size()));
     const bool has_digit = !behind.empty() && kDecimalDigits.find(behind[0]) != kDecimalDigits.npos;
-    double value = 0;
-    const std::string digits =
-        std::string(thousands) + (has_digit ? '.' + std::string(behind) : "");
-    const auto [stop, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    const bool good = error == std::errc() && stop == digits.data() + digits.size();
+    const auto value =
+        parse_number(std::string(thousands) + (has_digit ? '.' + std::string(behind) : ""));
     constexpr double kMost = 1e9;
-    if (k == text.size() || !good || !(value > 0 && value < kMost)) return std::nullopt;
-    const double all = value * 1000;
+    if (k == text.size() || !value || *value <= 0 || *value >= kMost) return std::nullopt;
+    const double all = *value * 1000;
     if (std::fabs(all - std::round(all)) > 1e-6) return std::nullopt;
     return std::to_string(std::llround(all));
 }
@@ -132,21 +124,14 @@ std::string bare(std::string_view text, bool whole) {
 
 /// 1/10, /10, x0.1 and 10^-1
 std::optional<std::string> calculated(std::string_view text) {
-    const auto number = [](std::string_view digits) -> std::optional<double> {
-        double value = 0;
-        const char* end = digits.data() + digits.size();
-        const auto [stop, error] = std::from_chars(digits.data(), end, value);
-        if (error != std::errc() || stop != end) return std::nullopt;
-        return value;
-    };
     const std::size_t sign = text.find_first_of("/^");
     std::optional<double> value;
     if (text.starts_with('x') || text.starts_with('*')) {
-        value = number(trim(text.substr(1)));
+        value = parse_number(trim(text.substr(1)));
     } else if (sign != text.npos) {
         if (sign == 0 && text[0] == '^') return std::nullopt;
-        const auto left = sign == 0 ? std::optional(1.0) : number(text.substr(0, sign));
-        const auto right = number(text.substr(sign + 1));
+        const auto left = sign == 0 ? std::optional(1.0) : parse_number(text.substr(0, sign));
+        const auto right = parse_number(text.substr(sign + 1));
         if (!left || !right) return std::nullopt;
         value = text[sign] == '/' ? *left / *right : std::pow(*left, *right);
     }
@@ -175,16 +160,18 @@ std::string comma_hint(std::string_view text, bool whole) {
 
 /// Shares are numbers from 0 to 1.
 std::string percent_hint(std::string_view text) {
-    double value = 0;
-    const char* end = text.data() + text.size() - 1;
-    const auto [stop, error] = std::from_chars(text.data(), end, value);
-    if (error != std::errc() || stop != end || !std::isfinite(value)) return "";
-    std::array<char, 32> share{};
-    const auto [last, full] = std::to_chars(share.data(), share.data() + share.size(), value / 100);
-    return full == std::errc() ? write(std::string_view(share.data(), last)) : "";
+    const auto value = parse_number(text.substr(0, text.size() - 1));
+    return value ? write(number_text(*value / 100)) : "";
 }
 
 }  // namespace
+
+std::optional<double> parse_number(std::string_view text) {
+    double value = 0;
+    const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const bool whole = error == std::errc() && stop == text.data() + text.size();
+    return whole && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
 
 std::string duration_hint(std::string_view text) {
     const std::size_t number = text.find_first_not_of("0123456789.,");

@@ -29,6 +29,8 @@ std::string none_hint(std::string_view key, std::string_view example, const Node
 /// For `baud:9600` or `baud=9600`, where `baud` and a value were meant.
 std::string blank_hint(std::string_view text);
 
+/// Parses a number, all of the text; nothing for one that is not finite.
+std::optional<double> parse_number(std::string_view text);
 /// True for letters, digits, '_' and '-', with a letter first.
 bool is_word(std::string_view text);
 /// Returns how to correct a line without ': ' that begins like a key; `token` is its first.

@@ -178,17 +178,14 @@ std::optional<double> MapReader::number(std::string_view key) {
     describe(key, KeyShape::Kind::number);
     const Node* node = scalar(key, "a number");
     if (node == nullptr) return std::nullopt;
-    double value = 0;
     const std::string_view typed = without_plus(node->scalar);
-    const char* end = typed.data() + typed.size();
-    const auto [stop, error] = std::from_chars(typed.data(), end, value);
-    const bool whole = error == std::errc() && stop == end && std::isfinite(value);
+    const auto value = parse_number(typed);
     const std::size_t sign = typed.starts_with('-') ? 1 : 0;
     const bool zeros = has_leading_zero(typed.substr(sign));
-    if (whole && !zeros && !node->is_text()) return value;
+    if (value && !zeros && !node->is_text()) return value;
     const std::string why =
         zeros             ? " (no leading zeros)"
-        : node->is_text() ? " in quotes" + (whole ? "; write " + node->scalar + " without" : "")
+        : node->is_text() ? " in quotes" + (value ? "; write " + node->scalar + " without" : "")
                           : number_hint(node->scalar, false);
     problem(key, wrong(key, "a number", *node) + why);
     return std::nullopt;

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -9,10 +10,13 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "difference.hpp"
 #include "panelgate/config/describe.hpp"
+#include "panelgate/tls/issue.hpp"
+#include "panelgate/yaml/map_reader.hpp"
 #include "running_line.hpp"
 #include "support/yaml_text.hpp"
 #include "unit/config/memory_files.hpp"
@@ -22,9 +26,30 @@ namespace {
 
 namespace fs = std::filesystem;
 
+const fs::path kGeneric = fs::path(SOURCE_ROOT) / "config/profiles/generic.yaml";
+
+std::string text_of(const fs::path& path) {
+    std::ifstream in(path);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+config::MemoryFiles all_files() {
+    const tls::Issued ca = tls::issue_ca("CA", {0, 1});
+    const tls::Issued gateway = tls::issue_server(ca, {"gateway"}, {0, 1});
+    std::map<std::string, std::string> texts{{"/run/secrets/ops", "secret-0123456789"},
+                                             {"/run/secrets/other", "other-0123456789"},
+                                             {"/profiles/own.yaml", text_of(kGeneric)}};
+    for (const std::string name : {"/tls/a", "/tls/b"}) {
+        texts[name + ".crt"] = gateway.certificate;
+        texts[name + ".key"] = gateway.key;
+        texts[name + "-ca.crt"] = ca.certificate;
+        texts[name + ".crl"] = tls::revoke(ca, "", gateway.certificate, {0, 1});
+    }
+    return config::MemoryFiles(std::move(texts));
+}
+
 const config::MemoryFiles& files() {
-    static const config::MemoryFiles kFiles(
-        {{"/run/secrets/ops", "secret-0123456789"}, {"/run/secrets/other", "other-0123456789"}});
+    static const config::MemoryFiles kFiles = all_files();
     return kFiles;
 }
 
@@ -48,20 +73,16 @@ constexpr const char* kPlain = R"(lines:
         simulate: {dead: true}
         poll: [{read: "400001"}]
         points: [{name: p, at: "400001", type: u32}]
-modbus_tcp: [{listen: "127.0.0.1:502", framing: tcp}, {listen: "127.0.0.1:503"}]
+modbus_tcp: [{listen: "127.0.0.1:502", framing: tcp}, {listen: "127.0.0.1:503"},
+  {listen: "127.0.0.1:802", tls: {certificate: /tls/a.crt, key: /tls/a.key}}]
 serial_masters:
   - {name: plc, device: /dev/ttyS2, serial: {parity: odd}, rs485: {mode: rts}}
-http: {anonymous: none}
+http: {anonymous: none, tls: {certificate: /tls/a.crt, key: /tls/a.key}}
 mqtt: {broker: "mqtt://b:1883", topic: x, format: json}
 relays: [{from: a-1/400001, to: a-1/400101, on_change: true}]
 log: {level: warn, format: json}
 realtime: {priority: 20, lock_memory: true}
 )";
-
-std::string text_of(const fs::path& path) {
-    std::ifstream in(path);
-    return {std::istreambuf_iterator<char>(in), {}};
-}
 
 /// Has what every_key.yaml has in only one way, or not at all.
 constexpr const char* kFurther = R"(lines:
@@ -88,12 +109,16 @@ modbus_tcp:
   - {listen: "127.0.0.1:502", lines: [a], framing: ascii, ascii_lower_case: take, broadcast: silent}
   - {listen: "127.0.0.1:503", retransmissions: join, units: {101: a/1, 102: a/1}}
   - {listen: "127.0.0.1:504", framing: rtu, broadcast: silent}
+  - {listen: "127.0.0.1:802", tls: {certificate: /tls/a.crt, key: /tls/a.key, ca: /tls/a-ca.crt,
+     client: required, crl: /tls/a.crl, min_version: TLSv1.2}}
 serial_masters:
   - {name: plc, device: /dev/ttyS2, lines: [a], units: {7: a/1}, access: read_write, framing: ascii,
      serial: {baud: 9600, data_bits: 7, parity: none, stop_bits: 1}, rs485: {mode: off},
      broadcast: silent, on_failure: silence, echo: auto, response_timeout: 2s}
   - {name: hmi, device: /dev/ttyS3, lines: [a], framing: rtu}
-http: {tokens: [{name: ops, role: operator, file: /run/secrets/ops, expires: 2027-12-31}]}
+http:
+  tokens: [{name: ops, role: operator, file: /run/secrets/ops, expires: 2027-12-31}]
+  tls: {certificate: /tls/a.crt, key: /tls/a.key, ca: /tls/a-ca.crt, client: optional}
 mqtt: {broker: "mqtts://b:8883", topic: x, qos: 1, client_id: x, username: x, store: 200,
        password_file: /run/secrets/ops, keep_alive: 60s, write: none, ca: /run/secrets/ops,
        certificate: /run/secrets/ops, key: /run/secrets/ops}
@@ -102,13 +127,21 @@ realtime: {priority: 20, lock_memory: true}
 audit: {file: /var/log/audit.jsonl, rotate: 10MiB, keep: 5, on_failure: refuse_writes, syslog: true}
 )";
 
+/// Keys that the values of their neighbours there rule out.
+constexpr const char* kApart = R"(lines: [{name: a, device: sim}]
+serial_masters:
+  - {name: plc, device: /dev/ttyS2, rs485: {mode: kernel, receive_during_send: false}}
+mqtt: {broker: "mqtt://b:1883", format: sparkplug, group: x, node: x}
+)";
+
 constexpr const char* kWords =
     "0 points sparkplug mqtts://c "
     "1 2 3 7 0.2 8 16 20ms 2s 1s none even on off kernel rts low rtu ascii tcp take "
     "refuse read_only high_first master line station pass deny silent exception "
     "viewer operator warn json u16 i16 BADC UW120 GDT220 UB190 400009 400109 "
     "a-1/400209 panasonic-gt b 127.0.0.1:99 10.0.0.0/8 /dev/ttyS9 press/UW140 oven/GDT300 "
-    "a/2 floor1/20 /run/secrets/other 20MiB continue 2028-01-31 ";
+    "a/2 floor1/20 /run/secrets/other /profiles /tls/b.crt /tls/b.key /tls/b-ca.crt /tls/b.crl "
+    "optional TLSv1.3 20MiB continue 2028-01-31 ";
 
 /// Alternative values, likely ones first.
 std::vector<std::string> others(const yaml::Node& value) {
@@ -169,27 +202,6 @@ bool makes_a_difference(const yaml::Node& tree, const Leaf& leaf, const config::
     return differs;
 }
 
-TEST(EveryKey, OfAConfigurationMakesADifference) {
-    std::map<std::string, bool> keys;
-    const std::string most = text_of(fs::path(TEST_DATA) / "every_key.yaml");
-    for (const std::string& text : {std::string(kFurther), std::string(kPlain), most}) {
-        yaml::Problems problems("x.yaml");
-        yaml::Node tree = yaml::parse(text, problems);
-        const auto before = load(text);
-        ASSERT_TRUE(before && load(yaml_text(tree)) &&
-                    differences(*before, *load(yaml_text(tree))).empty())
-            << yaml_text(tree);
-        std::vector<Leaf> leaves;
-        find_leaves(tree, "", leaves);
-        for (const Leaf& leaf : leaves) {
-            bool& differs = keys[leaf.key];
-            differs = differs || makes_a_difference(tree, leaf, *before);
-        }
-    }
-    EXPECT_GE(keys.size(), 120U);
-    for (const auto& [key, differs] : keys) EXPECT_TRUE(differs) << key;
-}
-
 std::string generic_path(const std::string& path, const std::string& key) {
     return path.empty() ? key : path + '/' + key;
 }
@@ -219,6 +231,66 @@ std::optional<config::Config> load_with(const char* base, const std::string& pat
     scalar.scalar = value;
     if (!value.empty()) maps[0]->entries.push_back({key, {}, scalar});
     return load(yaml_text(tree));
+}
+
+/// Values that the key may have, by what the table says of it.
+std::vector<std::string> values_of(const yaml::KeyShape& key) {
+    std::vector<std::string> all = key.words;
+    if (key.kind == yaml::KeyShape::Kind::boolean) return {"true", "false"};
+    if (key.kind == yaml::KeyShape::Kind::integer)
+        for (const std::int64_t value : {key.min, key.max, key.min + 1, key.max - 1})
+            all.push_back(std::to_string(value));
+    if (key.kind == yaml::KeyShape::Kind::duration)
+        for (const Duration value : {key.shortest, key.longest, Duration(20ms), Duration(2s)})
+            all.push_back(yaml::format_duration(value));
+    std::istringstream words(kWords);
+    for (std::string word; words >> word;) all.push_back(word);
+    return all;
+}
+
+/// True if some value of the key is not what leaving it out, or another value, means: of a key that
+/// none of these texts has.
+bool shows(const yaml::KeyShape& key) {
+    for (const char* base : {kPlain, kFurther}) {
+        std::optional<config::Config> first = load_with(base, key.path, "");
+        for (const std::string& value : values_of(key)) {
+            const auto other = load_with(base, key.path, value);
+            if (other && first && !differences(*first, *other).empty()) return true;
+            if (!first) first = other;  // it cannot be left out
+        }
+    }
+    return false;
+}
+
+/// A key that is new in a table is here without another line: it is loaded, and `--diff`, a reload
+/// and `config get` know it. What the documents and the schema have of it: test_reference.
+TEST(EveryKey, OfAConfigurationMakesADifference) {
+    using Kind = yaml::KeyShape::Kind;
+    std::map<std::string, bool> keys;
+    const std::string most = text_of(fs::path(TEST_DATA) / "every_key.yaml");
+    for (const std::string& text :
+         {std::string(kFurther), std::string(kPlain), std::string(kApart), most}) {
+        yaml::Problems problems("x.yaml");
+        yaml::Node tree = yaml::parse(text, problems);
+        const auto before = load(text);
+        ASSERT_TRUE(before && load(yaml_text(tree)) &&
+                    differences(*before, *load(yaml_text(tree))).empty())
+            << yaml_text(tree);
+        std::vector<Leaf> leaves;
+        find_leaves(tree, "", leaves);
+        for (const Leaf& leaf : leaves) {
+            bool& differs = keys[leaf.key];
+            differs = differs || makes_a_difference(tree, leaf, *before);
+        }
+    }
+    EXPECT_GE(keys.size(), 120U);
+    for (const auto& [key, differs] : keys) EXPECT_TRUE(differs) << key;
+    for (const yaml::KeyShape& key : config::describe().keys) {
+        const bool has_value = key.kind != Kind::map && key.kind != Kind::list;
+        const bool is_template = key.path.find("template") != std::string::npos;
+        if (has_value && !is_template && !keys.contains(key.path))
+            EXPECT_TRUE(shows(key)) << key.path;
+    }
 }
 
 TEST(EveryKey, MeansItsDefaultWhereItIsLeftOut) {
