@@ -49,7 +49,6 @@ class Syslog {
 
     /// Sends each of the bodies; returns how many were not taken.
     std::uint64_t send(std::string_view bodies) {
-        std::size_t of_last = 0;  ///< bytes of `pending` from before `next` was wanted
         std::uint64_t lost = 0;
         while (!bodies.empty()) {
             const std::size_t end = std::min(bodies.find('\n'), bodies.size());
@@ -129,7 +128,8 @@ struct Trail::State {
     Settings settings;
     std::optional<Settings> next;
     std::string pending;
-    std::uint64_t lost = 0;  ///< not yet recorded
+    std::size_t of_last = 0;  ///< bytes of `pending` from before `next` was wanted
+    std::uint64_t lost = 0;   ///< not yet recorded
     Counters counters;
     bool stop = false;
 
