@@ -19,7 +19,8 @@ http: {listen: "127.0.0.1:0"}
 # What neither has: its labels, and what it takes.
 OTHERS = {"panelgate_findings": "line, station, cause", "panelgate_framing_errors_total": "line",
           "panelgate_parity_errors_total": "line", "panelgate_overruns_total": "line",
-          "panelgate_breaks_total": "line"}
+          "panelgate_breaks_total": "line", "panelgate_tls_handshakes_total": "listener, outcome",
+          "panelgate_certificate_expiry_timestamp_seconds": "listener"}
 # What a program that was built outside of a repository would not have.
 LABELS = {"panelgate_build_info": "version, commit, compiler"}
 GROUPS = [("Requests", ("requests", "translated", "request_duration", "queue"),
@@ -33,6 +34,7 @@ GROUPS = [("Requests", ("requests", "translated", "request_duration", "queue"),
            "Only of lines whose driver counts: a serial port of the machine, and some USB adapters."),
           ("Points", ("point",), "With `points`."), ("Relays", ("relay",), "With `relays`."),
           ("Modbus/TCP", ("tcp",), "For each listener."), ("HTTP", ("http", "login"), ""),
+          ("TLS", ("tls", "certificate"), "For each listener with `tls`."),
           ("MQTT", ("mqtt",), "With `mqtt`."),
           ("Serial masters", ("serial_master",), "With `serial_masters`."),
           ("The gateway", ("config", "loop", "build", "log"), "")]

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "capacity.hpp"
+#include "certificates.hpp"
 #include "commands.hpp"
 #include "difference.hpp"
 #include "inventory.hpp"
@@ -148,6 +149,8 @@ ExitCode check(const std::string& file, const CheckOptions& options) {
         if (compared.loaded.config)
             std::ranges::copy(moved_units(*compared.loaded.config, *loaded.config),
                               std::back_inserter(judged.warnings));
+        std::ranges::copy(certificate_doubts(*loaded.config, seconds_since_1970()),
+                          std::back_inserter(judged.warnings));
         print_warnings(*loaded.config);
         for (const std::string& message : judged.warnings)
             std::cerr << path_of(file) << ": warning: " << message << '\n';

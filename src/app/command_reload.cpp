@@ -73,12 +73,17 @@ ExitCode print_verdict(const json::object& verdict) {
     return outcome == "invalid" ? kBadConfig : kUnavailable;
 }
 
+const char* scheme_of(const std::optional<tls::Trust>& trust) {
+    return trust ? "https://" : "http://";
+}
+
 /// The gateway knows the token that its file had when it was read last. Where it is another one by
 /// now, a gateway of this machine is asked by SIGHUP, which is for whoever may end it as well; the
 /// verdict is then asked for with the token, which is known once the file has been read.
 ExitCode reload_by_signal(const ReloadOptions& options, const config::Endpoint& at) {
-    const std::string known = "http://" + endpoint_text(at.address, at.port) +
-                              " does not know the token in " + options.token_file;
+    const std::string known = scheme_of(http_trust(options.file, options.http)) +
+                              endpoint_text(at.address, at.port) + " does not know the token in " +
+                              options.token_file;
     const auto process = process_at(at);
     if (options.rollback || !process || ::kill(*process, SIGHUP) != 0) {
         std::cerr << "panelgate: not reloaded: " << known << "\n  (if it has changed: "
@@ -115,13 +120,15 @@ ExitCode reload(const ReloadOptions& options) {
     if (!secret) return kNoInput;
     const auto& [address, port] = std::get<config::Endpoint>(endpoint);
     const std::string place = endpoint_text(address, port);
+    const auto trust = http_trust(options.file, options.http);
     const std::string request =
         "POST /api/v1/reload" + std::string(options.rollback ? "?rollback=true" : "") +
         (options.weaker ? "&weaker=true" : "") + " HTTP/1.1\r\nHost: " + place +
         (secret->empty() ? "" : "\r\nAuthorization: Bearer ") + *secret +
         "\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
-    const HttpReply reply = ask(address, port, request, kPatience, kMostOfVerdict,
-                                [](const HttpReply&) { return false; });
+    const HttpReply reply = ask(
+        address, port, request, kPatience, kMostOfVerdict, [](const HttpReply&) { return false; },
+        trust);
     if (!secret->empty() && reply.status().starts_with("401 "))
         return reload_by_signal(options, std::get<config::Endpoint>(endpoint));
     boost::system::error_code wrong;
@@ -130,7 +137,7 @@ ExitCode reload(const ReloadOptions& options) {
         return print_verdict(body.as_object());
     std::string why = reply.text.empty() ? reply.failure() : reply.status();
     if (!wrong && body.is_object()) why += ": " + text_in(body.as_object(), "detail");
-    std::cerr << "panelgate: not reloaded: http://" << place << ": " << why << '\n';
+    std::cerr << "panelgate: not reloaded: " << scheme_of(trust) << place << ": " << why << '\n';
     if (reply.text.empty() && options.http.empty())
         std::cerr << "  (if it runs with another `http: listen` than " << options.file
                   << " has now: --http ADDR:PORT, or kill -HUP its process)\n";
@@ -145,9 +152,10 @@ ExitCode health(const std::string& file, const std::string& http) {
         return none->code == kUsage ? kUsage : kNotReady;
     }
     const auto& [address, port] = std::get<config::Endpoint>(endpoint);
-    const std::string why = ask_whether_ready(address, port, kHealthTimeout);
+    const auto trust = http_trust(file, http);
+    const std::string why = ask_whether_ready(address, port, kHealthTimeout, trust);
     if (why.empty()) return kFine;
-    std::cerr << "panelgate: not ready: http://" << endpoint_text(address, port)
+    std::cerr << "panelgate: not ready: " << scheme_of(trust) << endpoint_text(address, port)
               << "/readyz: " << why << '\n';
     return kNotReady;
 }

@@ -177,7 +177,8 @@ void fit(config::Config& config) {
 }
 
 std::string url_of(const config::Config& config, const Gateway& gateway) {
-    return "http://" + endpoint_text(config::reachable(config.http->address), gateway.http_port());
+    return config.http->scheme() +
+           endpoint_text(config::reachable(config.http->address), gateway.http_port());
 }
 
 /// Logs the URL of the dashboard.

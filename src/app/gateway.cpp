@@ -206,6 +206,22 @@ void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedTex
     relays_->apply(routes_of(*snapshot_));
     servers_.apply(*snapshot_->config, snapshot_->plant, directory_in(snapshot_), shown,
                    longest_answer());
+    watch_certificates();
+}
+
+void Gateway::watch_certificates() {
+    const config::Config& config = *snapshot_->config;
+    const bool any =
+        (config.http && config.http->tls) ||
+        std::ranges::any_of(config.modbus_tcp, [](const auto& one) { return one.tls.has_value(); });
+    if (any && !certificates_)
+        certificates_ = std::make_unique<CertificateWatch>(
+            executor_, clock_,
+            [this](const CertificateWatch::Served& served,
+                   std::shared_ptr<const tls::Context> context) {
+                servers_.renew(served.listener, served.settings, std::move(context));
+            });
+    if (certificates_) certificates_->follow(config);
 }
 
 web::Providers Gateway::providers() {
@@ -251,6 +267,7 @@ void Gateway::start() {
     servers_.apply(*snapshot_->config, snapshot_->plant, directory(),
                    shown_text(*snapshot_->config), longest_answer());
     northbound_.start();
+    watch_certificates();
     ready_ = true;
 }
 
@@ -280,6 +297,7 @@ std::string Gateway::status() const {
 
 void Gateway::stop() {
     lag_.stop();
+    if (certificates_) certificates_->stop();
     servers_.close();
     northbound_.stop();
     if (line_histories_) line_histories_->stop();

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "certificates.hpp"
 #include "discoveries.hpp"
 #include "http_door.hpp"
 #include "northbound.hpp"
@@ -77,6 +78,7 @@ class Gateway {
     void retire_lines(const Lines& lines);
     void show(const std::shared_ptr<Snapshot>& snapshot);
     web::Providers providers();
+    void watch_certificates();
     bool copy_figures(metrics::Snapshot& figures, PointCopy& points,
                       const Snapshot& snapshot) const;
 
@@ -102,6 +104,7 @@ class Gateway {
     std::unique_ptr<Scrapes> scrapes_;  ///< null until `http:` is configured
     Servers servers_;
     Northbound northbound_;
+    std::unique_ptr<CertificateWatch> certificates_;  ///< null until a listener has `tls`
     bool ready_ = false;
 };
 

@@ -61,13 +61,14 @@ std::optional<GatewayClient> GatewayClient::make(const GatewayOptions& options, 
     }
     GatewayClient client;
     client.endpoint_ = std::get<config::Endpoint>(found);
+    client.trust_ = http_trust(options.file, options.http);
     client.token_ = std::move(*token);
     client.token_file_ = options.token_file;
     return client;
 }
 
 std::string GatewayClient::url() const {
-    return "http://" + endpoint_text(endpoint_.address, endpoint_.port);
+    return (trust_ ? "https://" : "http://") + endpoint_text(endpoint_.address, endpoint_.port);
 }
 
 std::string GatewayClient::without_token(std::string text) const {
@@ -118,8 +119,9 @@ GatewayAnswer no_answer(const char* why) {
 }  // namespace
 
 GatewayAnswer GatewayClient::put_question(const std::string& request, Duration patience) const {
-    return answer_of(ask(endpoint_.address, endpoint_.port, request, patience, kMostOfAnswer,
-                         [](const HttpReply&) { return false; }));
+    return answer_of(ask(
+        endpoint_.address, endpoint_.port, request, patience, kMostOfAnswer,
+        [](const HttpReply&) { return false; }, trust_));
 }
 
 GatewayAnswer GatewayClient::get(const std::string& path, Duration patience) const {
@@ -147,7 +149,7 @@ std::optional<GatewayAnswer> GatewayClient::follow(
         return false;
     };
     const HttpReply reply = ask(endpoint_.address, endpoint_.port, request("GET", path, ""),
-                                kStream, kMostEvents, look);
+                                kStream, kMostEvents, look, trust_);
     if (done) return std::nullopt;
     GatewayAnswer answer = answer_of(reply);
     if (answer.is_ok() && reply.error) return no_answer("the connection has ended");

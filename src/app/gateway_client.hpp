@@ -61,6 +61,7 @@ class GatewayClient {
     GatewayAnswer put_question(const std::string& request, Duration patience) const;
 
     config::Endpoint endpoint_;
+    std::optional<tls::Trust> trust_;  ///< none: plain HTTP
     std::string token_;
     std::string token_file_;
 };

@@ -25,6 +25,7 @@
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/metrics/process.hpp"
+#include "panelgate/tls/stream.hpp"
 #include "panelgate/web/http/gzip.hpp"
 #include "panelgate/yaml/document.hpp"
 
@@ -275,13 +276,35 @@ std::variant<config::Endpoint, NoHttpEndpoint> endpoint_of(const std::string& fi
                                                  : " has no http, so the gateway cannot be asked"));
 }
 
+constexpr std::string_view kPlainScheme = "http://";
+constexpr std::string_view kSecureScheme = "https://";
+
+/// ADDR:PORT of http://ADDR:PORT/, as it is copied from a browser.
+std::string without_scheme(std::string http) {
+    for (const std::string_view scheme : {kPlainScheme, kSecureScheme})
+        if (http.starts_with(scheme)) http.erase(0, scheme.size());
+    if (http.ends_with('/')) http.pop_back();
+    return http;
+}
+
 }  // namespace
+
+std::optional<tls::Trust> http_trust(const std::string& file, const std::string& http) {
+    if (http.starts_with(kPlainScheme)) return std::nullopt;
+    const std::optional<config::Config> config = read_quietly(file);
+    if (config && config->http && config->http->tls) {
+        const tls::Material& files = config->http->tls->material;
+        return tls::Trust{files.certificate, files.ca};
+    }
+    if (http.starts_with(kSecureScheme)) return tls::Trust{};
+    return std::nullopt;
+}
 
 std::variant<config::Endpoint, NoHttpEndpoint> http_endpoint(const std::string& file,
                                                              const std::string& http) {
     auto found = endpoint_of(file);
     if (!http.empty()) {
-        const auto asked = config::parse_endpoint(http);
+        const auto asked = config::parse_endpoint(without_scheme(http));
         if (!asked || asked->port == 0)
             return NoHttpEndpoint{"--http '" + http + "' is not ADDR:PORT, such as 127.0.0.1:8080",
                                   kUsage};
@@ -303,13 +326,18 @@ constexpr std::string_view kEndOfHead = "\r\n\r\n";
 class Question {
   public:
     Question(const std::string& request, std::size_t most,
-             const std::function<bool(const HttpReply&)>& enough)
-        : request_(request), most_(most), enough_(enough) {}
+             const std::function<bool(const HttpReply&)>& enough,
+             const std::optional<tls::Trust>& trust)
+        : request_(request), most_(most), enough_(enough), trust_(trust) {}
 
     HttpReply put(const asio::ip::tcp::endpoint& target, Duration patience) {
-        socket_.async_connect(target, [this](const error_code& error) {
+        stream_.socket().async_connect(target, [this, target](const error_code& error) {
             if (error) return end(error);
-            send_request();
+            if (!trust_) return send_request();
+            tls::connect(stream_, *trust_, target.address(), [this](const std::string& why) {
+                if (why.empty()) return send_request();
+                reply_.refused = why;
+            });
         });
         io_.run_for(patience);
         return reply_;
@@ -317,14 +345,14 @@ class Question {
 
   private:
     void send_request() {
-        asio::async_write(socket_, asio::buffer(request_),
+        asio::async_write(stream_, asio::buffer(request_),
                           [this](const error_code& error, std::size_t) {
                               if (error) return end(error);
                               listen();
                           });
     }
     void listen() {
-        socket_.async_read_some(asio::buffer(buffer_),
+        stream_.async_read_some(asio::buffer(buffer_),
                                 [this](const error_code& error, std::size_t size) {
                                     reply_.text.append(buffer_, size);
                                     if (error) return end(error);
@@ -337,7 +365,8 @@ class Question {
     std::size_t most_;
     const std::function<bool(const HttpReply&)>& enough_;
     asio::io_context io_{1};
-    asio::ip::tcp::socket socket_{io_};
+    const std::optional<tls::Trust>& trust_;
+    tls::Stream stream_{asio::ip::tcp::socket(io_)};
     char buffer_[4096]{};
     HttpReply reply_;
 };
@@ -365,6 +394,7 @@ std::string_view HttpReply::body() const {
 
 /// A server refuses a client either by closing or by resetting the connection.
 std::string HttpReply::failure() const {
+    if (!refused.empty()) return refused;
     if (!error) return "no answer in time";
     const bool shut_out = error == asio::error::eof || error == asio::error::connection_reset;
     if (!shut_out) return error.message();
@@ -373,8 +403,10 @@ std::string HttpReply::failure() const {
 
 HttpReply ask(const std::string& address, std::uint16_t port, const std::string& request,
               Duration patience, std::size_t most,
-              const std::function<bool(const HttpReply&)>& enough) {
-    return Question(request, most, enough).put({asio::ip::make_address(address), port}, patience);
+              const std::function<bool(const HttpReply&)>& enough,
+              const std::optional<tls::Trust>& trust) {
+    return Question(request, most, enough, trust)
+        .put({asio::ip::make_address(address), port}, patience);
 }
 
 namespace {
@@ -388,10 +420,11 @@ bool is_ready(const HttpReply& reply) {
 
 }  // namespace
 
-std::string ask_whether_ready(const std::string& address, std::uint16_t port, Duration patience) {
+std::string ask_whether_ready(const std::string& address, std::uint16_t port, Duration patience,
+                              const std::optional<tls::Trust>& trust) {
     const std::string request = "GET /readyz HTTP/1.1\r\nHost: " + endpoint_text(address, port) +
                                 "\r\nConnection: close\r\n\r\n";
-    const HttpReply reply = ask(address, port, request, patience, kMost, is_ready);
+    const HttpReply reply = ask(address, port, request, patience, kMost, is_ready, trust);
     if (is_ready(reply)) return {};
     if (reply.text.empty()) return reply.failure();
     if (!reply.is_http()) return "an answer that is no HTTP: " + first_line(reply.text);

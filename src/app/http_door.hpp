@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -16,6 +17,7 @@
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/metrics/exposition.hpp"
 #include "panelgate/rt/process.hpp"
+#include "panelgate/tls/client.hpp"
 #include "panelgate/web/api/sources.hpp"
 
 namespace panelgate::app {
@@ -86,10 +88,15 @@ struct NoHttpEndpoint {
 std::variant<config::Endpoint, NoHttpEndpoint> http_endpoint(const std::string& file,
                                                              const std::string& http);
 
+/// Whom to trust where that endpoint speaks HTTPS, as its file says, or `http` with https:// in
+/// front; nothing: it is asked by plain HTTP.
+std::optional<tls::Trust> http_trust(const std::string& file, const std::string& http);
+
 /// A gateway's reply to an HTTP request: the raw text including its head.
 struct HttpReply {
     std::string text;
     boost::system::error_code error;  ///< why reading ended; no error also after a timeout
+    std::string refused{};            ///< why there is no TLS, in words
 
     bool is_http() const { return text.starts_with("HTTP/1."); }
     /// "200 OK" of the status line (RFC 9112, 4); safe for a terminal.
@@ -102,14 +109,17 @@ struct HttpReply {
 /// The first line of `text`, safe for a terminal.
 std::string first_line(std::string_view text);
 
-/// Sends a request over a new connection and reads until `enough`, `most` bytes, the end of the
-/// connection, or `patience` is over. `address`: an IP address without brackets.
+/// Sends a request over a new connection, by TLS if there is somebody to trust, and reads until
+/// `enough`, `most` bytes, the end of the connection, or `patience` is over. `address`: an IP
+/// address without brackets.
 HttpReply ask(const std::string& address, std::uint16_t port, const std::string& request,
               Duration patience, std::size_t most,
-              const std::function<bool(const HttpReply&)>& enough);
+              const std::function<bool(const HttpReply&)>& enough,
+              const std::optional<tls::Trust>& trust = std::nullopt);
 
 /// Requests http://ADDR:PORT/readyz and waits for at most `patience`. Empty if the answer is 200;
 /// else the answer or the error in one printable line. `address`: an IP address without brackets.
-std::string ask_whether_ready(const std::string& address, std::uint16_t port, Duration patience);
+std::string ask_whether_ready(const std::string& address, std::uint16_t port, Duration patience,
+                              const std::optional<tls::Trust>& trust = std::nullopt);
 
 }  // namespace panelgate::app

@@ -147,6 +147,25 @@ json::object master_json(const serial_server::Settings& master) {
             {"on_failure", silent ? "silence" : "exception"}};
 }
 
+std::string_view word(tls::ClientCertificate client) {
+    switch (client) {
+        case tls::ClientCertificate::none:
+            return "none";
+        case tls::ClientCertificate::optional:
+            return "optional";
+        case tls::ClientCertificate::required:
+            return "required";
+    }
+    std::abort();
+}
+
+json::value tls_json(const std::optional<tls::Settings>& tls) {
+    if (!tls) return nullptr;
+    return json::object{{"certificate", tls->certificate},
+                        {"client", word(tls->client)},
+                        {"role_from", tls->role_from_certificate ? "certificate" : ""}};
+}
+
 json::object listener_json(const tcp_server::Settings& listener) {
     return {{"listen", listener.name()},
             {"framing", modbus::label(listener.framing)},
@@ -156,7 +175,8 @@ json::object listener_json(const tcp_server::Settings& listener) {
             {"diagnostics_unit", unit_json(listener.diagnostics_unit)},
             {"broadcast", word(listener.broadcast)},
             {"access", access(listener.read_only)},
-            {"allow", each(listener.allow, network_json)}};
+            {"allow", each(listener.allow, network_json)},
+            {"tls", tls_json(listener.tls)}};
 }
 
 json::object http_json(const web::Settings& http) {
@@ -167,7 +187,8 @@ json::object http_json(const web::Settings& http) {
             {"anonymous", label(http.anonymous)},
             {"tokens", each(http.tokens, token)},
             {"hosts", each(http.hosts, text_json)},
-            {"allow", each(http.allow, network_json)}};
+            {"allow", each(http.allow, network_json)},
+            {"tls", tls_json(http.tls)}};
 }
 
 json::object mqtt_json(const mqtt::Settings& mqtt) {
@@ -307,13 +328,19 @@ std::string broadcasts_of(const config::Config& config, const tcp_server::Settin
     return listener.broadcast == Mode::silent ? "sent, and not answered" : "sent and answered";
 }
 
+std::string text_of(const std::optional<tls::Settings>& tls) {
+    if (!tls) return "";
+    return ", TLS, certificates of clients " + std::string(word(tls->client));
+}
+
 std::string text_of(const config::Config& config, const tcp_server::Settings& listener) {
     std::string text = "modbus_tcp " + listener.name() + ':';
     for (const std::string& line : listener.lines) text += ' ' + line;
     if (listener.framing != modbus::Framing::tcp)
         text += ", framing " + std::string(modbus::label(listener.framing));
     if (listener.udp) text += ", udp too";
-    text += ", " + rights(listener.read_only) + ", for " + text_of(listener.allow) + '\n';
+    text += text_of(listener.tls) + ", " + rights(listener.read_only) + ", for " +
+            text_of(listener.allow) + '\n';
     text += text_of(listener.units);
     if (listener.diagnostics_unit)
         text += "  unit " + std::to_string(*listener.diagnostics_unit) + " is the gateway itself\n";
@@ -349,7 +376,7 @@ std::string text_of(Role role) {
 
 std::string text_of(const web::Settings& http) {
     std::string text = "http " + http.name() + ": without a token " + text_of(http.anonymous) +
-                       ", for " + text_of(http.allow);
+                       ", for " + text_of(http.allow) + text_of(http.tls);
     if (!http.hosts.empty()) text += ", as";
     for (const std::string& host : http.hosts) text += ' ' + host;
     text += '\n';

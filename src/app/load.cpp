@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -15,9 +16,11 @@
 #include <vector>
 
 #include "capacity.hpp"
+#include "certificates.hpp"
 #include "inventory.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/config/real_files.hpp"
+#include "panelgate/rt/clock.hpp"
 #include "panelgate/rt/process.hpp"
 #include "panelgate/web/http/json_text.hpp"
 #include "panelgate/yaml/document.hpp"
@@ -177,6 +180,11 @@ std::string fit_to_descriptors(config::Config& config) {
 
 }  // namespace
 
+std::int64_t seconds_since_1970() {
+    const auto now = rt::wall_now().time_since_epoch();
+    return std::chrono::duration_cast<std::chrono::seconds>(now).count();
+}
+
 std::vector<StartMessage> prepare(config::Config& config) {
     separate_families(config);
     std::vector<StartMessage> messages;
@@ -188,6 +196,8 @@ std::vector<StartMessage> prepare(config::Config& config) {
         if (plan::verdict(line.plan) != plan::Verdict::fine)
             messages.push_back({"planned load", overload_text(line)});
     }
+    for (std::string& doubt : certificate_doubts(config, seconds_since_1970()))
+        messages.push_back({"certificate", std::move(doubt)});
     if (std::string lowered = fit_to_descriptors(config); !lowered.empty())
         messages.push_back({"max_connections lowered", std::move(lowered)});
     return messages;

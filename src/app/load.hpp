@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -61,6 +62,9 @@ inline constexpr std::size_t kDescriptorsPerLine = 8;
 /// Lowers `max_connections` of all listeners to what `limit` descriptors allow. Returns the new
 /// limits in words; empty if nothing was lowered.
 std::string fit_connections(config::Config& config, std::size_t limit);
+
+/// Seconds since 1970.
+std::int64_t seconds_since_1970();
 
 /// A warning about a valid configuration, for the log.
 struct StartMessage {

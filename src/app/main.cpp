@@ -15,6 +15,7 @@
 
 #include "asking_commands.hpp"
 #include "build_info.hpp"
+#include "certificate_commands.hpp"
 #include "commands.hpp"
 #include "panelgate/base/text.hpp"
 #include "panelgate/cli/adapters.hpp"
@@ -117,6 +118,7 @@ class CommandLine {
         add_import();
         add_address();
         add_profiles();
+        add_certificate_commands(cli_, code_);
         add_help();
         add_groups();
     }
@@ -251,7 +253,7 @@ class CommandLine {
         put(kRun, {"run", "simulate"});
         put(kAsk, {"health", "reload"});
         put(kConfiguration, {"check", "config", "schema", "import"});
-        put(kTools, {"address", "profiles", "version", "help"});
+        put(kTools, {"address", "profiles", "cert", "version", "help"});
         cli_.footer(kExamples);
     }
 

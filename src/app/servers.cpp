@@ -171,7 +171,7 @@ tcp_server::Settings Servers::completed(tcp_server::Settings settings,
                                         const config::Config& config) const {
     boost::system::error_code unknown;
     settings.host = boost::asio::ip::host_name(unknown);
-    if (config.http) settings.url = "http://" + config.http->name() + '/';
+    if (config.http) settings.url = config.http->scheme() + config.http->name() + '/';
     return settings;
 }
 
@@ -301,6 +301,14 @@ void Servers::apply_masters(const config::Config& config, const Plant& plant) {
             line::make_tty_line(executor_, clock_, one.settings.device));
         one.master->start();
     }
+}
+
+void Servers::renew(const std::string& listener, const tls::Settings& settings,
+                    std::shared_ptr<const tls::Context> context) {
+    for (const Modbus& one : listeners_)
+        if ("modbus_tcp " + one.settings.name() == listener) one.listener->renew(settings, context);
+    if (http_ && "http " + http_->settings.name() == listener)
+        http_->server->renew(settings, std::move(context));
 }
 
 void Servers::stop_accepting(Duration longest) {

@@ -19,6 +19,7 @@
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/serial_server/serial_master.hpp"
 #include "panelgate/tcp_server/listener.hpp"
+#include "panelgate/tls/context.hpp"
 #include "panelgate/web/api/server.hpp"
 #include "plant.hpp"
 
@@ -100,6 +101,9 @@ class Servers {
                const std::shared_ptr<const web::Directory>& directory, const web::SharedText& shown,
                Duration longest);
 
+    /// The files of the `tls` of a listener ("http 127.0.0.1:8443") have changed.
+    void renew(const std::string& listener, const tls::Settings& settings,
+               std::shared_ptr<const tls::Context> context);
     void stop_accepting(Duration longest);
     bool drained();
     std::size_t pending_connections() const;

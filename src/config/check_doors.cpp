@@ -166,6 +166,7 @@ std::string whoever_reaches(const Listener& listener) {
 void warn_of_open_listener(Loading& loading, const Node& node,
                            const tcp_server::Settings& listener) {
     if (!is_reachable_from_outside(listener.address, listener.allow)) return;
+    if (listener.tls && listener.tls->client == tls::ClientCertificate::required) return;
     if (!can_write(loading.config, listener)) return;
     loading.warn(mark_of(node, "listen"),
                  whoever_reaches(listener) +
@@ -272,16 +273,19 @@ void warn_of_plain_tokens(Loading& loading, const Node& node, const web::Setting
         return is_loopback(network.address) && (is_host || network.prefix >= 8);
     };
     const bool only_here = !http.allow.empty() && std::ranges::all_of(http.allow, is_here);
-    if (http.tokens.empty() || is_loopback(http.address) || only_here) return;
+    if (http.tokens.empty() || http.tls || is_loopback(http.address) || only_here) return;
     loading.warn(mark_of(node, "tokens"),
                  "tokens are sent in plain text to " + http.name() +
-                     ": anyone on the network path can read and use them; listen on 127.0.0.1:" +
+                     ": anyone on the network path can read and use them; give http: tls "
+                     "(`panelgate cert` makes its files), or listen on "
+                     "127.0.0.1:" +
                      std::to_string(http.port) + " behind a proxy with TLS, or a VPN");
 }
 
 /// Warns of what anybody may do without a token.
 void warn_of_anonymous(Loading& loading, const Node& node, const web::Settings& http) {
     if (!is_reachable_from_outside(http.address, http.allow)) return;
+    if (http.tls && http.tls->client == tls::ClientCertificate::required) return;
     // Anybody is a viewer by default: then the address is what was typed.
     const bool typed = node.find("anonymous") != nullptr;
     const Mark mark = mark_of(node, typed ? "anonymous" : "listen");

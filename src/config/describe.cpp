@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "panelgate/config/config.hpp"
+#include "panelgate/tls/issue.hpp"
 #include "panelgate/yaml/document.hpp"
 
 namespace panelgate::config {
@@ -37,26 +38,39 @@ lines:
              labels: {0: off, 1: on}, no_value: [-32768]}
 modbus_tcp:
   - {listen: "127.0.0.1:502", lines: [floor1], units: {101: floor1/31}, diagnostics_unit: 255,
-     allow: [127.0.0.0/8]}
+     allow: [127.0.0.0/8],
+     tls: {certificate: /etc/panelgate/tls/gateway.crt, key: /etc/panelgate/tls/gateway.key,
+           ca: /etc/panelgate/tls/ca.crt, client: required, crl: /etc/panelgate/tls/crl.pem,
+           role_from: certificate}}
 serial_masters:
   - {name: plc, device: /dev/ttyUSB1, serial: {baud: 19200}, rs485: {mode: off}, lines: [floor1],
      units: {101: floor1/31}}
 http: {listen: "127.0.0.1:8080", hosts: [gateway.plant.example], allow: [127.0.0.0/8],
-       tokens: [{name: ops, role: operator, file: /run/secrets/ops}]}
+       tokens: [{name: ops, role: operator, file: /run/secrets/ops}],
+       tls: {certificate: /etc/panelgate/tls/gateway.crt, key: /etc/panelgate/tls/gateway.key,
+             ca: /etc/panelgate/tls/ca.crt, client: optional, crl: /etc/panelgate/tls/crl.pem,
+             role_from: certificate}}
 relays: [{from: press/UW100, to: press/UW200, count: 8, every: 1s}]
 mqtt: {broker: "mqtt://broker.plant:1883"}
 log: {level: info}
 realtime: {priority: 20}
 )";
 
-/// Every file holds a token.
-struct Tokens final : Files {
-    std::optional<std::string> read(const std::string&) const override {
-        return "0123456789abcdef";
+/// Certificates, their keys and tokens.
+struct Secrets final : Files {
+    std::optional<std::string> read(const std::string& path) const override {
+        if (path.ends_with("/ca.crt")) return ca.certificate;
+        if (path.ends_with(".crt")) return server.certificate;
+        if (path.ends_with("/crl.pem")) return crl;
+        return path.ends_with(".key") ? server.key : "0123456789abcdef";
     }
     std::optional<std::vector<std::string>> list_yaml(const std::string&) const override {
         return std::nullopt;
     }
+
+    tls::Issued ca = tls::issue_ca("specimen", {0, 1});
+    tls::Issued server = tls::issue_server(ca, {"specimen"}, {0, 1});
+    std::string crl = tls::revoke(ca, "", server.certificate, {0, 1});
 };
 
 /// A list or a map in one line, where it has no keys of its own.
@@ -100,7 +114,7 @@ Described describe_specimen() {
     yaml::Description description;
     yaml::Problems problems("specimen");
     problems.describe(&description);
-    if (!load(kSpecimen, Tokens(), problems)) throw std::logic_error(problems.text());
+    if (!load(kSpecimen, Secrets(), problems)) throw std::logic_error(problems.text());
     Described described{description.keys(), description.rules()};
     add_examples(yaml::parse(kSpecimen, problems), "", described.keys);
     inherit_changes(described.keys);

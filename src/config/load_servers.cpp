@@ -9,6 +9,7 @@
 
 #include "hints.hpp"
 #include "load_access.hpp"
+#include "load_tls.hpp"
 #include "loader.hpp"
 #include "panelgate/config/describe.hpp"
 #include "panelgate/config/endpoint.hpp"
@@ -318,10 +319,6 @@ void load_allow(Loading& loading, MapReader& in, std::vector<Network>& allow) {
 
 constexpr std::string_view kNoNetwork = "name at least one network, or leave it out for all";
 
-void refuse_tls(MapReader& in) {
-    in.refuse("tls", "is not in this version; remove it and listen on a trusted network only");
-}
-
 /// Keys that users write as for the serial lines of other programs.
 constexpr std::array<yaml::Elsewhere, 5> kServerKeysElsewhere{
     {{"type", {}, {}, "remove it: serial lines are listed in 'lines'"},
@@ -339,7 +336,7 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     load_framing(in, settings);
     load_diagnostics(loading, in, settings);
     load_allow(loading, in, settings.allow);
-    refuse_tls(in);
+    load_modbus_security(loading, in, settings);
     refuse_empty_access(in);
     refuse_empty(in, "allow", kNoNetwork);
     in.finish();
@@ -384,7 +381,7 @@ void load_http(Loading& loading, MapReader& root) {
     load_hosts(loading, in, settings);
     load_allow(loading, in, settings.allow);
     load_tokens(loading, in, settings.tokens);
-    refuse_tls(in);
+    settings.tls = load_tls(loading, in);
     refuse_empty(in, "hosts", "name at least one host, or leave it out for the machine's names");
     refuse_empty(in, "allow", kNoNetwork);
     refuse_empty(in, "tokens", "give at least one token, or leave it out");

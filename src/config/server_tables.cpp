@@ -93,8 +93,10 @@ const Keys<tcp_server::Settings>& listener_keys() {
             .integer("max_connections", &Settings::max_connections, 1, 65535,
                      "Most connections of all clients.")
             .integer("max_connections_per_address", &Settings::max_connections_per_address, 1,
-                     65535,
-                     "Most connections of one address; then its longest idle one is closed.");
+                     65535, "Most connections of one address; then its longest idle one is closed.")
+            .other("tls",
+                   "Modbus/TCP Security: only clients that speak TLS are served; `listen` is "
+                   "127.0.0.1:802 then unless it is given.");
     return kKeys;
 }
 
@@ -170,10 +172,47 @@ const Keys<web::Settings>& http_keys() {
                    [](const Settings& settings) { return networks_text(settings.allow); })
             .change_needs(kAllowCloses)
             .other("tokens", "Tokens of clients (Authorization: Bearer TOKEN).")
+            .other("tls", "HTTPS: only clients that speak TLS are served.")
             .integer("max_connections_per_address", &Settings::max_connections_per_address, 1,
                      static_cast<std::int64_t>(Settings().max_connections),
                      "Most connections of one address, event streams apart; then its longest "
                      "idle one is closed.");
+    return kKeys;
+}
+
+const Keys<tls::Settings>& tls_keys() {
+    using tls::ClientCertificate;
+    using tls::Settings;
+    using tls::Version;
+    static constexpr Words<ClientCertificate, 3> kClients{
+        {{"none", ClientCertificate::none},
+         {"optional", ClientCertificate::optional},
+         {"required", ClientCertificate::required}}};
+    static constexpr Words<Version, 2> kVersions{
+        {{"TLSv1.2", Version::tls12}, {"TLSv1.3", Version::tls13}}};
+    static constexpr Words<bool, 1> kRoles{{{"certificate", true}}};
+    const auto text = [](std::string Settings::* member) {
+        return [member](const Settings& settings) { return settings.*member; };
+    };
+    static const auto kKeys =
+        Keys<Settings>()
+            .other("certificate",
+                   "PEM file of the gateway's certificate, then of those between it and its CA.",
+                   text(&Settings::certificate))
+            .other("key", "PEM file of that certificate's key, without a password.",
+                   text(&Settings::key))
+            .other("ca", "PEM file of the CA that signs the certificates of clients.",
+                   text(&Settings::ca))
+            .word("client", &Settings::client, kClients,
+                  "Whether clients show a certificate: none, optional, required.")
+            .other("crl", "PEM file of the certificates that the CA has revoked.",
+                   text(&Settings::crl))
+            .word("role_from", &Settings::role_from_certificate, kRoles,
+                  "certificate: the role in a client's certificate decides what it may; without "
+                  "one it only reads.")
+            .initially("")
+            .word("min_version", &Settings::lowest, kVersions,
+                  "Oldest version that is spoken: TLSv1.2 or TLSv1.3.");
     return kKeys;
 }
 

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 
+#include "load_tls.hpp"
 #include "panelgate/config/describe.hpp"
 #include "setting_writer.hpp"
 #include "tables.hpp"
@@ -85,6 +86,7 @@ void show_http(const SettingWriter& top, const web::Settings& settings) {
         token_keys().show(one, token);
         one.put_secret("secret", token.secret);
     }
+    show_tls(section, settings.tls);
 }
 
 void show_servers(const SettingWriter& top, const Config& config) {
@@ -93,6 +95,7 @@ void show_servers(const SettingWriter& top, const Config& config) {
         const SettingWriter section = top.item("modbus_tcp", listeners.name(settings.name()));
         show_access(section, settings);
         listener_keys().show(section, settings);
+        show_tls(section, settings.tls);
     }
     for (const serial_server::Settings& settings : config.serial_masters) {
         const SettingWriter section = top.item("serial_masters", settings.name);

@@ -67,6 +67,8 @@ const Keys<tcp_server::Settings>& access_keys();
 const Keys<tcp_server::Settings>& listener_keys();
 const Keys<serial_server::Settings>& master_keys();
 const Keys<web::Settings>& http_keys();
+/// Of listeners and http.
+const Keys<tls::Settings>& tls_keys();
 const Keys<web::Token>& token_keys();
 const Keys<points::Relay>& relay_keys();
 const Keys<mqtt::Settings>& mqtt_keys();

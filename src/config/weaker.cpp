@@ -64,6 +64,26 @@ void compare_rights(Lines& all, const std::string& endpoint, const tcp_server::S
     }
 }
 
+/// Without TLS, or with certificates that fewer clients need.
+void compare_tls(Lines& all, const std::string& endpoint,
+                 const std::optional<tls::Settings>& running,
+                 const std::optional<tls::Settings>& next) {
+    if (!running) return;
+    if (!next) {
+        all.push_back(endpoint + ": tls is removed");
+        return;
+    }
+    if (next->client < running->client)
+        all.push_back(endpoint + ": tls asks fewer clients for a certificate");
+    if (running->role_from_certificate && !next->role_from_certificate)
+        all.push_back(endpoint + ": roles of certificates no longer count");
+    if (!running->crl.empty() && next->crl.empty())
+        all.push_back(endpoint + ": revoked certificates are accepted");
+    if (next->lowest < running->lowest) all.push_back(endpoint + ": tls min_version TLSv1.3 -> TLSv1.2");
+    if (next->material.ca != running->material.ca)
+        all.push_back(endpoint + ": certificates of another CA are accepted");
+}
+
 void compare_listeners(Lines& all, const Config& running, const Config& next) {
     for (const tcp_server::Settings& listener : next.modbus_tcp) {
         const std::string endpoint = "modbus_tcp " + listener.name();
@@ -74,6 +94,7 @@ void compare_listeners(Lines& all, const Config& running, const Config& next) {
             continue;
         }
         if (!was->udp && listener.udp) all.push_back(endpoint + ": udp false -> true");
+        compare_tls(all, endpoint, was->tls, listener.tls);
         compare_allow(all, endpoint, was->allow, listener.allow);
         compare_rights(all, endpoint, *was, listener);
     }
@@ -234,6 +255,7 @@ void compare_http(Lines& all, const Config& running, const Config& next) {
         return;
     }
     if (!was_open(*running.http, *next.http)) all.push_back(endpoint + ": is opened");
+    compare_tls(all, endpoint, running.http->tls, next.http->tls);
     compare_allow(all, endpoint, running.http->allow, next.http->allow);
     compare_hosts(all, *running.http, *next.http);
     if (next.http->anonymous > running.http->anonymous)

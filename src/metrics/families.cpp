@@ -1,10 +1,13 @@
 #include "families.hpp"
 
 #include <prometheus/text_serializer.h>
+#include <cstddef>
 #include <cstdint>
 #include <sstream>
 #include <string>
 #include <vector>
+
+#include "panelgate/tls/counters.hpp"
 
 namespace panelgate::metrics {
 
@@ -56,6 +59,34 @@ Family make_gauge(std::string name, std::string help) {
 
 Family make_histogram(std::string name, std::string help) {
     return {std::move(name), std::move(help), MetricType::Histogram};
+}
+
+namespace {
+
+void add_handshakes(Family& family, const std::string& listener, const tls::Counters& tls) {
+    for (std::size_t i = 0; i < tls.handshakes.size(); ++i)
+        family.counter({{"listener", listener}, {"outcome", std::string(tls::kOutcomeWords[i])}},
+                       tls.handshakes[i]);
+}
+
+}  // namespace
+
+void add_tls(Families& out, const Snapshot& snapshot) {
+    Family handshakes = make_counter("panelgate_tls_handshakes_total",
+                                     "TLS handshakes of clients, by how they ended.");
+    Family expiry =
+        make_gauge("panelgate_certificate_expiry_timestamp_seconds",
+                   "When the certificate that a listener shows to new clients stops being valid.");
+    const auto add = [&](const std::string& listener, const tls::Counters& tls) {
+        if (tls.certificate_expiry == 0) return;
+        add_handshakes(handshakes, listener, tls);
+        expiry.gauge({{"listener", listener}}, static_cast<double>(tls.certificate_expiry));
+    };
+    for (const tcp_server::Counters& listener : snapshot.listeners)
+        add(listener.listener, listener.tls);
+    if (snapshot.http) add(snapshot.http->listener, snapshot.http->tls);
+    out.push_back(handshakes.take());
+    out.push_back(expiry.take());
 }
 
 void add_http(Families& out, const Snapshot& snapshot) {

@@ -52,6 +52,7 @@ Family make_gauge(std::string name, std::string help);
 Family make_histogram(std::string name, std::string help);
 
 /// Adds nothing if there is no HTTP server.
+void add_tls(Families& out, const Snapshot& snapshot);
 void add_http(Families& out, const Snapshot& snapshot);
 
 /// Adds the MQTT families; nothing without a broker.

@@ -7,6 +7,7 @@
 
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
+#include "panelgate/tls/peer.hpp"
 
 namespace panelgate::tcp_server {
 
@@ -70,6 +71,17 @@ std::vector<bus::BusClient*> UnitMap::broadcast_lines(std::uint8_t unit) const {
 
 Caller::Caller(std::string name, WhoRef who) : name_(std::move(name)), who_(std::move(who)) {}
 
+void Caller::certify(std::string subject, std::optional<std::string> role) {
+    Who who = *who_;
+    who.certificate = std::move(subject);
+    by_certificate_ = role.has_value();
+    if (role) {
+        who.role = tls::role_named(*role);
+        who.certificate_role = std::move(*role);
+    }
+    who_ = make_who(std::move(who));
+}
+
 void Caller::transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,
                       bus::AnswerHandler handler) {
     use(bus);
@@ -131,14 +143,16 @@ Decision decide_broadcast(std::uint8_t function, Result<modbus::Request> request
 
 }  // namespace
 
-Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const UnitMap& units) {
+Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const UnitMap& units,
+                bool reads_only) {
     if (pdu.empty()) return refuse(Fault::malformed);
     auto request = modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::fit);
     if (!request && request.error() == Fault::denied) return refuse(Fault::denied);
     const bool itself = settings.diagnostics_unit == unit && !units.is_alias(unit);
     const bool writes = !modbus::is_pure_read(pdu);  // also if malformed
     if (itself) return Diagnose{};                   // nothing in it is writable
-    if (writes && settings.read_only) return refuse(Fault::denied, targets_of(unit, units));
+    if (writes && (settings.read_only || reads_only))
+        return refuse(Fault::denied, targets_of(unit, units));
 
     const bool broadcast = !units.broadcast_lines(unit).empty();
     const Result<Target> target = units.route(unit);

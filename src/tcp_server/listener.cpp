@@ -80,6 +80,9 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
                   shared_->log(rt::LogLevel::warn, "cannot accept", {{"reason", why.message()}});
               }) {
         shared_->counters.listener = shared_->settings.name();
+        if (shared_->settings.tls)
+            shared_->handshakes = std::make_shared<tls::Handshakes>(
+                executor, "modbus_tcp " + shared_->settings.name(), *shared_->settings.tls);
         if (!shared_->settings.udp) return;
         datagrams_ =
             std::make_shared<Datagrams>(executor, shared_, [this] { notify_when_empty(); });
@@ -87,6 +90,7 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
 
     void start();
     void apply(Settings settings, UnitMap units);
+    void renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context);
     std::uint16_t port() const { return acceptor_.port(); }
     Counters counters() const;
     void stop(std::function<void()> done);
@@ -125,6 +129,7 @@ void Listener::Core::start() {
 void Listener::Core::apply(Settings settings, UnitMap units) {
     allowed_ = rt::AccessList(settings.allow);
     if (datagrams_) datagrams_->allow(allowed_);
+    if (shared_->handshakes && settings.tls) shared_->handshakes->apply(*settings.tls);
     shared_->settings = std::move(settings);
     shared_->units = std::move(units);
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // close() erases
@@ -133,9 +138,17 @@ void Listener::Core::apply(Settings settings, UnitMap units) {
     }
 }
 
+void Listener::Core::renew(const tls::Settings& settings,
+                           std::shared_ptr<const tls::Context> context) {
+    if (!shared_->handshakes) return;
+    shared_->handshakes->apply(settings, std::move(context));
+    shared_->settings.tls = settings;
+}
+
 Counters Listener::Core::counters() const {
     Counters counters = shared_->counters;
     counters.connections = sessions_.size();
+    if (shared_->handshakes) counters.tls = shared_->handshakes->counters();
     return counters;
 }
 
@@ -246,6 +259,9 @@ Listener::~Listener() { core_->close_now(); }
 void Listener::start() { core_->start(); }
 void Listener::apply(Settings settings, UnitMap units) {
     core_->apply(std::move(settings), std::move(units));
+}
+void Listener::renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context) {
+    core_->renew(settings, std::move(context));
 }
 std::uint16_t Listener::port() const { return core_->port(); }
 Counters Listener::counters() const { return core_->counters(); }

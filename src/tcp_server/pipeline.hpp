@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "panelgate/base/bytes.hpp"
@@ -103,6 +104,10 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
     /// True if all requests were answered and all replies popped.
     bool empty() const { return waiting_.empty() && replies_.empty(); }
     const std::string& client() const { return caller_.name(); }
+    /// As Caller::certify().
+    void certify(std::string subject, std::optional<std::string> role) {
+        caller_.certify(std::move(subject), std::move(role));
+    }
 
     /// Starts no further request: queued ones are answered Fault::cancelled.
     void refuse_waiting();

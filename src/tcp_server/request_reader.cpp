@@ -130,10 +130,16 @@ bool is_http_request_line(ByteView first) {
            line.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ") == method;
 }
 
+/// A handshake record with a client's hello (RFC 8446 5.1, 4). As MBAP its protocol id is not 0.
+bool is_tls_hello(ByteView first) {
+    return first.size() > 5 && first[0] == 0x16 && first[1] == 3 && first[2] <= 4 && first[5] == 1;
+}
+
 std::optional<std::string> foreign(modbus::Framing expected, ByteView first) {
     if (const auto spoken = modbus::other_framing(expected, first))
         return std::string(name_of(*spoken)) +
                " and needs a listener with framing: " + word(*spoken);
+    if (is_tls_hello(first)) return "TLS and needs a listener with tls";
     if (is_http_request_line(first)) return "HTTP and needs the listener of 'http'";
     return std::nullopt;
 }

@@ -20,11 +20,13 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
+constexpr Duration kAnotherLook = 20ms;
+
 }  // namespace
 
 Session::Session(asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
                  ClosedHandler on_closed)
-    : socket_(std::move(socket)),
+    : stream_(std::move(socket)),
       shared_(std::move(shared)),
       on_closed_(std::move(on_closed)),
       active_(shared_->clock.now()),
@@ -37,9 +39,32 @@ void Session::start(Caller caller) {
     pipeline_ = std::make_shared<Pipeline>(shared_, std::move(caller), [weak = weak_from_this()] {
         if (const auto self = weak.lock()) self->go_on();
     });
-    error_code ignored;
-    socket_.non_blocking(true, ignored);
-    read();
+    if (!shared_->handshakes) return read();
+    handshaking_ = true;
+    error_code gone;
+    const asio::ip::tcp::endpoint client = stream_.socket().remote_endpoint(gone);
+    shared_->handshakes->begin(shared_from_this(), stream_, pipeline_->client(),
+                               client.address().to_string(),
+                               [this](bool secure) { on_secure(secure); });
+}
+
+/// The handshake keeps the session until here.
+void Session::on_secure(bool secure) {
+    handshaking_ = false;
+    if (closed_) return;
+    if (!secure) return close();
+    const tls::Peer& peer = stream_.peer();
+    std::optional<std::string> role;
+    if (shared_->settings.tls && shared_->settings.tls->role_from_certificate)
+        role = peer.role.value_or("");
+    if (role && !peer.role_fault.empty())
+        shared_->log(rt::LogLevel::warn, "certificate without a role",
+                     {{"client", pipeline_->client()},
+                      {"subject", peer.subject},
+                      {"reason", peer.role_fault}});
+    pipeline_->certify(peer.subject, std::move(role));
+    active_ = shared_->clock.now();
+    go_on();
 }
 
 Guest Session::guest() const {
@@ -50,12 +75,13 @@ Guest Session::guest() const {
 
 asio::ip::address Session::peer() const {
     error_code gone;
-    return socket_.remote_endpoint(gone).address();
+    return stream_.socket().remote_endpoint(gone).address();
 }
 
 /// Refuses queued requests; otherwise a pipelining client could delay the end indefinitely.
 void Session::finish() {
     if (closed_) return;
+    if (handshaking_) return close();
     if (input_state_ == Input::served) input_state_ = Input::discarded;
     cancel_due();
     pipeline_->refuse_waiting();
@@ -65,8 +91,7 @@ void Session::finish() {
 void Session::close() {
     if (std::exchange(closed_, true)) return;
     const std::shared_ptr<Session> self = shared_from_this();
-    error_code ignored;
-    socket_.close(ignored);
+    stream_.close();
     due_alarm_->cancel();
     output_alarm_->cancel();
     pipeline_->close();
@@ -91,13 +116,13 @@ void Session::go_on() {
 // finishing is discarded: closing a socket with unread input would reset replies in transit.
 
 void Session::read() {
-    if (closed_ || reading_ || input_state_ == Input::ended) return;
+    if (closed_ || handshaking_ || reading_ || input_state_ == Input::ended) return;
     if (input_state_ == Input::served && !pipeline_->has_room()) return watch_for_reset();
     reading_ = true;
     auto handler = [self = shared_from_this()](const error_code& error, std::size_t size) {
         self->on_read(error, size);
     };
-    socket_.async_read_some(asio::buffer(input_),
+    stream_.async_read_some(asio::buffer(input_),
                             asio::bind_allocator(PoolAllocator<std::byte>(), std::move(handler)));
 }
 
@@ -139,11 +164,19 @@ void Session::watch_reader() {
     due_alarm_->arm(*due, [self = shared_from_this()] { self->on_due(); });
 }
 
-/// Bytes already in the socket arrived in time even if not read yet.
+/// Bytes already in the socket arrived in time even if not read yet. What is there after another
+/// turn of the loop is a part of a TLS record.
 void Session::on_due() {
     due_.reset();
-    error_code ignored;
-    if (reading_ && socket_.available(ignored) != 0) return;  // take_requests() looks again
+    if (reading_ && stream_.available() != 0) {
+        if (!stream_.is_secure()) return;  // take_requests() looks again
+        if (!std::exchange(looked_again_, true)) {
+            due_ = shared_->clock.now() + kAnotherLook;
+            due_alarm_->arm(*due_, [self = shared_from_this()] { self->on_due(); });
+            return;
+        }
+    }
+    looked_again_ = false;
     reader_->on_due(shared_->clock.now());
     go_on();
 }
@@ -172,18 +205,18 @@ void Session::on_end_of_input() {
 /// are abandoned then.
 void Session::watch_for_reset() {
     if (std::exchange(watching_for_reset_, true)) return;
-    socket_.async_wait(asio::ip::tcp::socket::wait_error,
-                       [self = shared_from_this()](const error_code&) { self->close(); });
+    stream_.socket().async_wait(asio::ip::tcp::socket::wait_error,
+                                [self = shared_from_this()](const error_code&) { self->close(); });
 }
 
 // Output.
 
 /// Usually the kernel accepts a reply at once; the rest is written asynchronously.
 void Session::write() {
-    if (closed_ || writing_) return;
+    if (closed_ || handshaking_ || writing_) return;
     while (const Bytes* adu = pipeline_->front()) {
         error_code error;
-        const std::size_t taken = socket_.write_some(asio::buffer(*adu), error);
+        const std::size_t taken = stream_.write_some(asio::buffer(*adu), error);
         if (error && error != asio::error::would_block) return close();
         if (taken < adu->size()) return write_later(ByteView(*adu).subspan(taken));
         ++written_;
@@ -197,7 +230,7 @@ void Session::write() {
 void Session::write_later(ByteView rest) {
     writing_ = true;
     watch_output();
-    asio::async_write(socket_, asio::buffer(rest.data(), rest.size()),
+    asio::async_write(stream_, asio::buffer(rest.data(), rest.size()),
                       [self = shared_from_this()](const error_code& error, std::size_t) {
                           self->on_written(error);
                       });
@@ -231,7 +264,7 @@ void Session::watch_output() {
 /// Returns the bytes of replies not acknowledged by the client's TCP stack.
 int Session::unacknowledged_bytes() {
     int bytes = 0;
-    if (::ioctl(socket_.native_handle(), SIOCOUTQ, &bytes) != 0) return 0;
+    if (::ioctl(stream_.socket().native_handle(), SIOCOUTQ, &bytes) != 0) return 0;
     return bytes;
 }
 

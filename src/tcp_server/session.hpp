@@ -14,6 +14,7 @@
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/rt/settings.hpp"
 #include "panelgate/tcp_server/dispatch.hpp"
+#include "panelgate/tls/stream.hpp"
 #include "pipeline.hpp"
 #include "places.hpp"
 #include "request_reader.hpp"
@@ -53,6 +54,7 @@ class Session : public std::enable_shared_from_this<Session> {
         ended,      ///< the same, after end of input
     };
 
+    void on_secure(bool secure);
     void go_on();
     void read();
     void on_read(const boost::system::error_code& error, std::size_t size);
@@ -69,7 +71,7 @@ class Session : public std::enable_shared_from_this<Session> {
     int unacknowledged_bytes();
     void fail(std::string_view reason, rt::LogLevel level = rt::LogLevel::info);
 
-    boost::asio::ip::tcp::socket socket_;
+    tls::Stream stream_;
     std::shared_ptr<Shared> shared_;
     ClosedHandler on_closed_;
     std::shared_ptr<Pipeline> pipeline_;
@@ -78,12 +80,14 @@ class Session : public std::enable_shared_from_this<Session> {
 
     Input input_state_ = Input::served;
     std::array<std::uint8_t, 4096> input_{};
+    bool handshaking_ = false;  ///< nothing is read or written yet
     bool reading_ = false;
     bool watching_for_reset_ = false;
     /// Holds at most one incomplete request whenever a read starts.
     std::unique_ptr<RequestReader> reader_;
     std::unique_ptr<rt::Alarm> due_alarm_;
     std::optional<TimePoint> due_;  ///< the alarm is armed
+    bool looked_again_ = false;     ///< on_due() has, at encrypted bytes
 
     bool writing_ = false;       ///< the rest of the pipeline's front() is being written
     std::uint64_t written_ = 0;  ///< replies

@@ -14,6 +14,7 @@
 #include "panelgate/tcp_server/counters.hpp"
 #include "panelgate/tcp_server/dispatch.hpp"
 #include "panelgate/tcp_server/settings.hpp"
+#include "panelgate/tls/handshakes.hpp"
 
 namespace panelgate::tcp_server {
 
@@ -55,7 +56,8 @@ struct Shared {
     rt::Clock& clock;
     Counters counters;
     TimePoint started;
-    std::shared_ptr<OwnAnswers> own_answers;  ///< never null
+    std::shared_ptr<OwnAnswers> own_answers;        ///< never null
+    std::shared_ptr<tls::Handshakes> handshakes{};  ///< null: no TLS
 
     /// Logs one line for this listener.
     void log(rt::LogLevel level, std::string_view event, std::vector<rt::LogField> more = {}) const;

@@ -82,17 +82,24 @@ int Engine::write(const char* bytes, int size) {
     return static_cast<int>(sent);
 }
 
-void Engine::create() {
-    ssl_.reset(SSL_new(context_->native()));
+void Engine::create(SSL_CTX* context) {
+    ssl_.reset(SSL_new(context));
     BIO* const bio = BIO_new(Wire::method());
     BIO_set_data(bio, this);
     SSL_set_bio(ssl_.get(), bio, bio);
     SSL_set_app_data(ssl_.get(), &refused_);
-    SSL_set_accept_state(ssl_.get());
+}
+
+Engine::Engine(const std::shared_ptr<SSL_CTX>& context) {
+    create(context.get());
+    SSL_set_connect_state(ssl_.get());
 }
 
 Engine::Progress Engine::handshake() {
-    if (!ssl_) create();
+    if (!ssl_) {
+        create(context_->native());
+        SSL_set_accept_state(ssl_.get());
+    }
     ERR_clear_error();
     const int result = SSL_do_handshake(ssl_.get());
     if (result == 1) {

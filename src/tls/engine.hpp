@@ -18,7 +18,10 @@ class Engine {
   public:
     enum class Progress : std::uint8_t { done, needs_input, failed };
 
+    /// The server's side; OpenSSL's object is made by the first handshake().
     explicit Engine(std::shared_ptr<const Context> context) : context_(std::move(context)) {}
+    /// The client's side.
+    explicit Engine(const std::shared_ptr<SSL_CTX>& context);
     Engine(const Engine&) = delete;
     Engine& operator=(const Engine&) = delete;
 
@@ -41,7 +44,7 @@ class Engine {
   private:
     friend struct Wire;
 
-    void create();
+    void create(SSL_CTX* context);
     void explain(int reason);
     void explain_chain(long result);
     int read(char* into, int size);

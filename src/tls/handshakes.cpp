@@ -196,9 +196,12 @@ Handshakes::Handshakes(asio::any_io_executor executor, std::string name, Setting
 
 Handshakes::~Handshakes() = default;
 
-void Handshakes::apply(const Settings& settings) {
+void Handshakes::apply(const Settings& settings) try {
     if (settings == settings_) return;
     apply(settings, std::make_shared<const Context>(settings));
+} catch (const Unusable& why) {
+    rt::log(rt::LogLevel::error, "certificate not renewed",
+            {{"listener", name_}, {"reason", why.what()}});
 }
 
 void Handshakes::apply(const Settings& settings, std::shared_ptr<const Context> context) {
@@ -236,11 +239,13 @@ void Handshakes::end(Conversation& conversation, Outcome outcome, const std::str
     ++counters_.handshakes[static_cast<std::size_t>(outcome)];
     running_.remove(&conversation);
     if (outcome == Outcome::done) return;
-    rt::log(level_of(outcome), "tls handshake failed",
-            {{"listener", name_},
-             {"client", conversation.client},
-             {"outcome", std::string(label(outcome))},
-             {"reason", why}});
+    const std::string& client = conversation.client;
+    const std::string subject = name_ + ' ' + client.substr(0, client.rfind(':')) + ' ' + why;
+    rt::log_about(subject, level_of(outcome), "tls handshake failed",
+                  {{"listener", name_},
+                   {"client", client},
+                   {"outcome", std::string(label(outcome))},
+                   {"reason", why}});
 }
 
 Counters Handshakes::counters() const {

@@ -5,6 +5,7 @@
 #include <openssl/objects.h>
 #include <openssl/x509.h>
 #include <algorithm>
+#include <array>
 #include <memory>
 
 #include "native.hpp"
@@ -50,6 +51,12 @@ void read_role(const ASN1_OCTET_STRING* value, Peer& peer) {
 }
 
 }  // namespace
+
+Role role_named(std::string_view word) {
+    constexpr std::array kRoles{Role::viewer, Role::operator_, Role::engineer, Role::admin};
+    const auto* const known = std::ranges::find(kRoles, word, [](Role one) { return label(one); });
+    return known == kRoles.end() ? Role::none : *known;
+}
 
 Peer peer_of(const x509_st* certificate) {
     Peer peer;

@@ -1,7 +1,9 @@
 #include "panelgate/tls/stream.hpp"
 
+#include <linux/sockios.h>
 #include <openssl/err.h>
 #include <openssl/ssl.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <algorithm>
 #include <boost/asio/error.hpp>
@@ -81,6 +83,12 @@ Stream::Input Stream::look() {
 std::size_t Stream::available() const {
     error_code ignored;
     return socket_.available(ignored);
+}
+
+bool Stream::all_is_sent() const {
+    int bytes = 0;
+    const int socket = const_cast<tcp::socket&>(socket_).native_handle();
+    return ::ioctl(socket, SIOCOUTQ, &bytes) == 0 && bytes == 0;
 }
 
 void Stream::expires_after(Duration patience) {

@@ -14,6 +14,7 @@ import config
 import harness
 from harness import ROOT, read_registers
 from prometheus_server import DEPLOYED, Prometheus
+from tls_plant import plant, served
 from unread import Unread
 
 DASHBOARD = ROOT / "deploy/grafana/dashboards/panelgate.json"
@@ -89,11 +90,15 @@ class Plant:
             harness.Program("simulate", "-c", str(file), "--line", f"remote={adapter}"))
         self.far_end.out.wait_for("Ctrl-C")
         self.box = stack.enter_context(Unread(box(adapter)))
+        self.secure = stack.enter_context(plant())  # CertificateExpires
+        self.secure.cert("new-server", "localhost", "127.0.0.1", "--days", "9", "--force")
+        self.dated = stack.enter_context(served(self.secure, self.secure.tls()))
         self.client = stack.enter_context(self.demo.client())
         self.box_client = stack.enter_context(harness.Client(self.box.ports[0]))
 
     def targets(self):
-        return [f"127.0.0.1:{self.demo.http_port()}", f"127.0.0.1:{self.box.ports[1]}"]
+        return [f"127.0.0.1:{self.demo.http_port()}", f"127.0.0.1:{self.box.ports[1]}",
+                f"127.0.0.1:{self.dated.http_port()}"]
 
     def traffic(self):
         """Two panels of the demo, REST, and what fills the box's log."""

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <string>
 
+#include "panelgate/tls/counters.hpp"
+
 namespace panelgate::tcp_server {
 
 struct Counters {
@@ -17,6 +19,7 @@ struct Counters {
     std::uint64_t unanswered = 0;  ///< requests without a reply: unit 0 where broadcasts are silent
     std::uint64_t refused = 0;     ///< connections: limit reached and none gives way
     std::uint64_t evicted = 0;     ///< connections closed for newer ones (find_place())
+    tls::Counters tls{};
 };
 
 }  // namespace panelgate::tcp_server

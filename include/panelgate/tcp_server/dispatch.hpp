@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <variant>
@@ -73,6 +74,11 @@ class Caller {
     const std::string& name() const { return name_; }
     const WhoRef& who() const { return who_; }
     std::uint64_t host() const { return who_->host; }
+    /// What its certificate says. `role` is the one in it, "" none, which is the least; nothing
+    /// where its listener does not go by that. Call it before the first request.
+    void certify(std::string subject, std::optional<std::string> role);
+    /// By its certificate: only operators and above write.
+    bool reads_only() const { return by_certificate_ && who_->role < Role::operator_; }
     /// Passes the request to a bus for one of its stations; station 0: broadcast.
     void transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,
                   bus::AnswerHandler handler);
@@ -88,6 +94,7 @@ class Caller {
     std::string name_;
     WhoRef who_;
     bus::ClientId client_ = bus::next_client_id();
+    bool by_certificate_ = false;  ///< its role is its certificate's
     std::set<bus::RequestPort*> used_;
 };
 
@@ -108,9 +115,11 @@ struct Diagnose {};  ///< the gateway answers from its own registers
 using Decision = std::variant<Refuse, Forward, Broadcast, Diagnose>;
 
 /// Decides on a request in the order of EXC-08: function 0 or 128..255 is 01; a write through a
-/// read-only listener 01; an unrouted unit 0A; a write that its bus would refuse 01, before any
-/// other check; anything but a write (BC-02) to a broadcast unit 01; a PDU that is inconsistent
-/// with its function or cannot be answered 03. Queries the buses only for access rights.
-Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const UnitMap& units);
+/// read-only listener, or by a client that only reads, 01; an unrouted unit 0A; a write that its
+/// bus would refuse 01, before any other check; anything but a write (BC-02) to a broadcast unit
+/// 01; a PDU that is inconsistent with its function or cannot be answered 03. Queries the buses
+/// only for access rights.
+Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const UnitMap& units,
+                bool reads_only = false);
 
 }  // namespace panelgate::tcp_server

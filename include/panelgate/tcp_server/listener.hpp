@@ -13,6 +13,9 @@
 namespace boost::asio {
 class any_io_executor;
 }
+namespace panelgate::tls {
+class Context;
+}
 
 namespace panelgate::tcp_server {
 
@@ -37,6 +40,8 @@ class Listener {
     /// Requires settings.is_same_listener(). Throws like the constructor, and then leaves
     /// everything unchanged.
     void apply(Settings settings, UnitMap units);
+    /// For connections to come: the same `tls`, whose files have changed. Ignored without TLS.
+    void renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context);
     /// Returns the bound port; 0 before start().
     std::uint16_t port() const;
     Counters counters() const;

@@ -11,6 +11,7 @@
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/framing.hpp"
+#include "panelgate/tls/settings.hpp"
 
 namespace panelgate::tcp_server {
 
@@ -74,11 +75,14 @@ struct Settings {
     std::string url;   ///< of the web interface
     std::string host;  ///< host name
 
+    std::optional<tls::Settings> tls{};  ///< Modbus/TCP Security; none: plain
+
     std::string name() const { return endpoint_text(address, port); }
     /// True if `other` differs only in what can change without reopening the listener.
     bool is_same_listener(const Settings& other) const {
         return address == other.address && port == other.port && ipv6_only == other.ipv6_only &&
-               framing == other.framing && ascii_digits == other.ascii_digits && udp == other.udp;
+               framing == other.framing && ascii_digits == other.ascii_digits && udp == other.udp &&
+               tls.has_value() == other.tls.has_value();
     }
     friend bool operator==(const Settings&, const Settings&) = default;
 };

@@ -26,7 +26,8 @@ class Handshakes : public std::enable_shared_from_this<Handshakes> {
     Handshakes(boost::asio::any_io_executor executor, std::string name, Settings settings);
     ~Handshakes();
 
-    /// For handshakes that begin from now on. Throws Unusable, and then nothing has changed.
+    /// For handshakes that begin from now on. Files that no context can be made of are logged, and
+    /// the former ones stay in use.
     void apply(const Settings& settings);
     /// The same, with a context made elsewhere, such as in a worker.
     void apply(const Settings& settings, std::shared_ptr<const Context> context);

@@ -4,6 +4,8 @@
 #include <string>
 #include <string_view>
 
+#include "panelgate/base/who.hpp"
+
 struct x509_st;
 
 namespace panelgate::tls {
@@ -21,5 +23,9 @@ struct Peer {
 
 /// Reads a certificate; null: nobody. Long names are cut off, control characters replaced.
 Peer peer_of(const x509_st* certificate);
+
+/// The role of this name, as in the configuration; none for another word, which only the rules of
+/// the plant can know.
+Role role_named(std::string_view word);
 
 }  // namespace panelgate::tls

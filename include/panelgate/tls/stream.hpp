@@ -56,6 +56,8 @@ class Stream {
     Input look();
     /// Bytes in the socket that are not read, encrypted or not.
     std::size_t available() const;
+    /// True if the kernel holds nothing that the client has not acknowledged.
+    bool all_is_sent() const;
 
     /// If an operation is pending by then, it fails and the connection is closed.
     void expires_after(Duration patience);

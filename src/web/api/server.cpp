@@ -4,6 +4,7 @@
 
 #include "key_book.hpp"
 #include "panelgate/bus/bus_client.hpp"
+#include "panelgate/tls/context.hpp"
 #include "panelgate/web/http/listener.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "routes.hpp"
@@ -53,7 +54,11 @@ std::uint16_t Server::port() const { return listener_->port(); }
 
 void Server::stop(Duration reading) { listener_->stop(reading); }
 
-const Counters& Server::counters() const { return listener_->counters(); }
+void Server::renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context) {
+    listener_->renew(settings, std::move(context));
+}
+
+Counters Server::counters() const { return listener_->counters(); }
 
 std::size_t Server::connections() const { return listener_->connections(); }
 

@@ -44,15 +44,20 @@ std::optional<Problem> repeated_field(const BeastRequest& message);
 Parsed<std::string> host_of(const BeastRequest& message, const Target& target);
 HttpRequest to_request(BeastRequest&& message, Target target, std::string host);
 
+/// For a year browsers ask this host by HTTPS only (RFC 6797); its other ports and hosts below are
+/// not meant.
+constexpr const char* kStrictTransport = "max-age=31536000";
+
 template <class Message>
 void set_head(Message& message, const HttpResponse& response, bool keep_alive,
-              const std::string& product) {
+              const std::string& product, bool secure) {
     using boost::beast::http::field;
     message.version(11);
     message.result(response.status);
     message.set(field::server, product);
     message.set(field::cache_control, "no-store");
     message.set("X-Content-Type-Options", "nosniff");
+    if (secure) message.set("Strict-Transport-Security", kStrictTransport);
     for (const auto& [name, value] : response.headers) message.set(name, value);
     if (response.status != 204 && response.status != 304) {  // no body: RFC 9110 8.6, 15.4.5
         message.set(field::content_type, response.content_type);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "panelgate/rt/log.hpp"
+#include "panelgate/tls/handshakes.hpp"
 #include "session.hpp"
 #include "shared.hpp"
 
@@ -13,9 +14,20 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
+namespace {
+
+std::shared_ptr<tls::Handshakes> handshakes_of(const asio::any_io_executor& executor,
+                                               const Settings& settings) {
+    if (!settings.tls) return nullptr;
+    return std::make_shared<tls::Handshakes>(executor, "http " + settings.name(), *settings.tls);
+}
+
+}  // namespace
+
 HttpListener::HttpListener(asio::any_io_executor executor, std::shared_ptr<const Site> site)
     : shared_(std::make_shared<Shared>(std::move(site))),
       allowed_(shared_->site->settings.allow),
+      handshakes_(handshakes_of(executor, shared_->site->settings)),
       acceptor_(
           executor, [this](tcp::socket socket) { take(std::move(socket)); },
           [this](const error_code& why) {
@@ -32,6 +44,7 @@ void HttpListener::apply(std::shared_ptr<const Site> site) {
     allowed_ = rt::AccessList(site->settings.allow);
     const bool rights_changed = site->settings.tokens != shared_->site->settings.tokens ||
                                 site->settings.anonymous != shared_->site->settings.anonymous;
+    if (handshakes_ && site->settings.tls) handshakes_->apply(*site->settings.tls);
     shared_->serve(std::move(site));
     const auto sessions = sessions_;
     for (const auto& [id, session] : sessions) {
@@ -43,7 +56,17 @@ void HttpListener::apply(std::shared_ptr<const Site> site) {
     }
 }
 
-const Counters& HttpListener::counters() const { return shared_->counters; }
+void HttpListener::renew(const tls::Settings& settings,
+                         std::shared_ptr<const tls::Context> context) {
+    if (handshakes_) handshakes_->apply(settings, std::move(context));
+}
+
+Counters HttpListener::counters() const {
+    Counters counters = shared_->counters;
+    counters.listener = shared_->site->settings.name();
+    if (handshakes_) counters.tls = handshakes_->counters();
+    return counters;
+}
 
 std::uint16_t HttpListener::port() const { return acceptor_.port(); }
 
@@ -61,7 +84,8 @@ void HttpListener::take(tcp::socket socket) {
     const auto caller =
         std::make_shared<Caller>(shared_->site->next_caller(), peer.address().to_string());
     const bool probes_only = make_room(*caller);
-    auto session = std::make_shared<HttpSession>(std::move(socket), shared_, caller, probes_only);
+    auto session =
+        std::make_shared<HttpSession>(std::move(socket), shared_, caller, probes_only, handshakes_);
     sessions_.emplace(caller->id(), session);
     asio::co_spawn(
         acceptor_.get_executor(), HttpSession::run(session),

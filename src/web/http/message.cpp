@@ -1,5 +1,6 @@
 #include "panelgate/web/http/message.hpp"
 
+#include <utility>
 #include <vector>
 
 #include "panelgate/rt/log.hpp"
@@ -16,6 +17,14 @@ void Caller::identify(std::string token, Role role, std::string listener) {
     who.token = std::move(token);
     who.role = role;
     who.listener = std::move(listener);
+    who_ = make_who(std::move(who));
+}
+
+void Caller::certify(std::string subject, std::string word, std::optional<Role> role) {
+    Who who = *who_;
+    who.certificate = std::move(subject);
+    who.certificate_role = std::move(word);
+    certificate_role_ = role;
     who_ = make_who(std::move(who));
 }
 

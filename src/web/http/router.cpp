@@ -1,5 +1,6 @@
 #include "router.hpp"
 
+#include <algorithm>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/this_coro.hpp>
@@ -83,7 +84,7 @@ std::optional<Problem> check_access(const HttpRequest& request, Role needed,
     if (needed == Role::none) return std::nullopt;
     if (is_foreign_form(request)) return problem(415, "send the body as application/json");
     if (header(request, "authorization").empty()) {
-        if (settings.anonymous >= needed) return std::nullopt;
+        if (role_of(request, settings) >= needed) return std::nullopt;
         return unauthorized("this needs a token");
     }
     // Do not echo the value: without a scheme it may be the token.
@@ -109,7 +110,11 @@ std::optional<Problem> check_encoding(const HttpRequest& request) {
 }
 
 Role role_of(const HttpRequest& request, const Settings& settings) {
-    if (header(request, "authorization").empty()) return settings.anonymous;
+    if (header(request, "authorization").empty()) {
+        const bool certified = request.caller && request.caller->certificate_role();
+        return std::max(settings.anonymous,
+                        certified ? *request.caller->certificate_role() : Role::none);
+    }
     const Token* token = token_of(request, settings);
     return token == nullptr ? Role::none : token->role;
 }

@@ -22,7 +22,8 @@ bool carries_token(const HttpRequest& request);
 /// Returns 415 for a compressed or otherwise encoded body, which is not supported.
 std::optional<Problem> check_encoding(const HttpRequest& request);
 
-/// Returns the role of its token, or the anonymous one; none for an unknown token.
+/// Returns the role of its token; without one that of its certificate or the anonymous one,
+/// whichever is more; none for an unknown token.
 Role role_of(const HttpRequest& request, const Settings& settings);
 
 /// Returns the name of its token, "" without a known one.

@@ -14,7 +14,6 @@
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/write.hpp>
 #include <boost/system/error_code.hpp>
-#include <cerrno>
 #include <exception>
 #include <optional>
 #include <string>
@@ -22,6 +21,7 @@
 #include <utility>
 
 #include "admission.hpp"
+#include "panelgate/base/network.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/web/http/problem.hpp"
 #include "router.hpp"
@@ -31,8 +31,8 @@ namespace panelgate::web {
 using boost::asio::ip::tcp;
 using boost::system::error_code;
 
-Departure::Departure(tcp::socket& socket, Duration grace)
-    : socket_(socket), grace_(grace), timer_(socket.get_executor()) {}
+Departure::Departure(tls::Stream& stream, Duration grace)
+    : stream_(stream), socket_(stream.socket()), grace_(grace), timer_(stream.get_executor()) {}
 
 /// A reset is reported even with unread input.
 void Departure::start(std::shared_ptr<void> owner, std::function<void()> left) {
@@ -65,12 +65,16 @@ void Departure::watch_input() {
 }
 
 void Departure::look_at_input() {
-    char byte = 0;
-    const auto n = ::recv(socket_.native_handle(), &byte, 1, MSG_PEEK | MSG_DONTWAIT);
-    if (n > 0) return;
-    if (n == 0) return ask_later();
-    if (errno != EAGAIN && errno != EWOULDBLOCK) return tell();
-    watch_input();  // it was the rest of this request
+    switch (stream_.look()) {
+        case tls::Stream::Input::bytes:
+            return;
+        case tls::Stream::Input::end:
+            return ask_later();
+        case tls::Stream::Input::broken:
+            return tell();
+        case tls::Stream::Input::none:
+            return watch_input();  // it was the rest of this request
+    }
 }
 
 void Departure::ask_later() {
@@ -121,13 +125,15 @@ HttpResponse too_many_streams() {
 }  // namespace
 
 HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
-                         std::shared_ptr<Caller> caller, bool probes_only)
+                         std::shared_ptr<Caller> caller, bool probes_only,
+                         std::shared_ptr<tls::Handshakes> handshakes)
     : stream_(std::move(socket)),
       shared_(std::move(shared)),
+      handshakes_(std::move(handshakes)),
       caller_(std::move(caller)),
       probes_only_(probes_only),
       buffer_(kHeaderLimit + kReadSize + shared_->site->settings.max_body),
-      departure_(stream_.socket(), shared_->site->settings.half_close_grace),
+      departure_(stream_, shared_->site->settings.half_close_grace),
       turn_(stream_.get_executor()),
       final_send_timer_(stream_.get_executor()),
       time_to_read_(shared_->site->settings.request_timeout) {
@@ -138,9 +144,42 @@ HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<Shared> s
 
 asio::awaitable<void> HttpSession::run(std::shared_ptr<HttpSession> self) {
     self->departure_.start(self, [session = self.get()] { session->abandon(); });
-    bool more = true;
+    asio::awaitable<bool> securing = self->secure();
+    bool more = co_await std::move(securing);
     while (more && !self->stopping_) more = co_await self->serve_one();
     self->abandon();
+}
+
+/// Waits for the handshake, if the listener has TLS; false: it failed, and is logged.
+asio::awaitable<bool> HttpSession::secure() {
+    if (!handshakes_) co_return true;
+    ErrorCode ignored;
+    const tcp::endpoint client = stream_.socket().remote_endpoint(ignored);
+    const std::string name = endpoint_text(caller_->address(), client.port());
+    bool ended = false;
+    bool secure = false;
+    turn_.expires_at(asio::steady_timer::time_point::max());
+    std::function<void(bool)> done = [this, &ended, &secure](bool is_secure) {
+        ended = true;
+        secure = is_secure;
+        turn_.cancel();
+    };
+    handshakes_->begin(shared_from_this(), stream_, name, caller_->address(), std::move(done));
+    while (!ended) {  // stop() cancels the timer, too, and then closes the connection
+        turn_.expires_at(asio::steady_timer::time_point::max());
+        co_await turn_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
+    }
+    if (secure) take_certificate();
+    co_return secure;
+}
+
+void HttpSession::take_certificate() {
+    const tls::Peer& peer = stream_.peer();
+    const auto& tls = shared_->site->settings.tls;
+    const bool counts = tls && tls->role_from_certificate && peer.role;
+    std::optional<Role> role;
+    if (counts) role = tls::role_named(*peer.role);
+    caller_->certify(peer.subject, counts ? *peer.role : "", role);
 }
 
 asio::awaitable<bool> HttpSession::serve_one() {
@@ -217,12 +256,12 @@ asio::awaitable<void> HttpSession::wait_for_rate_limit(const HttpResponse* respo
     co_await turn_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 }
 
-/// Sent before the reply: the socket buffer is empty, so it is written whole. Clients skip it (RFC
-/// 9110 15.2).
+/// Sent before the reply: the socket buffer is empty, so it is written whole; of TLS a part of a
+/// record would have to be finished. Clients skip it (RFC 9110 15.2).
 void HttpSession::send_interim() {
     ErrorCode ignored;
-    stream_.socket().non_blocking(true, ignored);
-    stream_.socket().write_some(asio::buffer(kContinue), ignored);
+    if (stream_.is_secure() && !stream_.all_is_sent()) return;
+    stream_.write_some(asio::buffer(kContinue), ignored);
 }
 
 /// Reads one complete request into parser_.
@@ -240,6 +279,7 @@ asio::awaitable<boost::system::error_code> HttpSession::receive() {
             space, asio::redirect_error(asio::use_awaitable, error));
         if (error) co_return error;
         buffer_.commit(n);
+        if (!handshakes_ && speaks_tls()) co_return asio::error::no_protocol_option;
     }
     asked_before_ = true;
     stream_.expires_after(shared_->site->settings.request_timeout);
@@ -252,6 +292,17 @@ asio::awaitable<boost::system::error_code> HttpSession::receive() {
     error = co_await receive_body();
     parser_->get().base() = std::move(head);
     co_return error;
+}
+
+/// True, and logged, for the first bytes of a TLS handshake.
+bool HttpSession::speaks_tls() const {
+    const auto* const bytes = static_cast<const unsigned char*>(buffer_.data().data());
+    if (asked_before_ || buffer_.size() < 3 || bytes[0] != 0x16 || bytes[1] != 3) return false;
+    rt::log(rt::LogLevel::warn, "connection closed",
+            {{"listener", shared_->site->settings.name()},
+             {"client", caller_->address()},
+             {"reason", "it speaks TLS; write http:// in its address, or give http: tls"}});
+    return true;
 }
 
 asio::awaitable<boost::system::error_code> HttpSession::receive_body() {
@@ -308,7 +359,7 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
         response.shared_body = std::make_shared<const std::string>(std::move(response.body));
     if (head || response.shared_body) {
         http::response<http::empty_body> message;
-        set_head(message, response, keep_alive, shared_->site->product);
+        set_head(message, response, keep_alive, shared_->site->product, handshakes_ != nullptr);
         co_await http::async_write(stream_, message,
                                    asio::redirect_error(asio::use_awaitable, error));
         // In pieces of 64 KB, between which the loop serves others: Beast would pass the whole body
@@ -320,7 +371,7 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
         }
     } else {
         http::response<http::string_body> message;
-        set_head(message, response, keep_alive, shared_->site->product);
+        set_head(message, response, keep_alive, shared_->site->product, handshakes_ != nullptr);
         message.body() = std::move(response.body);
         co_await http::async_write(stream_, message,
                                    asio::redirect_error(asio::use_awaitable, error));
@@ -328,6 +379,15 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
     sending_ = false;
     final_send_timer_.cancel();
     co_return !error && keep_alive;
+}
+
+std::string HttpSession::head_of_events() const {
+    return "HTTP/1.1 200 OK\r\nServer: " + shared_->site->product +
+           "\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n"
+           "X-Content-Type-Options: nosniff\r\n" +
+           (handshakes_ ? "Strict-Transport-Security: " + std::string(kStrictTransport) + "\r\n"
+                        : "") +
+           "Connection: close\r\n\r\n: panelgate\n\n";
 }
 
 /// Streams events until the client leaves or the server stops. A comment every 15 s keeps
@@ -346,10 +406,7 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
         wake_timer.cancel();
     });
     listener_ = listener;
-    std::string text =
-        "HTTP/1.1 200 OK\r\nServer: " + shared_->site->product +
-        "\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n"
-        "X-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n: panelgate\n\n";
+    std::string text = head_of_events();
     ErrorCode error;
     while (!error) {
         stream_.expires_after(time_to_read_);
@@ -376,7 +433,7 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
 /// would lose the reply.
 asio::awaitable<void> HttpSession::drain() {
     ErrorCode error;
-    stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, error);
+    stream_.shutdown_send();
     stream_.expires_after(kDrainTime);
     std::array<char, kReadSize> waste;
     for (std::size_t total = 0; !error && total < kDrainLimit;) {
@@ -418,8 +475,6 @@ void HttpSession::abandon() {
     close();
 }
 
-void HttpSession::close() {
-    if (stream_.socket().is_open()) stream_.close();
-}
+void HttpSession::close() { stream_.close(); }
 
 }  // namespace panelgate::web

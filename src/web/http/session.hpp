@@ -5,7 +5,6 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/string_body.hpp>
 #include <functional>
@@ -15,6 +14,8 @@
 
 #include "beast_message.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/tls/handshakes.hpp"
+#include "panelgate/tls/stream.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "shared.hpp"
 
@@ -23,10 +24,10 @@ namespace panelgate::web {
 /// Detects that a client has left while its request runs and the session does not read (P2). A
 /// half-closed client still gets its reply (P3) but looks the same, so it is probed now and then
 /// with bytes that clients skip; the system of one that has left answers with a reset. Owned
-/// together with the socket.
+/// together with the stream.
 class Departure {
   public:
-    Departure(boost::asio::ip::tcp::socket& socket, Duration grace);
+    Departure(tls::Stream& stream, Duration grace);
 
     /// `owner` owns this and the socket; kept until the socket is closed. `left` is called at most
     /// once, never from inside these calls.
@@ -44,7 +45,8 @@ class Departure {
     bool was_reset();
     void tell();
 
-    boost::asio::ip::tcp::socket& socket_;
+    tls::Stream& stream_;
+    boost::asio::ip::tcp::socket& socket_;  ///< its socket
     Duration grace_;
     boost::asio::steady_timer timer_;
     std::weak_ptr<void> owner_;
@@ -60,7 +62,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
   public:
     /// With `probes_only` it answers a single request, and only probes.
     HttpSession(boost::asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
-                std::shared_ptr<Caller> caller, bool probes_only);
+                std::shared_ptr<Caller> caller, bool probes_only,
+                std::shared_ptr<tls::Handshakes> handshakes);
 
     /// Serves until the client leaves, breaks the protocol or is idle for too long, or until
     /// stop().
@@ -79,7 +82,11 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     using Parser = boost::beast::http::request_parser<boost::beast::http::string_body>;
     using ErrorCode = boost::system::error_code;
 
+    boost::asio::awaitable<bool> secure();
     boost::asio::awaitable<ErrorCode> receive();
+    bool speaks_tls() const;
+    void take_certificate();
+    std::string head_of_events() const;
     boost::asio::awaitable<ErrorCode> receive_body();
     boost::asio::awaitable<bool> serve_one();
     boost::asio::awaitable<HttpResponse> answer(BeastRequest message);
@@ -93,8 +100,9 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     void send_interim();
     void close();
 
-    boost::beast::tcp_stream stream_;
+    tls::Stream stream_;
     std::shared_ptr<Shared> shared_;
+    std::shared_ptr<tls::Handshakes> handshakes_;  ///< null: plain HTTP
     std::shared_ptr<Caller> caller_;
     boost::asio::ip::address local_;  ///< local address
     const bool probes_only_;

@@ -10,10 +10,12 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "difference.hpp"
 #include "panelgate/config/describe.hpp"
+#include "panelgate/tls/issue.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 #include "running_line.hpp"
 #include "support/yaml_text.hpp"
@@ -31,10 +33,23 @@ std::string text_of(const fs::path& path) {
     return {std::istreambuf_iterator<char>(in), {}};
 }
 
-const config::MemoryFiles& files() {
-    static const config::MemoryFiles kFiles({{"/run/secrets/ops", "secret-0123456789"},
+config::MemoryFiles all_files() {
+    const tls::Issued ca = tls::issue_ca("CA", {0, 1});
+    const tls::Issued gateway = tls::issue_server(ca, {"gateway"}, {0, 1});
+    std::map<std::string, std::string> texts{{"/run/secrets/ops", "secret-0123456789"},
                                              {"/run/secrets/other", "other-0123456789"},
-                                             {"/profiles/own.yaml", text_of(kGeneric)}});
+                                             {"/profiles/own.yaml", text_of(kGeneric)}};
+    for (const std::string name : {"/tls/a", "/tls/b"}) {
+        texts[name + ".crt"] = gateway.certificate;
+        texts[name + ".key"] = gateway.key;
+        texts[name + "-ca.crt"] = ca.certificate;
+        texts[name + ".crl"] = tls::revoke(ca, "", gateway.certificate, {0, 1});
+    }
+    return config::MemoryFiles(std::move(texts));
+}
+
+const config::MemoryFiles& files() {
+    static const config::MemoryFiles kFiles = all_files();
     return kFiles;
 }
 
@@ -58,10 +73,11 @@ constexpr const char* kPlain = R"(lines:
         simulate: {dead: true}
         poll: [{read: "400001"}]
         points: [{name: p, at: "400001", type: u32}]
-modbus_tcp: [{listen: "127.0.0.1:502", framing: tcp}, {listen: "127.0.0.1:503"}]
+modbus_tcp: [{listen: "127.0.0.1:502", framing: tcp}, {listen: "127.0.0.1:503"},
+  {listen: "127.0.0.1:802", tls: {certificate: /tls/a.crt, key: /tls/a.key}}]
 serial_masters:
   - {name: plc, device: /dev/ttyS2, serial: {parity: odd}, rs485: {mode: rts}}
-http: {anonymous: none}
+http: {anonymous: none, tls: {certificate: /tls/a.crt, key: /tls/a.key}}
 mqtt: {broker: "mqtt://b:1883", topic: x, format: json}
 relays: [{from: a-1/400001, to: a-1/400101, on_change: true}]
 log: {level: warn, format: json}
@@ -93,12 +109,16 @@ modbus_tcp:
   - {listen: "127.0.0.1:502", lines: [a], framing: ascii, ascii_lower_case: take, broadcast: silent}
   - {listen: "127.0.0.1:503", retransmissions: join, units: {101: a/1, 102: a/1}}
   - {listen: "127.0.0.1:504", framing: rtu, broadcast: silent}
+  - {listen: "127.0.0.1:802", tls: {certificate: /tls/a.crt, key: /tls/a.key, ca: /tls/a-ca.crt,
+     client: required, crl: /tls/a.crl, min_version: TLSv1.2}}
 serial_masters:
   - {name: plc, device: /dev/ttyS2, lines: [a], units: {7: a/1}, access: read_write, framing: ascii,
      serial: {baud: 9600, data_bits: 7, parity: none, stop_bits: 1}, rs485: {mode: off},
      broadcast: silent, on_failure: silence, echo: auto, response_timeout: 2s}
   - {name: hmi, device: /dev/ttyS3, lines: [a], framing: rtu}
-http: {tokens: [{name: ops, role: operator, file: /run/secrets/ops}]}
+http:
+  tokens: [{name: ops, role: operator, file: /run/secrets/ops}]
+  tls: {certificate: /tls/a.crt, key: /tls/a.key, ca: /tls/a-ca.crt, client: optional}
 mqtt: {broker: "mqtts://b:8883", topic: x, qos: 1, client_id: x, username: x, store: 200,
        password_file: /run/secrets/ops, keep_alive: 60s, write: none, ca: /run/secrets/ops,
        certificate: /run/secrets/ops, key: /run/secrets/ops}
@@ -119,7 +139,8 @@ constexpr const char* kWords =
     "refuse read_only high_first master line station pass deny silent exception "
     "viewer operator warn json u16 i16 BADC UW120 GDT220 UB190 400009 400109 "
     "a-1/400209 panasonic-gt b 127.0.0.1:99 10.0.0.0/8 /dev/ttyS9 press/UW140 oven/GDT300 "
-    "a/2 floor1/20 /run/secrets/other /profiles ";
+    "a/2 floor1/20 /run/secrets/other /profiles /tls/b.crt /tls/b.key /tls/b-ca.crt /tls/b.crl "
+    "optional TLSv1.3 ";
 
 /// Alternative values, likely ones first.
 std::vector<std::string> others(const yaml::Node& value) {

@@ -19,6 +19,10 @@
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/settings.hpp"
 
+namespace panelgate::tls {
+class Context;
+struct Settings;
+}  // namespace panelgate::tls
 namespace panelgate::web {
 
 /// Limits of one request, and of the remembered writes with an Idempotency-Key.
@@ -89,7 +93,9 @@ class Server {
     void stop(Duration reading = 10s);
     /// Number of open connections; falls to 0 after stop().
     std::size_t connections() const;
-    const Counters& counters() const;
+    /// As HttpListener::renew().
+    void renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context);
+    Counters counters() const;
 
   private:
     std::shared_ptr<const Site> site_of(Settings settings,

@@ -13,6 +13,10 @@
 #include "panelgate/web/http/counters.hpp"
 #include "panelgate/web/http/message.hpp"
 
+namespace panelgate::tls {
+class Context;
+class Handshakes;
+}  // namespace panelgate::tls
 namespace panelgate::web {
 
 class HttpSession;
@@ -38,7 +42,9 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
     /// Closes everything; outstanding replies are not sent.
     void abandon();
     std::size_t connections() const { return sessions_.size(); }
-    const Counters& counters() const;
+    /// For connections to come: the same `tls`, whose files have changed. Ignored without TLS.
+    void renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context);
+    Counters counters() const;
 
   private:
     void take(boost::asio::ip::tcp::socket socket);
@@ -47,6 +53,7 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
 
     std::shared_ptr<Shared> shared_;
     rt::AccessList allowed_;
+    std::shared_ptr<tls::Handshakes> handshakes_;  ///< null: no TLS
     rt::Acceptor acceptor_;
     std::map<std::uint64_t, std::shared_ptr<HttpSession>> sessions_;  ///< by caller id
 };

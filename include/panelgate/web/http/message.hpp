@@ -7,6 +7,7 @@
 #include <initializer_list>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -36,6 +37,9 @@ class Caller {
     /// Sets what the current request has shown: the name of its token ("": none), its role, and
     /// where it came in.
     void identify(std::string token, Role role, std::string listener);
+    /// What its certificate says; `role`: the one in it, where the listener goes by that.
+    void certify(std::string subject, std::string word, std::optional<Role> role);
+    const std::optional<Role>& certificate_role() const { return certificate_role_; }
     /// Asks on behalf of another caller.
     void acts_for(const Caller& client) { who_ = client.who_; }
     /// True once the connection is over: no reply is wanted, and the site's objects may be gone.
@@ -79,6 +83,7 @@ class Caller {
     std::uint64_t id_;
     std::string address_;
     WhoRef who_;
+    std::optional<Role> certificate_role_{};
     bool left_ = false;
     bool hung_up_ = false;
     bool has_effect_ = false;

@@ -2,12 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "panelgate/base/network.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/who.hpp"
+#include "panelgate/tls/settings.hpp"
 
 namespace panelgate::web {
 
@@ -62,11 +64,14 @@ struct Settings {
     Duration request_timeout = 10s;  ///< to receive one request, and to send one answer
     /// How long after a half-close the client is first probed, and how long between probes.
     Duration half_close_grace = 2s;
+    std::optional<tls::Settings> tls{};  ///< HTTPS; none: plain
 
+    std::string scheme() const { return tls ? "https://" : "http://"; }
     std::string name() const { return endpoint_text(address, port); }
     /// True if `other` differs only in what can change without reopening the listener.
     bool is_same_listener(const Settings& other) const {
-        return address == other.address && port == other.port && ipv6_only == other.ipv6_only;
+        return address == other.address && port == other.port && ipv6_only == other.ipv6_only &&
+               tls.has_value() == other.tls.has_value();
     }
     friend bool operator==(const Settings&, const Settings&) = default;
 };

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <boost/asio/ip/address.hpp>
+#include <functional>
+#include <string>
+
+namespace panelgate::tls {
+
+class Stream;
+
+/// Whom a client believes, in PEM form: the server that has this very certificate, whatever its
+/// name and dates, or one that the CA has signed for the address.
+struct Trust {
+    std::string certificate;
+    std::string ca;
+};
+
+/// Makes a connected stream secure, from the client's side, in the loop: for programs that ask one
+/// server. `done` is called once with why it failed, "" if it did not. The stream outlives it.
+void connect(Stream& stream, const Trust& trust, const boost::asio::ip::address& server,
+             std::function<void(const std::string& why)> done);
+
+}  // namespace panelgate::tls

@@ -1,0 +1,247 @@
+#include "certificate_commands.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "load.hpp"
+#include "panelgate/config/real_files.hpp"
+#include "panelgate/tls/issue.hpp"
+
+namespace panelgate::app {
+namespace {
+
+/// The command line of `cert` as typed.
+struct CertificateOptions {
+    std::vector<std::string> names;  ///< of the certificate; of `revoke`, its file
+    std::string role;
+    std::string dir = ".";  ///< of the files, the CA's included
+    int days = 0;
+    bool force = false;  ///< replace files
+};
+
+constexpr mode_t kPublic = 0644;
+constexpr mode_t kSecret = 0600;
+
+tls::Validity validity_of(const CertificateOptions& options) {
+    return {seconds_since_1970(), options.days};
+}
+
+std::string in_folder(const CertificateOptions& options, const std::string& name) {
+    return options.dir.empty() || options.dir == "." ? name : options.dir + '/' + name;
+}
+
+ExitCode cannot(const std::string& what, const std::string& path, ExitCode code) {
+    std::cerr << "panelgate: cannot " << what << ' ' << path << ": " << std::strerror(errno)
+              << '\n';
+    return code;
+}
+
+/// Replaces a file in one step, so that a gateway that reads it meanwhile has the old one or the
+/// new.
+bool put(const std::string& path, const std::string& text, mode_t mode) {
+    const std::string fresh = path + ".new";
+    const int file = ::open(fresh.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode);
+    if (file < 0) return false;
+    const bool moded = ::fchmod(file, mode) == 0;
+    const bool written =
+        ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size());
+    const bool kept = ::fsync(file) == 0;
+    const bool closed = ::close(file) == 0;
+    return moded && written && kept && closed && std::rename(fresh.c_str(), path.c_str()) == 0;
+}
+
+/// Writes NAME.key and NAME.crt; says so.
+ExitCode write_pair(const CertificateOptions& options, const std::string& name,
+                    const tls::Issued& issued) {
+    const std::string key = in_folder(options, name + ".key");
+    const std::string certificate = in_folder(options, name + ".crt");
+    for (const std::string& path : {key, certificate}) {
+        if (options.force || ::access(path.c_str(), F_OK) != 0) continue;
+        std::cerr << "panelgate: " << path << " is there already; --force replaces it\n";
+        return kUnavailable;
+    }
+    if (!put(key, issued.key, kSecret)) return cannot("write", key, kUnavailable);
+    if (!put(certificate, issued.certificate, kPublic))
+        return cannot("write", certificate, kUnavailable);
+    std::cout << "wrote " << certificate << " and " << key << ", valid for " << options.days
+              << " days\n";
+    return kFine;
+}
+
+std::optional<tls::Issued> read_ca(const CertificateOptions& options, ExitCode& code) {
+    tls::Issued ca;
+    for (const auto& [name, into] :
+         {std::pair("ca.crt", &ca.certificate), std::pair("ca.key", &ca.key)}) {
+        const auto text = config::RealFiles::read_any(in_folder(options, name));
+        if (!text) {
+            std::cerr << "panelgate: cannot read the CA's " << in_folder(options, name)
+                      << "; `panelgate cert new-ca` makes it, --dir says where it is\n";
+            code = kNoInput;
+            return std::nullopt;
+        }
+        *into = *text;
+    }
+    return ca;
+}
+
+/// A file's name of a certificate's: letters, digits, '.', '-' and '_'.
+std::string file_name(std::string name) {
+    std::ranges::replace_if(
+        name,
+        [](unsigned char c) { return std::isalnum(c) == 0 && c != '.' && c != '-' && c != '_'; },
+        '-');
+    return name;
+}
+
+template <class Make>
+ExitCode with_ca(const CertificateOptions& options, const Make& make) try {
+    ExitCode code = kFine;
+    const auto ca = read_ca(options, code);
+    return ca ? make(*ca) : code;
+} catch (const tls::CannotIssue& why) {
+    std::cerr << "panelgate: " << why.what() << '\n';
+    return kUnavailable;
+}
+
+ExitCode new_certificate_authority(const CertificateOptions& options) try {
+    const std::string name = options.names.empty() ? "Plant CA" : options.names.front();
+    const ExitCode code = write_pair(options, "ca", tls::issue_ca(name, validity_of(options)));
+    if (code == kFine)
+        std::cout << "Keep ca.key on a machine that is kept safe, and a copy of it: it signs all "
+                     "others. No gateway needs it.\n"
+                     "ca.crt goes to every gateway (`tls: ca`) and to every client, as the CA that "
+                     "it trusts.\n";
+    return code;
+} catch (const tls::CannotIssue& why) {
+    std::cerr << "panelgate: " << why.what() << '\n';
+    return kUnavailable;
+}
+
+ExitCode new_server_certificate(const CertificateOptions& options) {
+    return with_ca(options, [&](const tls::Issued& ca) {
+        const std::string name = file_name(options.names.front());
+        const ExitCode code =
+            write_pair(options, name, tls::issue_server(ca, options.names, validity_of(options)));
+        if (code == kFine)
+            std::cout
+                << "Both go to the gateway, readable by its user alone (chown panelgate, chmod "
+                   "600 the key):\n  tls: {certificate: /etc/panelgate/tls/"
+                << name << ".crt, key: /etc/panelgate/tls/" << name
+                << ".key, ca: /etc/panelgate/tls/ca.crt, client: required}\n";
+        return code;
+    });
+}
+
+ExitCode new_client_certificate(const CertificateOptions& options) {
+    return with_ca(options, [&](const tls::Issued& ca) {
+        std::optional<std::string> role;
+        if (!options.role.empty()) role = options.role;
+        const ExitCode code =
+            write_pair(options, file_name(options.names.front()),
+                       tls::issue_client(ca, options.names.front(), role, validity_of(options)));
+        if (code == kFine)
+            std::cout << "Both go to the client, with ca.crt as the CA that it trusts. "
+                      << (role ? "Its role is " + *role
+                               : std::string("It has no role, so it only reads"))
+                      << " where a gateway has `role_from: certificate`.\n";
+        return code;
+    });
+}
+
+ExitCode revoke_certificate(const CertificateOptions& options) {
+    return with_ca(options, [&](const tls::Issued& ca) {
+        const auto given = config::RealFiles::read_any(options.names.front());
+        if (!given) return cannot("read", options.names.front(), kNoInput);
+        const std::string path = in_folder(options, "crl.pem");
+        const auto former = config::RealFiles::read_any(path);
+        const std::string list = tls::revoke(ca, former.value_or(""), *given, validity_of(options));
+        if (!put(path, list, kPublic)) return cannot("write", path, kUnavailable);
+        std::cout << "wrote " << path
+                  << "\nIt goes to every gateway (`tls: crl`), which takes it without a restart; "
+                     "connections that are open stay open until they end.\n";
+        return kFine;
+    });
+}
+
+constexpr const char* kFooter =
+    "Files are written to --dir: NAME.crt (public) and NAME.key (secret, readable by you alone).\n"
+    "\n"
+    "  panelgate cert new-ca                              once, on a machine that is kept safe\n"
+    "  panelgate cert new-server gateway.plant 10.0.0.5   one a gateway, all its names and "
+    "addresses\n"
+    "  panelgate cert new-client scada --role operator    one a client\n"
+    "  panelgate cert revoke scada.crt                    no longer valid: writes crl.pem\n"
+    "\n"
+    "Exit codes: 0 fine; 64 usage; 66 a file cannot be read; 69 it cannot be written, or used.";
+
+struct Adder {
+    CLI::App& cert;
+    ExitCode& code;
+
+    CLI::App* add(const char* name, const char* about, int days,
+                  const std::shared_ptr<CertificateOptions>& typed) const {
+        CLI::App* command = cert.add_subcommand(name, about);
+        typed->days = days;
+        command->add_option("--dir", typed->dir, "folder of the files, those of the CA included")
+            ->capture_default_str();
+        command->add_option("--days", typed->days, "how long it is valid")
+            ->check(CLI::Range(1, 36500))
+            ->capture_default_str();
+        command->add_flag("--force", typed->force, "replace files that are there");
+        return command;
+    }
+    void on_call(CLI::App* command, ExitCode (*run)(const CertificateOptions&),
+                 const std::shared_ptr<CertificateOptions>& typed) const {
+        command->callback([&into = code, run, typed] { into = run(*typed); });
+    }
+};
+
+}  // namespace
+
+void add_certificate_commands(CLI::App& cli, ExitCode& code) {
+    CLI::App* cert =
+        cli.add_subcommand("cert", "make certificates: a CA, the gateway's, those of clients");
+    cert->require_subcommand(1);
+    cert->footer(kFooter);
+    const Adder adder{*cert, code};
+
+    auto ca = std::make_shared<CertificateOptions>();
+    ca->names = {"Plant CA"};
+    CLI::App* new_ca = adder.add("new-ca", "the plant's CA: ca.crt and ca.key", 3650, ca);
+    new_ca->add_option("NAME", ca->names, "its name")->expected(0, 1);
+    adder.on_call(new_ca, new_certificate_authority, ca);
+
+    auto server = std::make_shared<CertificateOptions>();
+    CLI::App* new_server = adder.add("new-server", "a gateway's certificate", 825, server);
+    new_server->add_option("NAME", server->names, "its host names and IP addresses")->required();
+    adder.on_call(new_server, new_server_certificate, server);
+
+    auto client = std::make_shared<CertificateOptions>();
+    CLI::App* new_client = adder.add("new-client", "a client's certificate", 825, client);
+    new_client->add_option("NAME", client->names, "its name")->required()->expected(1);
+    new_client->add_option("--role", client->role,
+                           "viewer, operator, engineer or admin, or another word that the rules of "
+                           "`access` know; without: it only reads");
+    adder.on_call(new_client, new_client_certificate, client);
+
+    auto lost = std::make_shared<CertificateOptions>();
+    CLI::App* revoke =
+        adder.add("revoke", "add a certificate to the list of revoked ones, crl.pem", 365, lost);
+    revoke->add_option("FILE", lost->names, "the certificate")->required()->expected(1);
+    adder.on_call(revoke, revoke_certificate, lost);
+}
+
+}  // namespace panelgate::app

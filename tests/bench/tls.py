@@ -1,0 +1,134 @@
+#!/usr/bin/env python3
+"""tls.py: what TLS costs. Memory of 1024 connections, a plain client's latency and a line's use under
+a flood of handshakes, CPU of a transaction beside a plain one. Prints one figure a line.
+
+PANELGATE=build/release/panelgate python3 -B tests/bench/tls.py
+"""
+import contextlib
+import os
+import pathlib
+import resource
+import ssl
+import statistics
+import subprocess
+import sys
+import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "system"))
+# pylint: disable=wrong-import-position
+import harness
+from config import FREE_PORT, gateway, line
+from harness import read_registers
+from tls_plant import SecureClient, plant
+
+TRANSACTIONS = int(os.environ.get("TLS_TRANSACTIONS", "3000"))
+SECONDS = int(os.environ.get("TLS_SECONDS", "10"))
+READ = read_registers(0, 10)
+
+
+def cpu_seconds(program):
+    fields = pathlib.Path(f"/proc/{program.process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def memory_kib(program):
+    text = pathlib.Path(f"/proc/{program.process.pid}/status").read_text()
+    return int(text.split("VmRSS:")[1].split()[0])
+
+
+def say(what, figure, unit):
+    print(f"{what:58s} {figure:10.2f} {unit}", flush=True)
+
+
+@contextlib.contextmanager
+def served(made):
+    """A plain listener and one with TLS, on one line of 115200 baud."""
+    many = f"{FREE_PORT}, max_connections_per_address: 4096, max_connections: 4096"
+    text = gateway(line(baud=115200), modbus=many).replace(
+        "modbus_tcp: [", f"modbus_tcp: [{{{many}, {made.tls('required', role_from='certificate')}}}, ")
+    (made.folder / "bench.yaml").write_text(text)
+    with harness.Program("run", "-c", made.path("bench.yaml")) as program:
+        program.http_port()
+        yield program, program.modbus_port(1), program.modbus_port(2)
+
+
+def latencies(client, seconds):
+    found = []
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        begun = time.perf_counter()
+        client.ask(31, READ)
+        found.append((time.perf_counter() - begun) * 1000)
+    return found
+
+
+def show(what, found):
+    found.sort()
+    say(what + ", median", statistics.median(found), "ms")
+    say(what + ", 99 %", found[int(len(found) * 0.99)], "ms")
+    say(what + ", transactions a second", len(found) / SECONDS, "1/s")
+
+
+def memory(made):
+    with served(made) as (program, secure, plain):
+        context = made.context("scada")
+        for kind, port in (("plain", plain), ("TLS", secure)):
+            before = memory_kib(program)
+            with contextlib.ExitStack() as stack:
+                for _ in range(1024):
+                    client = (SecureClient(port, context) if kind == "TLS" else harness.Client(port))
+                    stack.enter_context(client)
+                    client.ask(255, READ)
+                say(f"memory of 1024 {kind} connections", (memory_kib(program) - before) / 1024, "MiB")
+
+
+def flood(made):
+    with served(made) as (program, secure, plain), harness.Client(plain) as client:
+        latencies(client, 1)
+        show("plain client alone", latencies(client, SECONDS))
+        command = ["openssl", "s_time", "-connect", f"127.0.0.1:{secure}", "-new", "-time",
+                   str(SECONDS + 4), "-cert", made.path("scada.crt"), "-key", made.path("scada.key")]
+        floods = [subprocess.Popen(["nice", "-n19", *command], stdout=subprocess.PIPE,
+                                   stderr=subprocess.DEVNULL, text=True) for _ in range(2)]
+        latencies(client, 1)
+        begun = cpu_seconds(program)
+        show("under a flood of handshakes", latencies(client, SECONDS))
+        say("CPU of the gateway meanwhile", (cpu_seconds(program) - begun) / SECONDS * 100, "%")
+        for one in floods:
+            one.wait()
+        text = program.get("/metrics")[1]
+        done = sum(float(l.rsplit(" ", 1)[1]) for l in text.splitlines()
+                   if l.startswith("panelgate_tls_handshakes_total"))
+        say("handshakes a second", done / (SECONDS + 4), "1/s")
+
+
+def transactions(made):
+    with served(made) as (program, secure, plain):
+        used = {}
+        with SecureClient(secure, made.context("scada")) as safe, harness.Client(plain) as open_one:
+            for _ in range(2):
+                for kind, client in (("plain", open_one), ("TLS", safe)):
+                    begun = cpu_seconds(program)
+                    for _ in range(TRANSACTIONS):
+                        client.ask(31, READ)
+                    used[kind] = (cpu_seconds(program) - begun) / TRANSACTIONS * 1e6
+        say("CPU a transaction, plain", used["plain"], "us")
+        say("CPU a transaction, TLS", used["TLS"], "us")
+        say("difference", used["TLS"] - used["plain"], "us")
+        for kind, client in (("plain", harness.Client(plain)),
+                             ("TLS", SecureClient(secure, made.context("scada")))):
+            with client:
+                show(f"115200 baud, {kind}", latencies(client, SECONDS))
+
+
+def main():
+    resource.setrlimit(resource.RLIMIT_NOFILE, (resource.getrlimit(resource.RLIMIT_NOFILE)[1],) * 2)
+    print(f"OpenSSL of the client: {ssl.OPENSSL_VERSION}")
+    with plant() as made:
+        for one in (memory, flood, transactions):
+            if len(sys.argv) < 2 or one.__name__ in sys.argv[1:]:
+                one(made)
+
+
+if __name__ == "__main__":
+    main()
