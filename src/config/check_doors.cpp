@@ -306,7 +306,17 @@ void warn_of_anonymous(Loading& loading, const Node& node, const web::Settings& 
                                instead);
 }
 
+/// Probes show no certificate.
+void warn_of_required_certificates(Loading& loading, const Node& node, const web::Settings& http) {
+    if (!http.tls || http.tls->client != tls::ClientCertificate::required) return;
+    loading.warn(
+        mark_of(node, "tls"),
+        "client: required shuts out probes and `panelgate health`, which have no "
+        "certificate; client: optional with anonymous: none lets only them in without one");
+}
+
 void warn_of_http(Loading& loading, const Node& node, const web::Settings& http) {
+    warn_of_required_certificates(loading, node, http);
     warn_of_health(loading, node, http);
     warn_of_plain_tokens(loading, node, http);
     warn_of_anonymous(loading, node, http);

@@ -44,7 +44,7 @@ def say(what, figure, unit):
 def served(made):
     """A plain listener and one with TLS, on one line of 115200 baud."""
     many = f"{FREE_PORT}, max_connections_per_address: 4096, max_connections: 4096"
-    text = gateway(line(baud=115200), modbus=many).replace(
+    text = gateway(line(stations="{id: 31, name: press, profile: generic}", baud=115200), modbus=many).replace(
         "modbus_tcp: [", f"modbus_tcp: [{{{many}, {made.tls('required', role_from='certificate')}}}, ")
     (made.folder / "bench.yaml").write_text(text)
     with harness.Program("run", "-c", made.path("bench.yaml")) as program:

@@ -1,6 +1,8 @@
 """TLS: who gets in with which certificate, what is spoken, what broken handshakes cost, and
 certificates that are replaced under load."""
+import asyncio
 import http.client
+import importlib.util
 import itertools
 import os
 import re
@@ -122,6 +124,30 @@ class ByCertificate(Tls):
             program.log.wait_for("connection closed .*it speaks TLS; write http://")
 
 
+@unittest.skipUnless(importlib.util.find_spec("pymodbus"), "no pymodbus here")
+class Pymodbus(Tls):
+    def test_its_tls_client_reads_and_writes_by_its_role(self):
+        with served(self.made, self.made.tls("required", role_from="certificate")) as program:
+            for name, may in (("scada", True), ("panel", False)):
+                asyncio.run(self.ask(program.modbus_port(), name, may))
+
+    async def ask(self, port, name, may):
+        """By its asynchronous client: the other one waits for a socket whose bytes OpenSSL has."""
+        from pymodbus.client import AsyncModbusTlsClient  # pylint: disable=import-outside-toplevel
+        client = AsyncModbusTlsClient("127.0.0.1", port=port, sslctx=self.made.context(name),
+                                      server_hostname="localhost", framer=self.framer())
+        await client.connect()
+        self.assertEqual(len((await client.read_holding_registers(0, 2, slave=31)).registers), 2)
+        self.assertEqual((await client.write_register(100, 5, slave=31)).isError(), not may)
+        await client.close()
+
+    @staticmethod
+    def framer():
+        """Modbus/TCP Security keeps the MBAP header; pymodbus' own framer for TLS leaves it out."""
+        from pymodbus.framer.socket_framer import ModbusSocketFramer
+        return ModbusSocketFramer
+
+
 class Https(Tls):
     def test_rest_page_events_and_hsts(self):
         with served(self.made, http=self.made.tls()) as program:
@@ -171,6 +197,20 @@ class Https(Tls):
                     done = harness.run("health", *at)
             self.assertEqual(done.returncode, 1)
             self.assertIn("cannot be trusted", done.stderr)
+
+    def test_the_role_in_a_certificate_is_as_a_tokens(self):
+        tls = self.made.tls("optional", role_from="certificate")
+        path = "/api/v1/stations/press/holding-registers/100"
+        with served(self.made, http=tls, anonymous="none") as program:
+            def put(name):
+                return get(program.http_port(), path, self.made.context(name), "PUT",
+                           '{"values":[5]}', {"Content-Type": "application/json"})[0]
+
+            def read(name):
+                return get(program.http_port(), "/api/v1/stations", self.made.context(name))[0]
+            self.assertEqual([read("scada"), read("panel"), read("nobody"), read(None)],
+                             [200, 200, 401, 401])
+            self.assertEqual([put("scada"), put("panel"), put("nobody")], [200, 401, 401])
 
     def test_curl_and_openssl_are_served(self):
         with served(self.made, http=self.made.tls("optional")) as program:
@@ -350,6 +390,7 @@ class Checked(Tls):
     def test_check_judges_mode_match_dates_names_and_extension(self):
         with plant() as own:
             self.assertEqual(self.check(own, own.tls()).returncode, 0)
+            self.assertIn("shuts out probes", self.check(own, own.tls("required")).stderr)
             os.chmod(own.path("localhost.key"), 0o644)
             self.assertIn("every user of this machine can read the key",
                           self.check(own, own.tls()).stderr)

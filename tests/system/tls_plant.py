@@ -82,10 +82,10 @@ def plant():
 
 
 @contextlib.contextmanager
-def served(made, modbus="", http="", **keys):
+def served(made, modbus="", http="", anonymous="operator", **keys):
     """A gateway with these keys of `tls` at its listeners; "" is a plain one."""
     text = gateway(line(), modbus=FREE_PORT + (", " + modbus if modbus else ""),
-                   http=FREE_PORT + ", anonymous: operator" + (", " + http if http else ""), **keys)
+                   http=f"{FREE_PORT}, anonymous: {anonymous}" + (", " + http if http else ""), **keys)
     (made.folder / "panelgate.yaml").write_text(text)
     with harness.Program("run", "-c", made.path("panelgate.yaml")) as program:
         program.http_port()

@@ -4,8 +4,10 @@
 
 #include <boost/asio/io_context.hpp>
 #include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -240,6 +242,36 @@ TEST_F(DispatchTest, OnlyAWriteIsBroadcastAndOnlyWhereAllMayBeWritten) {
     settings.lines = {"b"};
     settings.broadcast = BroadcastMode::deny;  // then no request to all is looked at
     expect_decided({{0, kWrite, "refused 01"}, {0, kBroken, "refused 01"}, {3, kWrite, "to b/3"}});
+}
+
+TEST_F(DispatchTest, WhoOnlyReadsWritesNothingAndNeedsNoOtherRight) {
+    const UnitMap units(settings, lines);
+    const auto is_refused = [&](std::uint8_t unit, const Bytes& pdu) {
+        return std::holds_alternative<Refuse>(decide(unit, pdu, settings, units, true));
+    };
+    EXPECT_TRUE(is_refused(1, kWrite));
+    EXPECT_TRUE(is_refused(0, kWrite));
+    EXPECT_FALSE(is_refused(1, kRead));
+}
+
+// The role in a client's certificate, with `role_from: certificate` (SEC-05).
+TEST(Caller, ReadsOnlyUnlessItsCertificateSaysMore) {
+    const auto certified = [](std::optional<std::string> role) {
+        Caller caller("10.0.0.7:1", make_who({.name = "modbus_tcp 10.0.0.7:1",
+                                              .address = "10.0.0.7",
+                                              .role = Role::operator_}));
+        caller.certify("CN=panel", std::move(role));
+        EXPECT_EQ(caller.who()->certificate, "CN=panel");
+        return caller;
+    };
+    for (const char* role : {"", "viewer", "cook", "Operator"})
+        EXPECT_TRUE(certified(role).reads_only()) << role;
+    for (const char* role : {"operator", "engineer", "admin"})
+        EXPECT_FALSE(certified(role).reads_only()) << role;
+    EXPECT_FALSE(certified(std::nullopt).reads_only());
+    EXPECT_EQ(certified("cook").who()->certificate_role, "cook");
+    EXPECT_EQ(certified("cook").who()->role, Role::none);
+    EXPECT_EQ(certified(std::nullopt).who()->role, Role::operator_);
 }
 
 }  // namespace

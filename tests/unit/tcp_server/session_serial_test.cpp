@@ -279,5 +279,14 @@ TEST_P(AnyListener, AnHttpClientIsClosedAndNamedInTheLog) {
     EXPECT_TRUE(bus1.seen.empty());
 }
 
+TEST_P(AnyListener, ATlsClientIsClosedAndNamedInTheLog) {
+    settings.framing = GetParam();
+    Client client = connect();
+    client.send("16 03 01 00 2c 01 00 00 28 03 03"_hex + Bytes(38, 0x5A));
+    EXPECT_TRUE(client.sees_close());
+    EXPECT_EQ(log.count("it speaks TLS and needs a listener with tls"), 1U);
+    EXPECT_TRUE(bus1.seen.empty());
+}
+
 }  // namespace
 }  // namespace panelgate::tcp_server::session_serial_test
