@@ -1,7 +1,6 @@
 """docs/reference/cli.md: the commands, of what `PROGRAM help` prints."""
 import pathlib
 import re
-import subprocess
 
 import manual
 from tables import page, table
@@ -11,7 +10,7 @@ PAGE_1 = pathlib.Path(__file__).resolve().parent / "panelgate.1.in"
 
 def groups(program):
     """[(title, [(command, what it does)])], and the examples, as `help` lists them."""
-    text = subprocess.run([*program, "help"], check=True, capture_output=True, text=True).stdout
+    text = manual.listed(program)
     found, examples = [], []
     for part in text.strip().split("\nOptions:")[1].split("\n\n")[1:]:
         title, *lines = part.strip("\n").split("\n")
@@ -43,7 +42,8 @@ def about(command):
     entries = [(left, right) for left, right in command.entries if "--help" not in left]
     if entries:
         lines += table(("option or word", "what it is"), [(f"`{left}`", right) for left, right in entries])
-    return lines + ([" ".join(command.notes), ""] if command.notes else [])
+    lines += [" ".join(command.notes), ""] if command.notes else []
+    return lines + (["```text", *command.examples, "```", ""] if command.examples else [])
 
 
 def text(program):

@@ -17,22 +17,27 @@ EXAMPLE = HERE.parents[1] / "config/minimal.yaml"
 REFERENCE = HERE.parents[1] / "docs/reference/configuration.md"
 ENTRY = re.compile(r"^  (\S.*?)(?:\s{2,}(\S.*))?$")
 COLUMN = " " * 30
-OF_FILES = ("-c", "--config", "--profiles", "--diff", "--token-file", "-o", "--output")  # their value
+COMMAND_COLUMN = " " * 14
+OF_FILES = ("-c", "--config", "--profiles", "--diff", "--token-file", "-o", "--output", "--check")  # their value
 
 
 class Command:
-    """What `help COMMAND` prints: what it does, its usage, [(option or word, what it is)], notes."""
+    """What `help COMMAND` prints: what it does, its usage, [(option or word, what it is)], examples, notes."""
 
     def __init__(self, name, text):
         self.name = name
         lines = text.splitlines()
-        self.about = lines[0]
-        self.usage = next(line for line in lines if line.startswith("Usage: ")).split()[3:]
-        self.entries, self.notes = [], []
-        inside = False
-        for line in lines[2:]:
-            if line.endswith(":") and not line.startswith(" "):
-                inside = True
+        at = next(i for i, line in enumerate(lines) if line.startswith("Usage: "))
+        self.about = " ".join(lines[:at]).strip()
+        self.usage = lines[at].split()[3:]
+        self.entries, self.examples, self.notes = [], [], []
+        inside = shown = False
+        for line in lines[at + 1:]:
+            if re.match(r"\w+:$", line):
+                shown = line.startswith("Example")
+                inside = not shown
+            elif shown and line.startswith("  "):
+                self.examples.append(line.strip())
             elif inside and line.startswith(COLUMN) and self.entries:
                 left, right = self.entries[-1]
                 self.entries[-1] = (left, f"{right} {line.strip()}".strip())
@@ -51,13 +56,19 @@ class Command:
                 yield names.split(","), (words[1].split(",") if words else []) if rest else None
 
 
+def listed(program):
+    """What `help` prints, a command a line."""
+    text = subprocess.run([*program, "help"], check=True, capture_output=True, text=True).stdout
+    return re.sub(rf"\n{COMMAND_COLUMN}(?=\S)", " ", text)
+
+
 def asked(program):
     def run(*words):
         return subprocess.run([*program, "help", *words], check=True, capture_output=True,
                               text=True).stdout
-    listed = run().split("\nExamples:")[0].split("\nOptions:")[1].split("\n\n", 1)[1]
-    names = re.findall(r"(?m)^  (\S+)", listed)
-    about = {name: re.search(rf"(?m)^  {name}\s+(.*)$", listed)[1] for name in names}
+    commands = listed(program).split("\nExamples:")[0].split("\nOptions:")[1].split("\n\n", 1)[1]
+    names = re.findall(r"(?m)^  (\S+)", commands)
+    about = {name: re.search(rf"(?m)^  {name}\s+(.*)$", commands)[1] for name in names}
     return [Command(name, run(name)) for name in names if name not in ("help", "version")], about
 
 
@@ -98,6 +109,8 @@ def section(command):
         lines.append(".El")
     if command.notes:
         lines += [".Pp", prose(" ".join(command.notes))]
+    if command.examples:
+        lines += [".Bd -literal -offset indent", *map(mdoc, command.examples), ".Ed"]
     return lines
 
 

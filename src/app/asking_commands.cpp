@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <memory>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -19,13 +20,13 @@ constexpr const char* kPlace =
     "in one word with the station: oven/temperature";
 constexpr const char* kExitCodes =
     "Exit codes: 0 fine; 1 the gateway refuses, or there is no such place; 64 usage; 66 the token "
-    "file\ncannot be read; 69 no gateway answers.";
+    "file cannot be read; 69 no gateway answers.";
 
 /// What one command has typed: lives as long as its App.
 struct Typed {
     GatewayOptions at;
     std::string station;
-    std::string place;
+    std::optional<std::string> place;
     std::vector<std::string> more;
     std::string type;
     std::string order;
@@ -36,9 +37,9 @@ struct Typed {
     bool once = false;
 
     std::vector<std::string> words() const {
-        std::vector<std::string> all{station, place};
-        all.insert(all.end(), more.begin(), more.end());
-        std::erase(all, "");
+        std::vector<std::string> all{station};
+        if (place) all.push_back(*place);
+        all.insert(all.end(), more.begin(), more.end());  // an empty text is a value
         return all;
     }
 };
@@ -101,8 +102,7 @@ void add_read(Adder& adder) {
         ->check(CLI::IsMember({"text", "json"}));
     command->footer(
         "Exit codes: 0 it is read; 1 the gateway refuses, the panel does not answer, or a point "
-        "has "
-        "no\ncurrent value; 64 usage; 66 the token file cannot be read; 69 no gateway answers.");
+        "has no current value; 64 usage; 66 the token file cannot be read; 69 no gateway answers.");
     adder.on_call(command, [typed] {
         return read(typed->at, {.words = typed->words(),
                                 .type = typed->type,
@@ -121,7 +121,7 @@ void add_write(Adder& adder) {
                         "follow each other");
     command->footer(
         "Exit codes: 0 the panel has confirmed it; 1 refused, or not confirmed: the message says "
-        "whether\nit was transmitted; 64 usage; 66 the token file cannot be read; 69 no gateway "
+        "whether it was transmitted; 64 usage; 66 the token file cannot be read; 69 no gateway "
         "answers.");
     adder.on_call(command, [typed] {
         return write(typed->at,
@@ -134,13 +134,14 @@ void add_watch(Adder& adder) {
     CLI::App* command =
         adder.add("watch", "print a line whenever a value of a panel changes", typed);
     adder.add_place(command, typed);
-    command->add_option("MORE", typed->more, "further places, or stations with theirs");
+    command->add_option("MORE", typed->more,
+                        "further places of the station, or further stations, each with its places");
     command->add_option("--count", typed->count, "end after so many lines")
         ->check(from_1_to(1'000'000'000));
     command->footer(
         "Points are printed as the gateway polls them, other places are read once a second. Times "
         "are UTC.\nCtrl-C ends it with 0. Other exit codes: 1 the gateway refuses, or there is no "
-        "such place; 64 usage;\n66 the token file cannot be read; 69 no gateway answers.");
+        "such place; 64 usage; 66 the token file cannot be read; 69 no gateway answers.");
     adder.on_call(command, [typed] {
         return watch(typed->at, {.words = typed->words(),
                                  .type = typed->type,
@@ -155,8 +156,7 @@ void add_status(Adder& adder) {
         adder.add("status", "say how lines and stations are, and what is not well", typed);
     command->footer(
         "Exit codes: 0 all is well; 1 a line, a station, a relay or a listener is not, or there "
-        "are "
-        "findings;\n64 usage; 66 the token file cannot be read; 69 no gateway answers.");
+        "are findings; 64 usage; 66 the token file cannot be read; 69 no gateway answers.");
     adder.on_call(command, [typed] { return status(typed->at); });
     const auto shown = std::make_shared<Typed>();
     command = adder.add("top", "show load, clients and slow panels, each second anew", shown);
@@ -188,7 +188,7 @@ void add_report(Adder& adder) {
     command->footer(
         "The file is JSON: configuration without secrets, state, findings, incidents, traces, "
         "metrics.\nExit codes: 0 it is written; 1 the gateway refuses; 64 usage, or the file is "
-        "there; 66 the token file\ncannot be read; 69 no gateway answers; 70 the file cannot be "
+        "there; 66 the token file cannot be read; 69 no gateway answers; 70 the file cannot be "
         "written.");
     adder.on_call(command, [typed] { return report(typed->at, typed->file); });
 }

@@ -177,14 +177,9 @@ ExitCode revoke_certificate(const CertificateOptions& options) {
 }
 
 constexpr const char* kFooter =
+    "new-ca once, on a machine that is kept safe; new-server one a gateway, with all its names and "
+    "addresses; new-client one a client.\n"
     "Files are written to --dir: NAME.crt (public) and NAME.key (secret, readable by you alone).\n"
-    "\n"
-    "  panelgate cert new-ca                              once, on a machine that is kept safe\n"
-    "  panelgate cert new-server gateway.plant 10.0.0.5   one a gateway, all its names and "
-    "addresses\n"
-    "  panelgate cert new-client scada --role operator    one a client\n"
-    "  panelgate cert revoke scada.crt                    no longer valid: writes crl.pem\n"
-    "\n"
     "Exit codes: 0 fine; 64 usage; 66 a file cannot be read; 69 it cannot be written, or used.";
 
 struct Adder {

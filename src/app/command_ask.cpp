@@ -1,4 +1,6 @@
 // read and write: one question to a running gateway.
+#include <algorithm>
+#include <cstddef>
 #include <iostream>
 #include <string>
 #include <utility>
@@ -6,6 +8,7 @@
 
 #include "commands.hpp"
 #include "gateway_client.hpp"
+#include "output.hpp"
 
 namespace panelgate::app {
 
@@ -26,16 +29,6 @@ std::string query_of(const ReadOptions& options) {
     add("order", options.order);
     add("count", options.count == 0 ? "" : std::to_string(options.count));
     return query;
-}
-
-/// Type and order of a point are its configuration's.
-bool may_have_type(const GatewayPlace& place, bool is_given) {
-    if (place.target.kind != cli::PlaceKind::point || !is_given) return true;
-    std::cerr
-        << "panelgate: " << place.target.shown
-        << " is a point, which has its type and order in the configuration: leave out --type, "
-           "--order and --count\n";
-    return false;
 }
 
 }  // namespace
@@ -81,6 +74,9 @@ ExitCode write(const GatewayOptions& at, const WriteOptions& options) {
     const auto place = find_place(*gateway, places.list.front(), code);
     if (!place) return code;
     if (!may_have_type(*place, !options.type.empty() || !options.order.empty())) return kUsage;
+    if (place->target.kind == cli::PlaceKind::point && values.size() > 1)
+        return wrong_usage(place->target.shown + " is a point, which takes one value, not " +
+                           std::to_string(values.size()));
     const std::string typed = place->type.empty() ? options.type : place->type;
     const std::string json = cli::json_of_values(values, typed == "string");
     if (json.empty()) return wrong_usage("a decimal number is written with a point, such as 21.5");
@@ -93,7 +89,7 @@ ExitCode write(const GatewayOptions& at, const WriteOptions& options) {
     if (!answer.is_ok()) return explain_place(*gateway, *place, answer, "written");
     std::string shown;
     for (const std::string& value : values) shown += (shown.empty() ? "" : " ") + value;
-    std::cout << cli::written_text(place->target.shown, shown, answer.json);
+    print_done(cli::written_text(place->target.shown, shown, answer.json));
     return cli::is_confirmed(answer.json) ? kFine : kNotReady;
 }
 

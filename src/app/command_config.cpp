@@ -211,6 +211,14 @@ boost::json::object to_json(const yaml::KeyShape& key) {
     return made;
 }
 
+/// "; did you mean 'lines.timing'?" or "".
+std::string nearest_key(const std::string& path) {
+    std::vector<std::string_view> paths;
+    for (const yaml::KeyShape& key : config::describe().keys) paths.push_back(key.path);
+    const std::string near = nearest(path, paths);
+    return near.empty() ? "" : "; did you mean '" + shown_path(near) + "'?";
+}
+
 }  // namespace
 
 ExitCode config_keys(const std::string& typed, bool as_json) {
@@ -220,8 +228,8 @@ ExitCode config_keys(const std::string& typed, bool as_json) {
         return !path.empty() && key.path != path && !key.path.starts_with(path + '/');
     });
     if (keys.empty()) {
-        std::cerr << "panelgate: there is no key '" << typed
-                  << "'; `panelgate config keys` lists all\n";
+        std::cerr << "panelgate: there is no key '" << typed << '\'' << nearest_key(path)
+                  << "; `panelgate config keys` lists all\n";
         return kUsage;
     }
     if (as_json) {

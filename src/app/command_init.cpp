@@ -1,9 +1,13 @@
 #include <unistd.h>
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <iostream>
+#include <string>
+#include <string_view>
 
 #include "commands.hpp"
 #include "panelgate/scan/report.hpp"
@@ -45,7 +49,23 @@ bool write(const OutputFile& output, const std::string& text) {
     std::FILE* file = std::fopen(output.file.c_str(), output.force ? "w" : "wx");
     const bool written = file != nullptr && std::fputs(text.c_str(), file) >= 0;
     const bool closed = file != nullptr && std::fclose(file) == 0;
+    const int why = errno;
+    const bool is_part = file != nullptr && !(written && closed);
+    if (is_part && !output.force) ::unlink(output.file.c_str());
+    errno = why;
     return written && closed;
+}
+
+/// `text` as one word of a shell.
+std::string shell_word(const std::string& text) {
+    const auto is_plain = [](char c) {
+        return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+               std::string_view("/._-+,:=@%").find(c) != std::string_view::npos;
+    };
+    if (!text.empty() && std::ranges::all_of(text, is_plain)) return text;
+    std::string word = "'";
+    for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
+    return word + '\'';
 }
 
 }  // namespace
@@ -69,8 +89,8 @@ ExitCode init(const ScanOptions& options, const OutputFile& output) {
         return cannot_write(output);
     else
         std::cerr << "panelgate: wrote " << output.file << " with "
-                  << outcome.result->stations.size() << " station(s); run -c " << output.file
-                  << " runs it\n";
+                  << outcome.result->stations.size() << " station(s); to run it: panelgate run -c "
+                  << shell_word(output.file) << '\n';
     if (cut_short)
         std::cerr << "panelgate: incomplete: " << outcome.cut_short << "; what was not reached "
                   << "is missing in it\n";
@@ -84,6 +104,9 @@ ExitCode scan(const ScanOptions& options) {
         std::cout << scan::report_yaml(outcome.device, *outcome.result, outcome.profiles_dir);
     else
         std::cout << scan::report_text(options.device, *outcome.result, outcome.cut_short);
+    if (options.quick && !options.yaml && scan::found_any(*outcome.result))
+        std::cout << '\n'
+                  << scan::report_yaml(outcome.device, *outcome.result, outcome.profiles_dir);
     std::cout << std::flush;
     print_advice(options, *outcome.result);
     return outcome.code;

@@ -2,6 +2,7 @@
 #include <boost/json/value.hpp>
 #include <csignal>
 #include <iostream>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <variant>
@@ -10,6 +11,7 @@
 #include "gateway_client.hpp"
 #include "http_door.hpp"
 #include "local_gateway.hpp"
+#include "output.hpp"
 #include "panelgate/base/network.hpp"
 
 namespace panelgate::app {
@@ -56,8 +58,10 @@ void print_faults(const json::object& verdict) {
 ExitCode print_verdict(const json::object& verdict) {
     const std::string outcome = text_in(verdict, "outcome");
     if (outcome == "applied" || outcome == "unchanged") {
-        std::cout << outcome << '\n';
-        print_list(std::cout, verdict, "changes", "  ");
+        std::ostringstream done;
+        done << outcome << '\n';
+        print_list(done, verdict, "changes", "  ");
+        print_done(done.str());
         print_list(std::cerr, verdict, "weaker", "protects less: ");
         print_list(std::cerr, verdict, "warnings", "");
         print_list(std::cerr, verdict, "restart_needed", "only a restart changes: ");

@@ -1,15 +1,18 @@
 // status and top: what a running gateway tells of its lines and stations.
+#include <sys/ioctl.h>
 #include <unistd.h>
 #include <cstdlib>
 #include <iostream>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "commands.hpp"
 #include "gateway_client.hpp"
+#include "output.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/cli/overview.hpp"
 #include "panelgate/cli/table.hpp"
@@ -48,6 +51,14 @@ std::optional<cli::Overview> look(const GatewayClient& gateway, ExitCode& code) 
 }
 
 /// A screen that is drawn anew each second, also while the gateway is away.
+std::string for_the_screen(const std::string& text) {
+    constexpr winsize kUsual{.ws_row = 24, .ws_col = 80, .ws_xpixel = 0, .ws_ypixel = 0};
+    winsize size{};
+    if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_row < 2 || size.ws_col < 2)
+        size = kUsual;
+    return cli::cut_to_screen(text, size.ws_row, size.ws_col);
+}
+
 [[noreturn]] void draw_for_ever(const GatewayClient& gateway, cli::Overview overview) {
     cli::AllFigures before;
     double seconds = 0;
@@ -56,10 +67,10 @@ std::optional<cli::Overview> look(const GatewayClient& gateway, ExitCode& code) 
     for (;;) {
         const cli::AllFigures figures = overview.figures;
         overview.figures = cli::difference(figures, before);
-        std::cout << kHome + cli::top_text(overview, seconds, is_coloured()) + trouble +
-                         "\nCtrl-C ends it.\n"
-                  << std::flush;
-        if (!std::cout) std::_Exit(kFine);
+        const std::string screen =
+            cli::top_text(overview, seconds, is_coloured()) + trouble + "\nCtrl-C ends it.";
+        std::cout << kHome + for_the_screen(screen) << std::flush;
+        if (!std::cout) end_without_output();
         std::this_thread::sleep_for(1s);
         trouble.clear();
         const GatewayAnswer there = gateway.get("/readyz");
@@ -95,7 +106,9 @@ ExitCode top(const GatewayOptions& at, bool once) {
     if (!gateway) return code;
     auto overview = look(*gateway, code);
     if (!overview) return code;
-    if (once || ::isatty(STDOUT_FILENO) != 1) {
+    const char* const kind = std::getenv("TERM");
+    const bool is_dumb = kind != nullptr && std::string_view(kind) == "dumb";
+    if (once || is_dumb || ::isatty(STDOUT_FILENO) != 1) {
         std::cout << cli::top_text(*overview, 0, is_coloured());
         return kFine;
     }

@@ -17,6 +17,7 @@
 #include "build_info.hpp"
 #include "commands.hpp"
 #include "gateway_client.hpp"
+#include "output.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/cli/trace_text.hpp"
 #include "panelgate/rt/clock.hpp"
@@ -27,6 +28,7 @@ namespace {
 
 constexpr unsigned kMostEntries = 500;  // of a page of a trace
 constexpr auto kBetweenPages = 500ms;
+constexpr auto kBetweenLooks = 1s;  // at a gateway that is gone
 
 struct TracedLine {
     std::string path;
@@ -90,25 +92,70 @@ std::optional<std::vector<TracedLine>> lines_to_trace(const GatewayClient& gatew
     return traced;
 }
 
-/// What is new on all lines; nothing, with a message on stderr and `code` set, if that cannot be
-/// had.
-std::optional<std::vector<cli::TraceLine>> read_page(const GatewayClient& gateway,
-                                                     std::vector<TracedLine>& lines,
-                                                     ExitCode& code) {
-    std::vector<cli::TraceLine> all;
+/// Reads what is new on all lines into `page`; returns the answer that is no page of a trace, if
+/// there is one. What was read before it is kept for the next call.
+std::optional<GatewayAnswer> read_page(const GatewayClient& gateway, std::vector<TracedLine>& lines,
+                                       std::vector<cli::TraceLine>& page) {
     for (TracedLine& line : lines) {
         const std::string query =
             (line.next.empty() ? "?last=" : "?since=" + line.next + "&last=") +
             std::to_string(kMostEntries);
-        boost::json::object answer;
-        if (!ask_for(gateway, line.path + query, answer, code)) return std::nullopt;
-        if (const auto* next = answer.if_contains("next")) line.next = cli::value_text(*next);
-        for (auto& one : cli::trace_lines(answer, line.filter, line.names))
-            all.push_back(std::move(one));
+        GatewayAnswer answer = gateway.get(line.path + query);
+        if (!answer.is_ok()) return answer;
+        if (const auto* next = answer.json.if_contains("next")) line.next = cli::value_text(*next);
+        for (auto& one : cli::trace_lines(answer.json, line.filter, line.names))
+            page.push_back(std::move(one));
     }
-    std::ranges::sort(all, {}, [](const cli::TraceLine& line) { return line.time; });
-    return all;
+    std::ranges::sort(page, {}, [](const cli::TraceLine& line) { return line.time; });
+    return std::nullopt;
 }
+
+/// Prints what comes on all lines, for ever. A gateway that is gone is waited for, as `watch` does;
+/// one that was started anew counts its transactions anew.
+class Follower {
+  public:
+    Follower(const GatewayClient& gateway, std::vector<TracedLine> lines)
+        : gateway_(gateway), lines_(std::move(lines)) {}
+
+    void show(const std::vector<cli::TraceLine>& page) {
+        for (const cli::TraceLine& line : page) {
+            if (came_back_ && line.time <= newest_) continue;  // it was the same one, and is shown
+            std::cout << line.text;
+            newest_ = std::max(newest_, line.time);
+        }
+        if (!page.empty()) came_back_ = false;
+        std::cout << std::flush;
+    }
+
+    ExitCode run() {
+        for (std::vector<cli::TraceLine> page;; page.clear()) {
+            if (!std::cout) end_without_output();
+            std::this_thread::sleep_for(is_gone_ ? kBetweenLooks : kBetweenPages);
+            const auto wrong = read_page(gateway_, lines_, page);
+            if (wrong && wrong->status != 0) return gateway_.explain(*wrong);
+            show(page);
+            if (wrong) {
+                say_gone(*wrong);
+            } else {
+                is_gone_ = false;
+            }
+        }
+    }
+
+  private:
+    void say_gone(const GatewayAnswer& answer) {
+        for (TracedLine& line : lines_) line.next.clear();
+        came_back_ = true;
+        if (!std::exchange(is_gone_, true))
+            std::cerr << "panelgate: " << gateway_.reason(answer) << "; waiting for it\n";
+    }
+
+    const GatewayClient& gateway_;
+    std::vector<TracedLine> lines_;
+    std::string newest_;  ///< time of what was shown last
+    bool is_gone_ = false;
+    bool came_back_ = false;  ///< and nothing was shown since
+};
 
 }  // namespace
 
@@ -119,19 +166,14 @@ ExitCode trace(const GatewayOptions& at, const TraceOptions& options) {
     auto lines = lines_to_trace(*gateway, options, code);
     if (!lines) return code;
     if (options.follow) end_with_signals();
-    auto page = read_page(*gateway, *lines, code);
-    if (!page) return code;
-    if (page->size() > options.count)
-        page->erase(page->begin(), page->end() - static_cast<std::ptrdiff_t>(options.count));
+    std::vector<cli::TraceLine> page;
+    if (const auto wrong = read_page(*gateway, *lines, page)) return gateway->explain(*wrong);
+    if (page.size() > options.count)
+        page.erase(page.begin(), page.end() - static_cast<std::ptrdiff_t>(options.count));
     std::cout << cli::trace_heading();
-    for (;;) {
-        for (const cli::TraceLine& line : *page) std::cout << line.text;
-        std::cout << std::flush;
-        if (!options.follow || !std::cout) return kFine;
-        std::this_thread::sleep_for(kBetweenPages);
-        page = read_page(*gateway, *lines, code);
-        if (!page) return code;
-    }
+    Follower follower(*gateway, std::move(*lines));
+    follower.show(page);
+    return options.follow ? follower.run() : kFine;
 }
 
 namespace {
@@ -219,10 +261,13 @@ ExitCode write_new(const std::string& file, const std::string& text) {
         written = now > 0;
         if (written) done += static_cast<std::size_t>(now);
     }
-    if (!written)
-        std::cerr << "panelgate: cannot write " << file << ": " << std::strerror(errno) << '\n';
-    if (fd >= 0) ::close(fd);
-    return written ? kFine : kInternal;
+    const int why = errno;
+    const bool closed = fd < 0 || ::close(fd) == 0;
+    if (written && closed) return kFine;
+    std::cerr << "panelgate: cannot write " << file << ": " << std::strerror(written ? errno : why)
+              << '\n';
+    if (fd >= 0) ::unlink(file.c_str());  // a part of it is no report
+    return kInternal;
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 
 #include "commands.hpp"
 #include "gateway_client.hpp"
+#include "output.hpp"
 #include "panelgate/cli/table.hpp"
 #include "panelgate/rt/clock.hpp"
 
@@ -63,7 +64,7 @@ class Watch {
         std::cout << rfc3339(rt::wall_now()).substr(0, kSeconds) + "Z  " +
                          places_[index].target.shown + "  " + text + '\n'
                   << std::flush;
-        if (!std::cout) std::_Exit(kFine);  // nobody reads any more
+        if (!std::cout) end_without_output();
         return counted_ && --left_ == 0;
     }
 
@@ -151,22 +152,36 @@ class Watch {
     ExitCode code_ = kFine;
 };
 
+ExitCode refuse_words(const std::string& what) {
+    std::cerr << "panelgate: " << what << '\n';
+    return kUsage;
+}
+
+std::vector<std::string> names_of(const std::vector<cli::Station>& stations) {
+    std::vector<std::string> names;
+    for (const cli::Station& station : stations)
+        if (!station.name.empty()) names.push_back(station.name);
+    return names;
+}
+
 }  // namespace
 
 ExitCode watch(const GatewayOptions& at, const WatchOptions& options) {
-    const cli::Places places = cli::places_of(options.words);
-    if (!places.wrong.empty()) {
-        std::cerr << "panelgate: " << places.wrong << '\n';
-        return kUsage;
-    }
+    cli::Places places = cli::places_of(options.words);
+    if (!places.wrong.empty()) return refuse_words(places.wrong);
     end_with_signals();
     ExitCode code = kFine;
     const auto gateway = GatewayClient::make(at, code);
     if (!gateway) return code;
+    const auto stations = all_stations(*gateway, code);
+    if (!stations) return code;
+    places = cli::places_of(options.words, names_of(*stations));
+    if (!places.wrong.empty()) return refuse_words(places.wrong);
     std::vector<GatewayPlace> found;
     for (const cli::Place& typed : places.list) {
         auto place = find_place(*gateway, typed, code);
         if (!place) return code;
+        if (!may_have_type(*place, !options.type.empty() || !options.order.empty())) return kUsage;
         found.push_back(std::move(*place));
     }
     return Watch(*gateway, std::move(found), options).run();

@@ -118,6 +118,7 @@ struct ScanOptions {
     std::string profiles;  ///< a directory of further profiles
     bool yaml = false;
     bool speak = false;  ///< scan even if another master is talking
+    bool quick = false;  ///< ask each address once
 };
 ExitCode scan(const ScanOptions& options);
 /// Where to write a configuration.
@@ -131,5 +132,7 @@ ExitCode init(const ScanOptions& options, const OutputFile& output);
 ExitCode import_conf(const std::string& file);
 /// Lists all profiles, or describes one; `dir` as in address().
 ExitCode profiles(const std::string& name, const std::string& dir);
+/// Judges a file that describes a panel as loading it does; "-" for standard input.
+ExitCode check_profile_file(const std::string& file);
 
 }  // namespace panelgate::app

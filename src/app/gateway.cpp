@@ -257,13 +257,15 @@ web::Providers Gateway::providers() {
 }
 
 void Gateway::start() {
+    const auto directory = [this] { return directory_in(snapshot_); };
+    // First what may throw: nothing is sent to a panel where a port is taken. No client is served
+    // before this returns.
+    servers_.open(*snapshot_->config, snapshot_->plant,
+                  {directory, [this] { return providers(); }});
     lag_.start();
     for (const auto& line : snapshot_->lines) line->start();
     relays_->start();
     if (line_histories_) line_histories_->start();
-    const auto directory = [this] { return directory_in(snapshot_); };
-    servers_.open(*snapshot_->config, snapshot_->plant,
-                  {directory, [this] { return providers(); }});
     servers_.apply(*snapshot_->config, snapshot_->plant, directory(),
                    shown_text(*snapshot_->config), longest_answer());
     northbound_.start();

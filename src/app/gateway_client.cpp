@@ -1,6 +1,7 @@
 #include "gateway_client.hpp"
 
 #include <unistd.h>
+#include <algorithm>
 #include <boost/json/parse.hpp>
 #include <boost/json/value.hpp>
 #include <charconv>
@@ -37,8 +38,10 @@ std::optional<std::string> token_in(const std::string& file) {
     std::string line;
     std::getline(in, line);
     std::string token(trimmed(std::string_view(line).substr(0, line.find('\r'))));
-    if (!token.empty()) return token;
-    std::cerr << "panelgate: no token can be read from " << file << " (its first line is one)\n";
+    const auto is_visible = [](char c) { return c > ' ' && c < '\x7f'; };  // as in a header
+    if (!token.empty() && std::ranges::all_of(token, is_visible)) return token;
+    std::cerr << "panelgate: no token can be read from " << file
+              << " (its first line is one, of visible ASCII characters)\n";
     return std::nullopt;
 }
 
@@ -218,6 +221,14 @@ std::optional<GatewayPlace> find_place(const GatewayClient& gateway, const cli::
     }
     found.target = cli::target_of(station.name, typed.place, found.points);
     return found;
+}
+
+bool may_have_type(const GatewayPlace& place, bool is_given) {
+    if (place.target.kind != cli::PlaceKind::point || !is_given) return true;
+    std::cerr << "panelgate: " << place.target.shown
+              << " is a point, which has its type and order in the configuration: leave out "
+                 "--type, --order and --count\n";
+    return false;
 }
 
 ExitCode explain_place(const GatewayClient& gateway, const GatewayPlace& place,

@@ -78,6 +78,9 @@ struct GatewayPlace {
 /// and `code` set, if there is no such station.
 std::optional<GatewayPlace> find_place(const GatewayClient& gateway, const cli::Place& typed,
                                        ExitCode& code);
+/// Type and order of a point are its configuration's: false, with a message on stderr, if the place
+/// is one and they are given.
+bool may_have_type(const GatewayPlace& place, bool is_given);
 /// Prints why a place could not be read or written; returns the exit code.
 ExitCode explain_place(const GatewayClient& gateway, const GatewayPlace& place,
                        const GatewayAnswer& answer, const std::string& verb);

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cstddef>
 #include <exception>
+#include <filesystem>
 #include <initializer_list>
 #include <iostream>
 #include <set>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -17,63 +19,9 @@
 #include "build_info.hpp"
 #include "certificate_commands.hpp"
 #include "commands.hpp"
+#include "help_text.hpp"
 #include "panelgate/base/text.hpp"
 #include "panelgate/cli/adapters.hpp"
-
-namespace panelgate::app {
-
-/// Rewords a CLI11 error: "--format must be text or json, not 'xml'". Without the command's name
-/// and without a full stop.
-std::string usage_fault(const CLI::ParseError& error);
-
-namespace {
-
-/// "text,json" as "text or json".
-std::string choices(std::string_view list) {
-    std::string words;
-    while (!list.empty()) {
-        const std::size_t comma = std::min(list.find(','), list.size());
-        if (!words.empty()) words += comma == list.size() ? " or " : ", ";
-        words += list.substr(0, comma);
-        list.remove_prefix(std::min(comma + 1, list.size()));
-    }
-    return words;
-}
-
-/// "--format: xml not in {text,json}"
-std::string wrong_choice(const std::string& text, const std::string& option) {
-    constexpr std::string_view kBetween = " not in {";
-    const std::size_t between = text.find(kBetween);
-    const std::size_t value = option.size() + 2;
-    if (between == text.npos || !text.ends_with('}') || value > between) return text;
-    const std::size_t list = between + kBetween.size();
-    return option + " must be " +
-           choices(std::string_view(text).substr(list, text.size() - list - 1)) + ", not '" +
-           text.substr(value, between - value) + '\'';
-}
-
-}  // namespace
-
-std::string usage_fault(const CLI::ParseError& error) {
-    const std::string text = error.what();
-    const std::string kind = error.get_name();
-    const std::string option = text.substr(0, text.find(':'));  // or the whole text
-    if (kind == "RequiredError") return text.substr(0, text.find(" is required")) + " is missing";
-    if (kind == "ArgumentMismatch")
-        return option + (text.find("At Most") != text.npos ? " may be given once"
-                                                           : " needs a value after it");
-    if (kind == "ConversionError") return "an option that takes no value was given one";
-    if (kind == "RequiresError") return text;  // "--weaker requires --rollback"
-    if (kind == "ValidationError") return wrong_choice(text, option);
-    const int extras =
-        static_cast<int>(CLI::ExitCodes::ExtrasError);  // its kind is the command's name
-    if (error.get_exit_code() != extras) return "these options cannot be understood";
-    const std::string word = text.substr(text.rfind(' ') + 1);
-    const bool is_option = word.starts_with('-') && word != "--";
-    return is_option ? "there is no option " + word + " here" : "nothing may follow '--'";
-}
-
-}  // namespace panelgate::app
 
 namespace {
 
@@ -85,17 +33,16 @@ constexpr const char* kAbout =
 
 constexpr const char* kExamples =
     "Examples:\n"
-    "  panelgate demo                                   five simulated panels and a dashboard\n"
-    "  panelgate init /dev/ttyUSB0 -o panelgate.yaml    find panels, write a configuration\n"
+    "  panelgate demo                                   simulated panels, a dashboard\n"
+    "  panelgate init /dev/ttyUSB0 -o panelgate.yaml    find panels, write a file\n"
     "  panelgate run -c panelgate.yaml                  serve them\n"
     "  panelgate read oven/temperature                  ask the gateway that runs\n"
     "  panelgate check -c panelgate.yaml                what a configuration means\n"
     "  panelgate address panasonic-gt GDT108            where a notation is in Modbus\n";
 constexpr const char* kFirstSteps =
     "To begin:\n"
-    "  panelgate demo                                   look at it: simulated panels, no hardware\n"
-    "  panelgate init /dev/ttyUSB0 -o panelgate.yaml    find the panels of a line, and write a\n"
-    "                                                   configuration (scan only looks)\n"
+    "  panelgate demo                                   simulated panels, no hardware\n"
+    "  panelgate init /dev/ttyUSB0 -o panelgate.yaml    find panels, write a file\n"
     "  panelgate run -c panelgate.yaml                  serve them\n";
 
 /// The command line; parsing it runs the command.
@@ -121,6 +68,8 @@ class CommandLine {
         add_certificate_commands(cli_, code_);
         add_help();
         add_groups();
+        refuse_empty_values(cli_);
+        shape_help(cli_);
     }
 
     ExitCode parse(std::vector<std::string> words) {
@@ -137,7 +86,8 @@ class CommandLine {
                                  did_you_mean(words[0], commands()));
         static const std::set<std::string> kAlone{"-h", "--help", "-V", "--version"};
         if (words[0].starts_with('-') && !kAlone.contains(words[0]))
-            return which_command("a command is missing before '" + words[0] + '\'');
+            return which_command("a command is missing before '" + words[0] + '\'' +
+                                 did_you_mean(words[0], {kAlone.begin(), kAlone.end()}));
         const std::string command = words[0];
         try {
             keep_negative_values(words);
@@ -201,6 +151,13 @@ class CommandLine {
         return kUsage;
     }
 
+    /// What may have been meant as the configuration.
+    static bool looks_like_file(const std::string& word) {
+        std::error_code none;
+        return word.ends_with(".yaml") || word.ends_with(".yml") ||
+               std::filesystem::is_regular_file(word, none);
+    }
+
     /// Reports the first argument that `command` did not understand.
     static ExitCode unexpected(const CLI::App& command) {
         std::vector<std::string> left = command.remaining();
@@ -213,12 +170,13 @@ class CommandLine {
             for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
             for (const std::string& name : option->get_snames()) names.push_back('-' + name);
         }
-        const bool takes_file = command.get_option_no_throw("--config") != nullptr;
+        const bool is_file =
+            looks_like_file(typed) && command.get_option_no_throw("--config") != nullptr;
         std::cerr << "panelgate: " << command.get_name()
                   << (is_option ? " has no option '" : " does not take '") << typed << '\'';
         if (is_option) {
             std::cerr << did_you_mean(typed, names);
-        } else if (takes_file) {
+        } else if (is_file) {
             std::cerr << "; a file is given with -c: " << command.get_name() << " -c " << typed;
         }
         std::cerr << "; `panelgate help " << command.get_name() << "` says what it takes\n";
@@ -348,6 +306,9 @@ class CommandLine {
                             "addresses to ask, such as 1-31 (the default) or 5,17,20-31");
         add_profiles_dir(command, scan_.profiles);
         command->add_flag("--speak", scan_.speak, "scan although another master is talking");
+        command->add_flag("--quick", scan_.quick,
+                          "ask each address once: seconds, not half a minute; a slow panel may be "
+                          "missed");
     }
 
     void add_scan() {
@@ -356,9 +317,10 @@ class CommandLine {
         add_search(command);
         command->add_flag("--yaml", scan_.yaml, "print a configuration of the line instead");
         command->footer(
+            "Panels are named on stderr as soon as they are known. With --quick the table is "
+            "followed by a configuration to paste.\n"
             "Exit codes: 0 something was found; 64 usage; 69 the device cannot be used, another "
-            "master\n"
-            "is talking, nothing was found, or the scan was interrupted (what was found is "
+            "master is talking, nothing was found, or the scan was interrupted (what was found is "
             "printed).");
         command->callback([this] { code_ = scan(scan_); });
     }
@@ -371,8 +333,8 @@ class CommandLine {
         command->add_flag("--force", output_.force, "write over a file that is there");
         command->footer(
             "Exit codes: 0 it is written; 64 usage, or the file is there; 69 as of scan: nothing "
-            "was\nfound, the device cannot be used, another master is talking, the scan was "
-            "interrupted; 70 the\nfile cannot be written.");
+            "was found, the device cannot be used, another master is talking, the scan was "
+            "interrupted; 70 the file cannot be written.");
         command->callback([this] { code_ = init(scan_, output_); });
     }
 
@@ -401,10 +363,22 @@ class CommandLine {
     }
 
     void add_profiles() {
-        CLI::App* command = cli_.add_subcommand("profiles", "list the panel profiles, or show one");
+        CLI::App* command =
+            cli_.add_subcommand("profiles", "list the panel profiles, show one, or check a file");
         command->add_option("NAME", name_, "of the profile that is shown");
         add_profiles_dir(command, profiles_dir_);
-        command->callback([this] { code_ = profiles(name_, profiles_dir_); });
+        command->add_option(
+            "--check", profile_file_,
+            "judge a file that describes a panel, - for standard input, and say what would be "
+            "right");
+        command->footer(
+            "Exit codes: 0 fine; 64 usage; 66 the file cannot be read; 78 a file has faults.");
+        command->callback([this] {
+            if (!profile_file_.empty() && !name_.empty())
+                throw CLI::ValidationError("--check", "it takes a file, and no NAME beside it");
+            code_ = profile_file_.empty() ? profiles(name_, profiles_dir_)
+                                          : check_profile_file(profile_file_);
+        });
     }
 
     void add_health() {
@@ -436,7 +410,7 @@ class CommandLine {
             ->needs("--rollback");
         command->footer(
             "Exit codes: 0 it serves the file, or did already; 1 no gateway could be asked, or a "
-            "rollback\nwould protect less; 69 valid, but something could not be opened; 78 the "
+            "rollback would protect less; 69 valid, but something could not be opened; 78 the "
             "file has faults.\nAfter 1, 69 and 78 nothing has changed.");
         command->callback([this] { code_ = reload(reload_); });
     }
@@ -460,6 +434,7 @@ class CommandLine {
     std::string notation_;
     std::string name_;
     std::string profiles_dir_;
+    std::string profile_file_;
 };
 
 /// Reopens closed standard descriptors on /dev/null, in the direction that still makes their use

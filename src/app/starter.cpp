@@ -59,6 +59,7 @@ class ScanRun final : public line::Line::Events {
     void settled(TimePoint now);
 
   private:
+    void name_panels();
     void end(const std::string& why);
     void redraw();
     void tell();
@@ -74,6 +75,7 @@ class ScanRun final : public line::Line::Events {
     std::unique_ptr<scan::Scanner> scanner_;  ///< since the line is up
     std::optional<line::Drive<scan::Scanner, ScanRun>> drive_;
     std::unique_ptr<rt::Alarm> redraw_;
+    std::size_t named_ = 0;  ///< panels that were told of
     boost::asio::signal_set signals_;
     std::string cut_short_;
 };
@@ -140,7 +142,22 @@ void ScanRun::on_deadline(TimePoint now) {
     scanner_->on_deadline(now);
 }
 
+/// Tells of each panel as soon as it is known.
+void ScanRun::name_panels() {
+    const auto& panels = scanner_->examined();
+    for (; named_ < panels.size(); ++named_) {
+        const std::string found = "panelgate: found " + scan::found_text(panels[named_]);
+        if (!shows_progress()) {
+            std::cerr << found << '\n';
+            continue;
+        }
+        std::cerr << '\r' << found.substr(0, width() - 1) << kClear << "\r\n"
+                  << progress(width() - 1) << kClear << std::flush;
+    }
+}
+
 void ScanRun::settled(TimePoint) {
+    name_panels();
     if (scanner_->done()) io_.stop();
 }
 
@@ -167,6 +184,7 @@ std::optional<scan::Settings> parse_options(const ScanOptions& options) {
     scan::Settings settings;
     settings.remote = options.device.starts_with("tcp://");
     settings.speak_anyway = options.speak;
+    settings.quick = options.quick;
     std::optional<std::string> wrong;
     if (settings.remote && !line::parse_tcp_device(options.device)) {
         wrong = "DEVICE must be tcp://HOST:PORT with a port from 1 to 65535, not '" +
@@ -233,6 +251,9 @@ ScanOutcome search(const ScanOptions& options) {
 void print_advice(const ScanOptions& options, const scan::Result& result) {
     for (const std::string& sentence : scan::advice(options.device, result))
         std::cerr << "panelgate: " << sentence << '\n';
+    if (options.quick && result.ending == scan::Result::Ending::finished)
+        std::cerr << "panelgate: --quick has asked each address once: where a panel is missing, "
+                     "scan without it\n";
 }
 
 namespace {
@@ -272,15 +293,23 @@ std::string name_of(std::string_view notation) {
     return name;
 }
 
+bool is_clock(const profile::PanelProfile& profile, const profile::Area& area) {
+    using Kind = profile::Simulation::Motion::Kind;
+    return std::ranges::any_of(profile.simulation.motion, [&](const auto& motion) {
+        return motion.kind == Kind::clock && motion.area == area.name;
+    });
+}
+
 /// One example line; "" if nothing in the area is readable.
-std::string example_of(const profile::Area& area) {
+std::string example_of(const profile::PanelProfile& profile, const profile::Area& area) {
     const bool bits = modbus::is_bit_table(area.table);
     const auto first = static_cast<std::uint16_t>(
         area.writable ? std::max(area.writable->first, area.readable.first) : area.readable.first);
     if (!area.readable.contains(first)) return "";
     const std::string at = profile::format_notation(area, first);
+    const bool measures = !bits && !is_clock(profile, area);
     std::string text = "{name: " + name_of(at) + ", at: " + quoted(at);
-    text += bits ? "" : ", type: i16, scale: 0.1, unit: celsius";
+    text += measures ? ", type: i16, scale: 0.1, unit: celsius" : "";
     return "        #   - " + text + ", every: 1s}   # " + area.description + '\n';
 }
 
@@ -288,7 +317,7 @@ std::string examples_of(const profile::PanelProfile& profile) {
     std::string text = "        # points:   # values by name, for REST, events and /metrics\n";
     std::size_t count = 0;
     for (const profile::Area& area : profile.areas) {
-        const std::string example = count < kMostExamples ? example_of(area) : "";
+        const std::string example = count < kMostExamples ? example_of(profile, area) : "";
         if (!example.empty()) ++count;
         text += example;
     }

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <boost/json/array.hpp>
 #include <boost/json/serialize.hpp>
+#include <cstddef>
 #include <cstdint>
+#include <string_view>
 #include <utility>
 
 #include "panelgate/base/text.hpp"
@@ -114,8 +116,24 @@ std::string written_text(const std::string& shown, const std::string& typed,
     return shown + " = " + what + ", " + how + '\n';
 }
 
+namespace {
+
+/// A refusal's text without what only makes sense to who has written the request: a query that
+/// there is, and the place in a JSON that the command line has made.
+std::string without_rest(std::string text) {
+    constexpr std::string_view kRound = "; ?round=true writes the nearest";
+    constexpr std::string_view kPlace = "line 1, column ";
+    if (text.ends_with(kRound)) text.resize(text.size() - kRound.size());
+    const std::size_t place = text.find(kPlace);
+    if (place == text.npos) return text;
+    const std::size_t end = text.find(": ", place);
+    return end == text.npos ? text : text.substr(end + 2);
+}
+
+}  // namespace
+
 std::string not_written_text(const json::object& problem) {
-    std::string text = printable(text_of(problem, "detail"));
+    std::string text = without_rest(printable(text_of(problem, "detail")));
     const std::string title = printable(text_of(problem, "title"));
     if (text.empty()) text = title.empty() ? "the gateway does not say why" : title;
     const json::value* transmitted = problem.if_contains("transmitted");

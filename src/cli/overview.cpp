@@ -19,7 +19,7 @@ namespace json = boost::json;
 namespace {
 
 constexpr std::size_t kShown = 10;  // clients and panels of `top`
-constexpr std::size_t kBar = 20;    // characters
+constexpr std::size_t kBar = 16;    // characters: the table is 80 wide
 
 std::string shown(const json::object& object, std::string_view name) {
     return printable(text_of(object, name));

@@ -77,6 +77,39 @@ Named of_line(std::span<const Station> all, const std::string& line, std::string
     return {"", "there is no line '" + line + '\'' + suggestion(line, lines)};
 }
 
+std::string tables_text() {
+    std::string text;
+    for (const std::string_view table : kTables)
+        text += (text.empty() ? "" : ", ") + std::string(table);
+    return text;
+}
+
+/// What is wrong with a place of the form TABLE/ADDRESS; "" for any other.
+std::string wrong_table(std::string_view place) {
+    const std::size_t slash = place.find('/');
+    if (slash == place.npos) return "";
+    const std::string table(place.substr(0, slash));
+    const std::string_view address = place.substr(slash + 1);
+    if (is_table(table)) {
+        if (!address.empty()) return "";
+        return "an address is missing after '" + std::string(place) + "', such as " + table + "/4";
+    }
+    const bool is_number =
+        !address.empty() && address.find_first_not_of("0123456789") == address.npos;
+    if (!is_number) return "";
+    return "there is no table '" + table + "'; there are " + tables_text();
+}
+
+/// Of a station that `next` follows.
+std::string no_place(const std::string& station, std::string_view next) {
+    // "holdings/4" alone is a station of a line; behind "press" it is meant as a place.
+    std::string wrong = station.find('/') == station.npos ? wrong_table(next) : "";
+    if (!wrong.empty()) return wrong;
+    return "a place is missing after '" + station +
+           "': a notation such as UW100, TABLE/ADDRESS such as holding-registers/4, or a point's "
+           "name";
+}
+
 }  // namespace
 
 bool holds_place(std::string_view word) {
@@ -84,13 +117,17 @@ bool holds_place(std::string_view word) {
     return !parts.station.empty() && !parts.place.empty();
 }
 
-Places places_of(std::span<const std::string> words) {
+Places places_of(std::span<const std::string> words, std::span<const std::string> stations) {
     Places made;
     std::string station;    // that was named alone
     bool has_place = true;  // of it
     for (const std::string& word : words) {
+        if (word.empty()) continue;
         Place parts = parts_of(word);
-        const bool is_plain = parts.station.empty() || word.find('/') == word.npos;
+        std::string wrong = wrong_table(parts.station.empty() ? word : parts.place);
+        if (!wrong.empty()) return {{}, std::move(wrong)};
+        const bool begins = has_place && std::ranges::find(stations, word) != stations.end();
+        const bool is_plain = !begins && (parts.station.empty() || word.find('/') == word.npos);
         if (parts.station.empty() && station.empty())
             return {{}, "a station is missing before '" + word + "', such as oven " + word};
         if (is_plain && !station.empty()) {
@@ -98,16 +135,13 @@ Places places_of(std::span<const std::string> words) {
             has_place = true;
             continue;
         }
-        if (!has_place) break;
+        if (!has_place) return {{}, no_place(station, word)};
         has_place = !parts.place.empty();
         station = has_place ? "" : parts.station;
         if (has_place) made.list.push_back(std::move(parts));
     }
     if (has_place && !made.list.empty()) return made;
-    return {{},
-            "a place is missing after '" + station +
-                "': a notation such as UW100, TABLE/ADDRESS such as holding-registers/4, or a "
-                "point's name"};
+    return {{}, no_place(station, "")};
 }
 
 Named find_station(std::span<const Station> all, const std::string& typed) {

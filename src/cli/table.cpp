@@ -103,6 +103,46 @@ std::string TextTable::text(bool coloured) const {
     return made;
 }
 
+namespace {
+
+/// The first `columns` characters of a line, which escape sequences do not use up.
+std::string cut_line(std::string_view line, std::size_t columns) {
+    std::string made;
+    std::size_t used = 0;
+    for (std::size_t i = 0; i < line.size(); ++i) {
+        if (line[i] == '\x1b') {
+            const std::size_t end = std::min(line.find('m', i), line.size() - 1);
+            made += line.substr(i, end - i + 1);
+            i = end;
+            continue;
+        }
+        const bool begins = (static_cast<unsigned char>(line[i]) & 0xC0U) != 0x80U;
+        if (begins) ++used;
+        if (used <= columns) made += line[i];
+    }
+    return made;
+}
+
+}  // namespace
+
+std::string cut_to_screen(std::string_view text, std::size_t rows, std::size_t columns) {
+    std::vector<std::string> lines;
+    while (!text.empty()) {
+        const std::size_t end = std::min(text.find('\n'), text.size());
+        lines.push_back(cut_line(text.substr(0, end), columns));
+        text.remove_prefix(std::min(end + 1, text.size()));
+    }
+    if (lines.size() > rows) {
+        lines[rows - 2] = "(" + std::to_string(lines.size() - rows + 1) + " more lines)";
+        lines[rows - 1] = lines.back();
+        lines.resize(rows);
+    }
+    std::string made;
+    for (const std::string& line : lines) made += line + '\n';
+    made.resize(made.size() - std::min<std::size_t>(made.size(), 1));
+    return made;
+}
+
 std::string span_text(double seconds) {
     if (seconds < 10) return with_digits(std::max(seconds, 0.0), 1, "s");
     if (seconds < 100) return with_digits(std::floor(seconds), 0, "s");

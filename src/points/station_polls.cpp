@@ -32,14 +32,18 @@ void PollSchedule::set_phases(std::span<const Duration> intervals) {
     for (const auto& [every, members] : groups)
         shortest = std::min(shortest, every / static_cast<Duration::rep>(members.size()));
     const Duration shift = shortest / static_cast<Duration::rep>(groups.size());
+    const Duration first_step =
+        settings_.first_within / static_cast<Duration::rep>(intervals.size());
+    Duration first{};  // the shortest intervals come first
     Duration offset{};
     for (const auto& [every, members] : groups) {
         const auto count = static_cast<Duration::rep>(members.size());
         const Duration step = every / count;
-        const Duration first_step = std::min(every, settings_.first_within) / count;
         for (Duration::rep k = 0; k < count; ++k) {
+            const Duration phase = k * step + offset;
             entries_[members[static_cast<std::size_t>(k)]] = {
-                every, k * step + offset, start_ + k * first_step + offset, false, false};
+                every, phase, start_ + std::min(phase, first), false, false};
+            first += first_step;
         }
         offset += shift;
     }

@@ -71,9 +71,10 @@ std::optional<SerialFormat> probable_format(const profile::Catalogue& profiles,
 Duration Scanner::State::asking_cost() const {
     const Duration wire = frame_time(format, modbus::kReadRequestAdu);
     const auto first = static_cast<std::int64_t>(first_pass.size());
-    const auto second = static_cast<std::int64_t>(second_pass.size()) + first;
+    const auto second = settings.quick ? 0 : static_cast<std::int64_t>(second_pass.size()) + first;
     std::int64_t high_first = static_cast<std::int64_t>(high_first_pass.size());
     for (const auto* pass : {&first_pass, &second_pass}) {
+        if (settings.quick) break;
         high_first += std::ranges::count_if(
             *pass, [this](std::uint8_t station) { return station_may_be_high_first(station); });
     }
@@ -201,6 +202,11 @@ std::string evidence_text(const StationFinding& finding) {
         return anomaly.empty() ? "answers, not looked at closer" : anomaly;
     const std::string& why = finding.candidates.front().why;
     return anomaly.empty() ? why : anomaly + "; " + why;
+}
+
+std::string found_text(const StationFinding& finding) {
+    return "station " + address(finding) + ": " + profile_of(finding) + ", " +
+           evidence_text(finding);
 }
 
 namespace {

@@ -96,8 +96,12 @@ void Scanner::State::start_asking(TimePoint now) {
         again.pop_front();
         return ask(now, retry->station, settings.second_timeout, Purpose::again);
     }
-    if (!first_pass.empty())
-        return ask(now, take(first_pass), settings.first_timeout, Purpose::first_pass);
+    if (!first_pass.empty()) {
+        // Late replies are heard while others are asked; after the last one nobody is.
+        const bool is_last = settings.quick && first_pass.size() == 1;
+        return ask(now, take(first_pass),
+                   is_last ? settings.second_timeout : settings.first_timeout, Purpose::first_pass);
+    }
     if (!to_examine.empty()) {
         const std::uint8_t station = take(to_examine);
         examination = std::make_unique<Examination>(profiles, settings, station, known_format(),
@@ -158,7 +162,7 @@ void Scanner::State::on_outcome(std::uint8_t station, const Outcome& outcome) {
 
 /// Queues one more request with a longer timeout, after all other stations.
 void Scanner::State::queue_second_pass(std::uint8_t station) {
-    if (phase != Phase::asking || answered.contains(station)) return;
+    if (phase != Phase::asking || answered.contains(station) || settings.quick) return;
     if (waited_for[station]) return queue_high_first(station);
     waited_for.set(station);
     second_pass.push_back(station);
@@ -275,6 +279,8 @@ std::optional<Action> Scanner::poll_action() {
 std::optional<TimePoint> Scanner::next_deadline() const {
     return done() ? std::nullopt : std::optional(state_->due());
 }
+
+const std::vector<StationFinding>& Scanner::examined() const { return state_->result.stations; }
 
 bool Scanner::done() const { return state_->phase == State::Phase::done; }
 

@@ -37,6 +37,23 @@ class CommandLine(unittest.TestCase):
             self.assertRegex(text, rf"(?m)^\s+{command}\b")
             self.assertIn("Usage", self.expect(0, command, "--help").stdout)
 
+    def test_each_help_has_an_example_and_fits_a_terminal(self):
+        listed = self.expect(0, "help").stdout.split("\nExamples:")[0].split("\nBegin:")[1]
+        commands = [[name] for name in re.findall(r"(?m)^  (\w+)", listed) if name not in ("help", "version")]
+        self.assertGreater(len(commands), 18)
+        for command in [[], *commands, ["config", "get"], ["config", "keys"],
+                        *(["cert", name] for name in ("new-ca", "new-server", "new-client", "revoke"))]:
+            text = self.expect(0, *command, "--help").stdout
+            self.assertLessEqual(max(map(len, text.splitlines())), 80, text)
+            self.assertRegex(text, rf"\nExamples?:\n  panelgate {' '.join(command)}")
+
+    def test_an_empty_value_of_an_option_is_refused(self):
+        for words in (["scan", "/dev/null", "--stations", ""], ["status", "--http", ""],
+                      ["init", "/dev/null", "-o", ""], ["report", "-o", ""], ["run", "--config="]):
+            told = self.expect(USAGE, *words).stderr
+            self.assertRegex(told, "a value is missing after it|needs a value after it")
+            self.assertEqual(told.count("\n"), 1)
+
     def test_wrong_usage_ends_with_64_and_says_why(self):
         for arguments in ([], ["fly"], ["run", "--fly"], ["check", "--format", "xml"], ["address"],
                           ["health", "--http", "nowhere"], ["health", "--http", "127.0.0.1:0"],
@@ -69,6 +86,7 @@ class CommandLine(unittest.TestCase):
         self.assertIn("lines.timing.frame_gap: 0ms to 10s, or auto (default auto)\n", keys("lines.timing"))
         self.assertIn("lines.stations.id: 1 to 247 (required)\n", keys())
         self.assertIn("there is no key", self.expect(USAGE, "config", "keys", "nothing").stderr)
+        self.assertIn("did you mean 'lines'?", self.expect(USAGE, "config", "keys", "linse").stderr)
 
     def test_a_mistyped_command_is_told_the_nearest(self):
         for typed, near in (("chekc", "check"), ("simulat", "simulate"), ("dmeo", "demo")):
@@ -86,6 +104,8 @@ class CommandLine(unittest.TestCase):
                           f"'{near}'?", told)
         self.assertIn("a file is given with -c: check -c x.yaml",
                       self.expect(USAGE, "check", "x.yaml").stderr)
+        self.assertNotIn("-c", self.expect(USAGE, "status", "extra").stderr)
+        self.assertIn("did you mean '--version'?", self.expect(USAGE, "--verison").stderr)
         self.assertIn("a command is missing before '-c'", self.expect(USAGE, "-c", "x").stderr)
 
     def test_what_a_command_lacks_is_told_by_name(self):
@@ -121,6 +141,13 @@ class CommandLine(unittest.TestCase):
                                               line) for line in program.stderr))
             finally:
                 program.terminate()
+
+    def test_a_port_that_is_taken_is_told_before_a_panel_is_asked(self):
+        with socket.create_server(("127.0.0.1", 0)) as taken:
+            ended = self.expect(UNAVAILABLE, "demo", "--http", "127.0.0.1:0", "--modbus",
+                                f"127.0.0.1:{taken.getsockname()[1]}")
+        self.assertIn("cannot start", ended.stderr)
+        self.assertNotIn("line up", ended.stderr)
 
     def test_a_service_whose_stdout_is_closed_runs_and_ends_like_any_other(self):
         start = 'exec "$0" demo --http 127.0.0.1:0 --modbus 127.0.0.1:0 >&-'

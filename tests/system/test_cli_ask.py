@@ -3,13 +3,14 @@ import json
 import pathlib
 import signal
 import socket
+import subprocess
 import tempfile
 import unittest
 
 import config
 import harness
 
-REFUSED, USAGE, NO_INPUT, UNAVAILABLE = 1, 64, 66, 69
+REFUSED, USAGE, NO_INPUT, UNAVAILABLE, INTERNAL = 1, 64, 66, 69, 70
 
 
 class Asking(unittest.TestCase):
@@ -50,7 +51,9 @@ class Asking(unittest.TestCase):
                 ("read press UW0 --type q16", "there are bool, u16"),
                 ("write press UW0 5", "UW15 to UW6047; nothing was sent"),
                 ("write press/setpoint 99", "from 0 to 60, not 99"),
-                ("watch press FOO1", "is no notation")):
+                ("watch press FOO1", "is no notation"),
+                ("write press/setpoint 21.55", "are 21.5 and 21.6\n"),
+                ("write press UW100 1e400 --type f64", "not written: 1e400 is beyond what")):
             with self.subTest(words):
                 self.assertIn(told, self.ask(REFUSED, *words.split()))
         for words, told in (
@@ -60,9 +63,33 @@ class Asking(unittest.TestCase):
                 ("read oven/mode --type u16", "leave out --type"),
                 ("read oven GDT1 --count x", "--count: it is a whole number from 1 to 65536, not 'x'"),
                 ("write oven/mode", "VALUE is missing"),
+                ("write press/setpoint 30 31", "press/setpoint is a point, which takes one value, not 2"),
+                ("read press holdings/4", "there is no table 'holdings'; there are coils, "),
+                ("read press holding-registers/", "an address is missing after 'holding-registers/'"),
+                ("watch oven/mode --type f32", "oven/mode is a point, which has its type"),
+                ("watch press UW0 oven", "a place is missing after 'oven'"),
+                ("read press temperature extra", "read does not take 'extra'; `panelgate help read`"),
                 ("write press/setpoint 21,5", "such as 21.5")):
             with self.subTest(words):
                 self.assertIn(told, self.ask(USAGE, *words.split()))
+
+    def test_an_empty_text_is_a_value(self):
+        told = harness.run("write", "press", "UW400", "", "--type", "string", "--http", self.http)
+        self.assertNotIn("VALUE is missing", told.stderr)
+        self.assertIn("a place is missing after 'press'", self.ask(USAGE, "read", "press", ""))
+
+    def test_what_is_written_is_told_where_stdout_takes_nothing(self):
+        with open("/dev/full", "w") as full:
+            ask = lambda *words: subprocess.run([harness.PANELGATE, *words, "--http", self.http], stdout=full, text=True,
+                                                stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, check=False,
+                                                timeout=harness.PATIENCE)
+            told = ask("write", "press/setpoint", "30")
+            self.assertEqual((told.returncode, told.stderr),
+                             (0, "panelgate: stdout takes nothing; this is done: press/setpoint = 30, confirmed\n"))
+            for command in ("read", "watch"):
+                told = ask(command, "press/UW0")
+                self.assertEqual(told.returncode, INTERNAL, told.stderr)
+                self.assertIn("stdout takes nothing", told.stderr)
 
     def test_a_write_without_an_answer_says_what_has_left(self):
         self.gateway.rest("PUT", "/api/v1/simulator/mixer", {"dead": 1})
@@ -80,6 +107,11 @@ class Asking(unittest.TestCase):
         text = self.ask(0, "watch", "press", "UW0", "holding-registers/1", "--count", "2")
         self.assertEqual([line.split("  ")[1:] for line in text.splitlines()],
                          [["press UW0", "10"], ["press holding-registers/1", "20"]])
+
+    def test_places_of_several_stations_are_watched(self):
+        text = self.ask(0, "watch", "press", "UW0", "UW1", "oven", "GDT0", "--count", "3")
+        self.assertEqual([line.split("  ")[1] for line in text.splitlines()],
+                         ["press UW0", "press UW1", "oven GDT0"])
 
     def test_a_signal_ends_watching_with_0(self):
         with harness.Program("watch", "press/UW0", "--http", self.http) as watching:
@@ -126,6 +158,10 @@ class NoGateway(unittest.TestCase):
                 wrong.write_text("fedcba9876543210\n")
                 told = harness.run("read", "31", "UW0", *at, "--token-file", str(wrong))
                 self.assertIn(f"does not take the token in {wrong}", told.stderr)
+                wrong.write_bytes(b"\0\xff\xfe\n")
+                told = harness.run("read", "31", "UW0", *at, "--token-file", str(wrong))
+                self.assertEqual(told.returncode, NO_INPUT, told.stderr)
+                self.assertIn(f"no token can be read from {wrong}", told.stderr)
                 gone = harness.run("read", "31", "UW0", *at, "--token-file", folder + "/gone")
                 self.assertEqual(gone.returncode, NO_INPUT)
                 told = harness.run("read", "nobody", "UW0", *at, "--token-file", str(token))

@@ -3,10 +3,12 @@ import json
 import os
 import pathlib
 import pty
+import resource
 import signal
 import stat
 import subprocess
 import tempfile
+import termios
 import unittest
 
 import config
@@ -51,9 +53,10 @@ class State(unittest.TestCase):
         finally:
             self.gateway.rest("PUT", "/api/v1/simulator/mixer", {"dead": 0})
 
-    def on_a_terminal(self, *arguments, **env):
+    def on_a_terminal(self, *arguments, size=(24, 80), **env):
         """What a command draws, up to two screens or its end."""
         ours, theirs = pty.openpty()
+        termios.tcsetwinsize(theirs, size)
         with os.fdopen(ours, "rb", buffering=0) as screen:
             process = subprocess.Popen([harness.PANELGATE, *arguments, "--http", self.http], stdout=theirs,
                                        stdin=subprocess.DEVNULL, env={**os.environ, "TERM": "xterm", **env})
@@ -79,13 +82,21 @@ class State(unittest.TestCase):
         self.assertIn("figures since its start", screens[0])
         self.assertRegex(screens[1], r"figures of the last [12]\.\d s(.|\r|\n)*floor1 +up +[\d.]+ % .* [\d.]+ ms")
 
+    def test_top_fits_the_terminal(self):
+        screen = self.on_a_terminal("top", NO_COLOR="1", size=(12, 40))[1].split("\x1b[H\x1b[2J")[1]
+        lines = screen.split("\r\n")
+        self.assertEqual(len(lines), 12, screen)
+        self.assertLessEqual(max(map(len, lines)), 40)
+        self.assertRegex(lines[-2], r"^\(\d+ more lines\)$")
+        self.assertNotIn("\x1b", self.on_a_terminal("top", TERM="dumb")[1])
+
     def test_top_looks_once_on_a_pipe(self):
         for arguments in (("top",), ("top", "--once")):
             looked = self.ask(*arguments)
             self.assertEqual(looked.returncode, 0, looked.stderr)
             for heading in ("LINE", "CLIENT", "SLOWEST"):
                 self.assertRegex(looked.stdout, rf"(?m)^{heading} ")
-            self.assertRegex(looked.stdout, r"(?m)^floor1 +up +[\d.]+ % +\[[# ]{20}\]")
+            self.assertRegex(looked.stdout, r"(?m)^floor1 +up +[\d.]+ % +\[[# ]{16}\]")
 
     def test_a_trace_has_the_last_transactions(self):
         self.gateway.values("/api/v1/stations/press/devices/UW0")
@@ -104,6 +115,18 @@ class State(unittest.TestCase):
         with harness.Program("trace", "--follow", "--count", "1", "--http", self.http) as following:
             following.out.wait_for("Z ", 3)
             self.assertEqual(following.stop(signal.SIGINT), 0)
+
+    def test_a_trace_waits_for_a_gateway_that_is_started_anew(self):
+        with harness.demo() as gateway:
+            http = f"127.0.0.1:{gateway.http_port()}"
+            with harness.Program("trace", "--follow", "--count", "1", "--http", http) as following:
+                following.out.wait_for("Z ")
+                self.assertEqual(gateway.stop(), 0)
+                following.log.wait_for("no gateway answers at .*; waiting for it")
+                with harness.Program("demo", "--http", http, "--modbus", "127.0.0.1:0") as anew:
+                    anew.values("/api/v1/stations/oven/devices/GDT77")
+                    following.out.wait_for("> 14 03 00 4D")
+                    self.assertEqual(following.stop(signal.SIGINT), 0)
 
     def test_a_report_holds_all_that_there_is_and_writes_over_nothing(self):
         file = self.folder / "report.json"
@@ -125,6 +148,15 @@ class State(unittest.TestCase):
         named = self.ask("report", cwd=self.folder)
         self.assertEqual(named.returncode, 0, named.stderr)
         self.assertEqual(len(list(self.folder.glob("panelgate-report-*Z.json"))), 1)
+
+    def test_a_report_that_finds_no_room_is_an_error_and_leaves_no_part(self):
+        def small():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+        file = self.folder / "report.json"
+        told = self.ask("report", "-o", str(file), preexec_fn=small, restore_signals=False)
+        self.assertEqual((told.returncode, file.exists()), (INTERNAL, False), told.stderr)
+        self.assertIn(f"cannot write {file}: File too large", told.stderr)
 
     def test_names_are_printed_for_the_shell(self):
         self.assertEqual(self.ask("names").stdout.split(), ["press", "mixer", "io", "oven", "filler"])

@@ -37,7 +37,7 @@ class Init(unittest.TestCase):
         with simulated(config.line("left", stations=PANELS)) as links:
             made = init(links["left"], *SEARCH, "-o", str(self.file))
             self.assertEqual((made.returncode, made.stdout), (0, ""), made.stderr)
-            self.assertIn(f"wrote {self.file} with 2 station(s)", made.stderr)
+            self.assertIn(f"wrote {self.file} with 2 station(s); to run it: panelgate run -c {self.file}\n", made.stderr)
             checked = check(self.file)
             self.assertEqual(checked.returncode, 0, checked.stderr)
             line = json.loads(checked.stdout)["lines"][0]
@@ -60,6 +60,10 @@ class Init(unittest.TestCase):
         with simulated(config.line("left", stations=PANELS)) as links:
             printed = init(links["left"], *SEARCH)
             self.assertEqual(printed.returncode, 0, printed.stderr)
+            spaced = self.file.with_name("my panels.yaml")
+            self.assertIn(f"panelgate run -c '{spaced}'\n",
+                          init(links["left"], *SEARCH, "--quick", "-o", str(spaced)).stderr)
+            self.assertEqual(spaced.read_text(), printed.stdout, "--quick leaves nothing out of these")
             forced = init(links["left"], *SEARCH, "-o", str(self.file), "--force")
             self.assertEqual(forced.returncode, 0, forced.stderr)
         self.assertEqual(self.file.read_text(), printed.stdout)

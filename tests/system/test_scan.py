@@ -68,10 +68,10 @@ def start(*arguments, stderr=subprocess.PIPE):
 
 
 def scan(*arguments):
-    """(exit code, stdout, stderr); without what it says every 5 s where it takes so long."""
+    """(exit code, stdout, stderr); without what it says meanwhile."""
     process = start(*arguments)
     out, err = process.communicate(timeout=3 * LIMIT)
-    return process.returncode, out, re.sub(r"(?m)^panelgate: \d+ %, .*\n", "", err)
+    return process.returncode, out, re.sub(r"(?m)^panelgate: (\d+ %|found station \d+:) ?.*\n", "", err)
 
 
 def drain(descriptor, process):
@@ -115,7 +115,8 @@ class Scan(unittest.TestCase):
             print(f"six addresses: {took:.1f} s", flush=True)
             self.assertLess(took, LIMIT)
             self.assertEqual((shown.returncode, piped.returncode), (0, 0), err)
-            self.assertRegex(err, r"^(panelgate: \d+ %, about \d+ s left, \d found: 38400 8N1, .*\n)+$")
+            self.assertRegex(err, r"^(panelgate: (\d+ %, about \d+ s left, \d found: 38400 8N1, |found station ).*\n)+$")
+            self.check_named(err)
             self.check_table(links["a"], table)
             self.check_progress(drawn)
             self.check_configuration(text)
@@ -129,13 +130,36 @@ class Scan(unittest.TestCase):
             self.assertEqual("seem to share address 7: " in row, row.startswith("7 "), row)
 
     def check_progress(self, drawn):
-        lines = drawn.replace("\x1b[K", "").split("\r")
+        lines = drawn.replace("\x1b[K", "").replace("\n", "").split("\r")
         self.assertLess(max(map(len, lines)), COLUMNS)
-        self.assertNotIn("\n", drawn)
+        self.check_named(drawn)
         self.assertRegex(drawn, r"\d+ %, about \d+ s left, \d found: 38400 8N1, station")
         self.assertTrue(drawn.endswith("\r\x1b[K"), repr(drawn[-80:]))
         shares = [int(share) for share in re.findall(r"(\d+) %", drawn)]
         self.assertGreater(shares[-1], 80)
+
+    def check_named(self, told):
+        """Each panel, before the scan is at its end."""
+        named = re.findall(r"panelgate: found station (\d+): ([\w-]+)", told)
+        self.assertEqual({int(address): profile for address, profile in named}, FOUND)
+        last = max(found.end() for found in re.finditer("found station", told))
+        self.assertRegex(told[last:], r"\d+ %, about")
+
+    def test_a_quick_scan_ends_with_a_configuration_to_paste(self):
+        with simulated(six("a")) as links:
+            begun = time.monotonic()
+            code, out, err = scan(links["a"], "--quick")
+            took = time.monotonic() - begun
+        print(f"six addresses, quick: {took:.1f} s", flush=True)
+        self.assertEqual(code, 0, err)
+        self.assertIn("--quick has asked each address once", err)
+        table, text = out.split("\n\n", 1)
+        self.check_table(links["a"], table)
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "found.yaml"
+            file.write_text(text)
+            checked = harness.run("check", "-c", str(file))
+        self.assertEqual((checked.returncode, checked.stderr), (0, ""))
 
     def check_configuration(self, text):
         self.assertIn("# two stations seem to share address 7: ", text)

@@ -23,8 +23,8 @@ struct Places {
 
 /// Understands the words of a command: "oven temperature GDT108", "oven/temperature press/UW0",
 /// "floor1/17 coils/4", "floor1/17/coils/4". Words behind a station that was named alone are
-/// places of it.
-Places places_of(std::span<const std::string> words);
+/// places of it; behind its first place the name of one of `stations` begins the next station.
+Places places_of(std::span<const std::string> words, std::span<const std::string> stations = {});
 /// True if the word holds a place behind its station ("oven/temperature"; not "floor1/17").
 bool holds_place(std::string_view word);
 

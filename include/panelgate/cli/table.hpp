@@ -47,6 +47,10 @@ std::string printable(std::string_view text);
 /// Characters of UTF-8.
 std::size_t width_of(std::string_view text);
 
+/// What a screen has room for, without a line end at the end: cut lines, and the last line last.
+/// `rows` is at least 2.
+std::string cut_to_screen(std::string_view text, std::size_t rows, std::size_t columns);
+
 /// "0.4 s", "35 s", "12 min", "3 h", "5 d".
 std::string span_text(double seconds);
 /// "7.4 ms", "1.2 s"; "-" for nothing.

@@ -35,7 +35,7 @@ class PollSchedule {
         std::size_t max_outstanding = 1;  ///< entries in progress at once; 0 means 1
         /// Every entry gets its first turn within this time, spread evenly, so that slow ones have
         /// a value soon.
-        Duration first_within = 5s;
+        Duration first_within = 1s;
         /// Limits of extra turns (request_extra_turn): a burst, then one per interval.
         std::size_t extra_burst = 16;
         Duration extra_every = 250ms;

@@ -36,6 +36,8 @@ struct Settings {
     unsigned repeats = 6;         ///< of one read, to see whether its replies are alike
     unsigned most_repeats = 18;   ///< while damage leaves open whether there are two stations
     unsigned damaged_tries = 12;  ///< of a request that gets only damaged replies
+    /// Asks each silent address once: not again with patience, nor in the other order of the CRC.
+    bool quick = false;
 };
 
 /// Parse lists of the command line into settings: "9600,38400"; "none,even"; "1-31", "5,17,20-31".

@@ -106,6 +106,9 @@ std::string stations_yaml(const std::string& line, const std::vector<StationFind
 /// Returns why a station was recognised as such, and its anomalies.
 std::string evidence_text(const StationFinding& finding);
 
+/// Returns a station as one sentence: "station 31: autonics-gplp-s, ...".
+std::string found_text(const StationFinding& finding);
+
 /// Returns further advice for the user: one sentence each.
 std::vector<std::string> advice(const std::string& device, const Result& result);
 

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <variant>
+#include <vector>
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
@@ -47,6 +48,8 @@ class Scanner {
 
     bool done() const;
     Progress progress(TimePoint now) const;
+    /// Returns the stations that were looked at closely so far, in that order.
+    const std::vector<StationFinding>& examined() const;
     /// Returns what is known so far, also before it is done.
     Result result() const;
 

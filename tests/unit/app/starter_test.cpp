@@ -64,6 +64,15 @@ TEST(Starter, OfEachProfileIsAConfigurationWithPointsThatOnlyNeedToBeUncommented
         EXPECT_FALSE(one.points.empty()) << one.profile->name;
 }
 
+TEST(Starter, AClockIsNoTemperature) {
+    scan::Result result;
+    result.format = kFormat;
+    result.stations = {station(20, {{"panasonic-gt", "a"}})};
+    const std::string text = starter(result);
+    EXPECT_THAT(text, HasSubstr("{name: at-gdt9080, at: \"GDT9080\", every: 1s}"));
+    EXPECT_THAT(text, HasSubstr("scale: 0.1, unit: celsius"));
+}
+
 TEST(Starter, WhoAnsweredLateIsGivenMoreTime) {
     scan::Result result;
     result.format = kFormat;

@@ -65,6 +65,15 @@ TEST(NotWrittenText, SaysWhatHasReachedThePanel) {
     EXPECT_EQ(not_written_text(object(R"({"title":"Bad Request"})")), "Bad Request");
 }
 
+TEST(NotWrittenText, HasNothingOfRest) {
+    EXPECT_EQ(not_written_text(object(R"({"detail":"the nearest are 21.5 and 21.6; ?round=true )"
+                                      R"(writes the nearest"})")),
+              "the nearest are 21.5 and 21.6");
+    EXPECT_EQ(not_written_text(object(R"({"detail":"a number that cannot be: line 1, column 10: )"
+                                      R"(1e400 is beyond what a 64-bit number holds"})")),
+              "1e400 is beyond what a 64-bit number holds");
+}
+
 TEST(EventCutter, TakesAnyPieces) {
     constexpr std::string_view kStream =
         ": panelgate\n\nretry: 2000\nid: 1\n\nid: 2\nevent: point\r\ndata: {\"a\":1}\r\n\r\n"

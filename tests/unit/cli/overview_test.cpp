@@ -114,7 +114,7 @@ TEST(StatusText, NamesWhatIsNotWell) {
 TEST(TopText, HasWhoUsesTheLineAndWhoIsSlow) {
     const std::string text = top_text(well(), 2, false);
     EXPECT_THAT(text, HasSubstr("http://127.0.0.1:8080, figures of the last 2.0 s\n"));
-    EXPECT_THAT(text, HasSubstr("floor1  up     52.5 %  [###########         ]      1        50.0"
+    EXPECT_THAT(text, HasSubstr("floor1  up     52.5 %  [########        ]      1        50.0"
                                 "       2.5  10.0 ms\n"));
     EXPECT_LT(text.find("http 10.0.0.7  floor1  79.5 %         8       2  timeout, 3.0 s ago"),
               text.find("poll of press"));

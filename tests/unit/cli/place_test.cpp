@@ -43,6 +43,33 @@ TEST(PlacesOf, SaysWhatIsMissing) {
     EXPECT_THAT(places_of(Words{"coils/4"}).wrong, HasSubstr("a station is missing before"));
     EXPECT_THAT(places_of(Words{"floor1/17", "floor1/18"}).wrong, HasSubstr("after 'floor1/17'"));
     EXPECT_NE(places_of(Words{}).wrong, "");
+    EXPECT_THAT(places_of(Words{"press", ""}).wrong, HasSubstr("a place is missing after 'press'"));
+}
+
+TEST(PlacesOf, SaysWhatIsWrongWithATable) {
+    const std::string told =
+        "there is no table 'holdings'; there are coils, discrete-inputs, input-registers, "
+        "holding-registers";
+    EXPECT_EQ(places_of(Words{"press", "holdings/4"}).wrong, told);
+    EXPECT_EQ(places_of(Words{"31", "holdings/4"}).wrong, told);
+    EXPECT_EQ(places_of(Words{"press/holdings/4"}).wrong, told);
+    EXPECT_EQ(places_of(Words{"floor1/17", "coils/"}).wrong,
+              "an address is missing after 'coils/', such as coils/4");
+    EXPECT_EQ(places_of(Words{"press/coils/"}).wrong,
+              "an address is missing after 'coils/', such as coils/4");
+}
+
+TEST(PlacesOf, BehindAPlaceTheNameOfAStationBeginsTheNext) {
+    const Words stations{"press", "oven"};
+    EXPECT_THAT(places_of(Words{"press", "UW0", "UW1", "oven", "GDT108"}, stations).list,
+                ElementsAre(Place{"press", "UW0"}, Place{"press", "UW1"}, Place{"oven", "GDT108"}));
+    EXPECT_THAT(places_of(Words{"press/UW0", "oven", "GDT108"}, stations).list,
+                ElementsAre(Place{"press", "UW0"}, Place{"oven", "GDT108"}));
+    EXPECT_THAT(places_of(Words{"press", "oven"}, stations).list,
+                ElementsAre(Place{"press", "oven"}))
+        << "its first place may have any name";
+    EXPECT_THAT(places_of(Words{"press", "UW0", "oven"}, stations).wrong,
+                HasSubstr("a place is missing after 'oven'"));
 }
 
 const std::vector<Station> kStations{

@@ -42,6 +42,14 @@ TEST(Printable, LeavesATerminalAlone) {
               2U);
 }
 
+TEST(CutToScreen, KeepsTheLastLineAndSaysWhatIsLeftOut) {
+    EXPECT_EQ(cut_to_screen("one\n\nthree\nend", 4, 3), "one\n\nthr\nend");
+    EXPECT_EQ(cut_to_screen("1\n2\n3\n4\n5\nend", 4, 20), "1\n2\n(3 more lines)\nend");
+    EXPECT_EQ(cut_to_screen("\x1b[1mload\x1b[0m", 24, 2), "\x1b[1mlo\x1b[0m");
+    EXPECT_EQ(cut_to_screen("\xC3\xB6ven", 24, 2), "\xC3\xB6v");
+    EXPECT_EQ(cut_to_screen("", 24, 80), "");
+}
+
 TEST(Times, HaveTheUnitThatAPersonWouldUse) {
     EXPECT_EQ(span_text(0.44), "0.4 s");
     EXPECT_EQ(span_text(35.9), "35 s");

@@ -59,6 +59,12 @@ TEST(PollSchedule, SpreadsEntriesOfOneIntervalEvenlyOverItAndGivesSlowOnesTheirF
     EXPECT_EQ(lost(slow), 0u);
 }
 
+TEST(PollSchedule, SlowEntriesOfSeveralIntervalsGetTheirFirstTurnSoonToo) {
+    PollSchedule schedule = make_schedule({600s, 20s, 60s, 40s}, 1000, 1s);
+    EXPECT_EQ(run(schedule, 5s), (Begun{{1, {0ms}}, {3, {250ms}}, {2, {500ms}}, {0, {750ms}}}));
+    EXPECT_EQ(run(schedule, 6s), (Begun{{3, {5s}}})) << "then each keeps its phase";
+}
+
 TEST(PollSchedule, KeepsIntervalsThatDivideEachOtherApart) {
     PollSchedule schedule = make_schedule({1s, 2s, 4s, 8s});
     while (*schedule.next_due() < kStart + 100s) {

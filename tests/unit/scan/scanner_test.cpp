@@ -147,6 +147,42 @@ TEST(Scanner, FindsTheFivePanelsOfTheDemo) {
     EXPECT_LT(line.now - line.start, 30s);
 }
 
+TEST(Scanner, QuickFindsTheSamePanelsInAThirdOfTheTime) {
+    DemoLine usual;
+    DemoLine line;
+    Settings settings;
+    settings.quick = true;
+    EXPECT_EQ(texts(line.scan(settings)), kDemo);
+    usual.scan({});
+    EXPECT_LT(3 * (line.now - line.start), usual.now - usual.start);
+}
+
+TEST(Scanner, QuickHearsTheSlowPanelThatItAsksLast) {
+    VirtualLine line;
+    line.add("omron-cp2e", 1);
+    line.add("autonics-gplp-s", 5).slow = 300ms;
+    Settings settings;
+    settings.quick = true;
+    settings.stations = {1, 5};
+    EXPECT_EQ(line.scan(settings).stations.size(), 2U);
+}
+
+TEST(Scanner, TellsOfPanelsAsSoonAsTheyAreKnown) {
+    DemoLine line;
+    Scanner scanner(shipped(), {}, line.start);
+    std::size_t known = 0;
+    for (Duration gone = 100ms; !scanner.done(); gone += 100ms) {
+        line.run(scanner, line.start + gone);
+        if (known == 0 && scanner.examined().size() == 1)
+            EXPECT_THAT(found_text(scanner.examined()[0]), HasSubstr("station 1: omron-cp2e, "));
+        EXPECT_GE(scanner.examined().size(), known);
+        known = scanner.examined().size();
+        if (known == 5) break;
+    }
+    EXPECT_EQ(known, 5U);
+    EXPECT_FALSE(scanner.done());
+}
+
 TEST(Scanner, ReportsAnAddressThatTwoPanelsShareAndStillTellsThePanel) {
     for (const char* profile : {"autonics-gplp-s", "panasonic-gt", "autonics-arm"}) {
         DemoLine line;
