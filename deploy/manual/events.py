@@ -23,6 +23,10 @@ ELSEWHERE = {"write": ("", ["line", "station", "client", "at", "pdu", "outcome",
              "connection gives way": ("info, warn", []),
              "datagram refused": ("debug, info, warn", [])}
 MEANINGS = {
+    "audit anchor": "the audit has come to this record; `panelgate audit verify --log` compares it",
+    "audit fails": "the audit's file takes nothing, and what happens to writes meanwhile",
+    "audit file": "a file was found that the audit cannot go on with; it is kept",
+    "audit recovered": "the audit's file takes records again; what waited is written",
     "bytes behind its replies": "more bytes come after a panel's replies; the line waits for them",
     "cannot accept": "a client could not be let in: usually no descriptor is left",
     "cannot start": "a listener could not be opened; the program ends",

@@ -83,8 +83,10 @@ struct CertificateWatch::Look {
     void make(std::size_t at, tls::Material files) {
         Fresh made{at, served[at].settings, nullptr, ""};
         made.settings.material = std::move(files);
+        made.settings.made = nullptr;
         try {
             made.context = std::make_shared<const tls::Context>(made.settings);
+            made.settings.made = made.context;
         } catch (const tls::Unusable& why) {
             made.why = why.what();
         }

@@ -138,6 +138,7 @@ SignalLoop::SignalLoop(asio::io_context& io)
     : io_(io), ends_(io, SIGTERM, SIGINT), reloads_(io, SIGHUP) {
     keep_until_the_process_goes();
     std::signal(SIGPIPE, SIG_IGN);  // the reader of our output may close it
+    std::signal(SIGXFSZ, SIG_IGN);  // a file at its limit (ulimit -f) is a full disk, no death
     std::signal(SIGUSR1, SIG_IGN);  // sent by some log rotation scripts; it would end the gateway
     std::signal(SIGUSR2, SIG_IGN);
 }

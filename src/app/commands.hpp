@@ -12,6 +12,7 @@ enum ExitCode : int {
     kNotReady = 1,  ///< health: /readyz is not 200
     kNotSet = 1,    ///< config get: the key is not set
     kDenied = 1,    ///< check --explain: the request is denied
+    kNo = 1,        ///< audit: the chain is not whole; no such record
     kUsage = 64,
     kNoInput = 66,
     kUnavailable = 69,
@@ -43,6 +44,31 @@ ExitCode config_get(const std::string& file, const std::string& path);
 ExitCode config_keys(const std::string& path, bool as_json);
 /// Prints a JSON Schema of the configuration.
 ExitCode schema();
+/// The command line of `audit`; texts are empty when not given.
+struct AuditOptions {
+    std::vector<std::string> files;       ///< none: those of the configuration
+    std::string config = kDefaultConfig;  ///< names them
+    std::vector<std::string> logs;        ///< of the gateway, for verify; "-" standard input
+    std::string station;
+    std::string since;
+    std::string until;
+    std::string kind;
+    std::string client;
+    bool json = false;
+};
+/// Says whether an audit is whole, or what is wrong with it first.
+ExitCode audit_verify(const AuditOptions& options);
+/// Prints records.
+ExitCode audit_show(const AuditOptions& options);
+/// The command line of `token new`.
+struct TokenOptions {
+    std::string name;
+    std::string role = "operator";
+    std::string expires;  ///< "90d", "2027-12-31", or empty
+    std::string output;   ///< the file for its hash; empty: it is printed
+};
+/// Makes a token and prints it once, with what the configuration must say.
+ExitCode token_new(const TokenOptions& options);
 /// Checks whether the gateway is ready. `http`: "ADDR:PORT" of its REST API; if empty, the address
 /// from `file`, or the default if there is no readable file.
 ExitCode health(const std::string& file, const std::string& http);

@@ -62,6 +62,10 @@ std::vector<points::RelayRoute> routes_of(const Snapshot& snapshot) {
     return routes;
 }
 
+std::vector<web::Token> tokens_of(const config::Config& config) {
+    return config.http ? config.http->tokens : std::vector<web::Token>{};
+}
+
 std::shared_ptr<const web::Directory> directory_in(const std::shared_ptr<Snapshot>& snapshot) {
     return {snapshot, &snapshot->directory};
 }
@@ -103,6 +107,10 @@ LineWatch Gateway::watch() {
                           const std::vector<std::size_t>& wants) {
         on_points(line, station, wants);
     };
+    watch.write = [this](const std::string& line, const bus::WriteEnd& end) {
+        audit_.write(line, end);
+    };
+    watch.refuses_writes = [this] { return audit_.refuses_writes(); };
     return watch;
 }
 
@@ -186,6 +194,7 @@ void Gateway::show(const std::shared_ptr<Snapshot>& snapshot) {
             snapshot->directory.lines[i].history = snapshot->histories[i].get();
     }
     snapshot_ = snapshot;
+    audit_.show(snapshot_);
     northbound_.show(snapshot_);
 }
 
@@ -198,6 +207,7 @@ void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedTex
     servers_.open(*config, draft, {directory, [this] { return providers(); }});
     // Nothing below throws.
     const bool kept_nothing = line_histories_ == nullptr;
+    audit_.tokens(tokens_of(*snapshot_->config), tokens_of(*config));
     rest_wires(*config, lines);
     retire_lines(lines);
     apply_lines(*config, lines);
@@ -222,6 +232,13 @@ void Gateway::watch_certificates() {
                 servers_.renew(served.listener, served.settings, std::move(context));
             });
     if (certificates_) certificates_->follow(config);
+}
+
+void Gateway::record(const web::ReloadVerdict& verdict) {
+    const bool was_kept = audit_.is_kept();
+    audit_.reload(verdict);
+    audit_.apply(snapshot_->config->audit);
+    if (!was_kept) audit_.reload(verdict);
 }
 
 web::Providers Gateway::providers() {
@@ -253,6 +270,7 @@ web::Providers Gateway::providers() {
     providers.wall = rt::wall_now;
     providers.discovery = discoveries_.get();
     providers.reload = reloads_;
+    providers.record = audit_.deeds();
     return providers;
 }
 
@@ -263,6 +281,7 @@ void Gateway::start() {
     servers_.open(*snapshot_->config, snapshot_->plant,
                   {directory, [this] { return providers(); }});
     lag_.start();
+    audit_.apply(snapshot_->config->audit);
     for (const auto& line : snapshot_->lines) line->start();
     relays_->start();
     if (line_histories_) line_histories_->start();
@@ -305,6 +324,7 @@ void Gateway::stop() {
     if (line_histories_) line_histories_->stop();
     relays_->stop();
     for (const auto& line : snapshot_->lines) line->stop();
+    audit_.close();
 }
 
 /// Copies one piece of the figures: a line, some points, or all the rest, which is small.
@@ -319,6 +339,7 @@ bool Gateway::copy_figures(metrics::Snapshot& figures, PointCopy& points,
     figures.relays = relay_samples(relays_->status());
     servers_.copy_figures(figures);
     figures.mqtt = northbound_.counters();
+    if (audit_.is_kept()) figures.audit = audit_.counters();
     if (reloads_->barred(false).empty()) figures.reloads = reloads_->counters();
     figures.version = PANELGATE_VERSION;
     figures.commit = build_commit();

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "audit_book.hpp"
 #include "certificates.hpp"
 #include "discoveries.hpp"
 #include "http_door.hpp"
@@ -48,6 +49,8 @@ class Gateway {
     /// then nothing has changed. `shown`: its text for REST. Unchanged stations share their profile
     /// with the running ones (config::share_profiles()).
     void apply(std::shared_ptr<const config::Config> config, web::SharedText shown);
+    /// Records a reload, whatever became of it, and keeps the audit as it now is configured.
+    void record(const web::ReloadVerdict& verdict);
     const std::shared_ptr<const config::Config>& config() const { return snapshot_->config; }
     /// Stops accepting; accepted requests are answered within their deadline.
     void stop_accepting();
@@ -85,6 +88,7 @@ class Gateway {
     boost::asio::any_io_executor executor_;
     rt::AsioClock clock_;
     rt::LoopLag lag_{clock_};
+    AuditBook audit_{executor_, clock_};  ///< lines record in it until they are destroyed
     bool simulate_;
     Reloader* reloads_;
     web::EventHub events_;  ///< buses publish to it until they are destroyed

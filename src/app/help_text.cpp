@@ -62,6 +62,19 @@ constexpr std::array kExamples{
     Example{"new-server", "cert new-server gateway.plant 10.0.0.5"},
     Example{"new-client", "cert new-client scada --role operator"},
     Example{"revoke", "cert revoke scada.crt"},
+    Example{"audit",
+            "audit verify --log panelgate.log\n"
+            "audit show --station press --since 1h"},
+    Example{"verify",
+            "audit verify -c panelgate.yaml --log panelgate.log\n"
+            "audit verify audit.jsonl audit.jsonl.000000000001"},
+    Example{"show",
+            "audit show --station press --since 1h\naudit show --kind reload --since 7d\n"
+            "audit show --client ops --json"},
+    Example{"token", "token new --name scada --role operator --expires 90d"},
+    Example{"new",
+            "token new --name scada --role operator --expires 90d\n"
+            "token new --name wall --role viewer -o /etc/panelgate/wall.hash"},
     Example{"profiles", "profiles\nprofiles autonics-gplp-s\nprofiles --check acme-meter.yaml"},
 };
 

@@ -65,6 +65,7 @@ class CommandLine {
         add_import();
         add_address();
         add_profiles();
+        add_security_commands(cli_, code_);
         add_certificate_commands(cli_, code_);
         add_help();
         add_groups();

@@ -111,6 +111,7 @@ config::Config but_equal_lines(const config::Config& config, const config::Confi
     made.log = config.log;
     made.realtime = config.realtime;
     made.access = config.access;
+    made.audit = config.audit;
     for (const config::Line& line : config.lines) {
         if (std::ranges::find(other.lines, line) == other.lines.end()) made.lines.push_back(line);
     }
@@ -261,6 +262,7 @@ void Reloader::end(const std::shared_ptr<Job>& job) {
     ++counters_.reloads[static_cast<std::size_t>(verdict.outcome)];
     if (good) counters_.last_success_unix = unix_now();
     log_verdict(verdict);
+    gateway_->record(verdict);
     last_ = std::make_shared<const web::ReloadVerdict>(std::move(verdict));
     if (step_) step_(false);
     for (Waiting& one : std::exchange(served_, {})) one.handler(last_);

@@ -248,6 +248,12 @@ bus::Settings RunningLine::settings_of(const config::Line& line) {
     settings.observe = [this, name = line.name](const bus::BusEvent& event) {
         on_event(name, event);
     };
+    if (watch_.write) {
+        settings.record_write = [this, name = line.name](const bus::WriteEnd& end) {
+            watch_.write(name, end);
+        };
+    }
+    settings.refuses_writes = watch_.refuses_writes;
     return settings;
 }
 

@@ -52,6 +52,10 @@ struct LineWatch {
     std::function<void(const std::string& line, std::uint8_t station,
                        const std::vector<std::size_t>& wants)>
         points;
+    /// A write has ended; for an audit. May be empty.
+    std::function<void(const std::string& line, const bus::WriteEnd& end)> write{};
+    /// True while no write may be sent. May be empty.
+    std::function<bool()> refuses_writes{};
 };
 
 /// The wire of a line, whatever its name: its device with links resolved, or the far end.

@@ -1,9 +1,8 @@
 #include "panelgate/audit/chain.hpp"
 
-#include <openssl/evp.h>
 #include <algorithm>
+#include <array>
 #include <charconv>
-#include <stdexcept>
 #include <utility>
 
 namespace panelgate::audit {
@@ -41,37 +40,6 @@ std::optional<Hash> parse_hash(std::string_view text) {
     return hash;
 }
 
-struct Digest::Context {
-    ~Context() {
-        EVP_MD_CTX_free(context);
-        EVP_MD_free(sha256);
-    }
-    EVP_MD* sha256 = EVP_MD_fetch(nullptr, "SHA256", nullptr);
-    EVP_MD_CTX* context = EVP_MD_CTX_new();
-};
-
-Digest::Digest() : context_(std::make_unique<Context>()) {}
-Digest::~Digest() = default;
-Digest::Digest(Digest&&) noexcept = default;
-Digest& Digest::operator=(Digest&&) noexcept = default;
-
-Hash Digest::of(const Hash& previous, std::string_view text) {
-    std::array<unsigned char, 32> bytes{};
-    const bool done = context_->sha256 != nullptr && context_->context != nullptr &&
-                      EVP_DigestInit_ex2(context_->context, context_->sha256, nullptr) == 1 &&
-                      EVP_DigestUpdate(context_->context, previous.data(), previous.size()) == 1 &&
-                      EVP_DigestUpdate(context_->context, text.data(), text.size()) == 1 &&
-                      EVP_DigestFinal_ex(context_->context, bytes.data(), nullptr) == 1;
-    if (!done) throw std::runtime_error("OpenSSL has no SHA-256");
-    constexpr std::string_view kDigits = "0123456789abcdef";
-    Hash hash{};
-    for (std::size_t i = 0; i < bytes.size(); ++i) {
-        hash[2 * i] = kDigits[bytes[i] >> 4U];
-        hash[2 * i + 1] = kDigits[bytes[i] & 0x0fU];
-    }
-    return hash;
-}
-
 void Chain::append(std::string& out, std::string_view body) {
     const std::size_t begin = out.size();
     std::array<char, 20> digits{};
@@ -82,7 +50,7 @@ void Chain::append(std::string& out, std::string_view body) {
     out.append(digits.data(), end);
     out += ',';
     out += body;
-    last_.hash = digest_.of(last_.hash, std::string_view(out).substr(begin));
+    last_.hash = digest_.of(text_of(last_.hash), std::string_view(out).substr(begin));
     out += kHash;
     out += text_of(last_.hash);
     out += kClose;

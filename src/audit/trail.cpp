@@ -1,6 +1,11 @@
 #include "panelgate/audit/trail.hpp"
 
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <condition_variable>
 #include <csignal>
 #include <exception>
@@ -29,11 +34,84 @@ std::thread start_thread(std::function<void()> run) {
     return thread;
 }
 
+/// The local syslog, in the format of RFC 5424. Never waits: what it does not take is lost there,
+/// and counted.
+class Syslog {
+  public:
+    explicit Syslog(std::string socket) : path_(std::move(socket)) {
+        std::array<char, 256> name{};
+        if (::gethostname(name.data(), name.size() - 1) == 0) host_ = name.data();
+        if (host_.empty()) host_ = "-";
+    }
+    ~Syslog() { close(); }
+    Syslog(const Syslog&) = delete;
+    Syslog& operator=(const Syslog&) = delete;
+
+    /// Sends each of the bodies; returns how many were not taken.
+    std::uint64_t send(std::string_view bodies) {
+        std::uint64_t lost = 0;
+        while (!bodies.empty()) {
+            const std::size_t end = std::min(bodies.find('\n'), bodies.size());
+            if (!send_one(bodies.substr(0, end))) ++lost;
+            bodies.remove_prefix(std::min(end + 1, bodies.size()));
+        }
+        return lost;
+    }
+
+  private:
+    /// `"time":"T","kind":"K",...` becomes `<110>1 T HOST panelgate PID K - {...}`: 110 is the
+    /// facility "log audit" at level info.
+    bool send_one(std::string_view body) {
+        text_ = "<110>1 ";
+        text_ += quoted_behind(body, "\"time\":\"");
+        text_ += ' ' + host_ + " panelgate " + std::to_string(::getpid()) + ' ';
+        text_ += quoted_behind(body, "\"kind\":\"");
+        text_ += " - {";
+        text_ += body;
+        text_ += '}';
+        if (socket_ < 0 && !connect()) return false;
+        if (::send(socket_, text_.data(), text_.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0)
+            return true;
+        if (errno != EAGAIN && errno != ENOBUFS) close();  // it was restarted: the next one tries
+        return false;
+    }
+    static std::string_view quoted_behind(std::string_view body, std::string_view key) {
+        const auto at = body.find(key);
+        if (at == body.npos) return "-";
+        const std::string_view rest = body.substr(at + key.size());
+        return rest.substr(0, rest.find('"'));
+    }
+    bool connect() {
+        sockaddr_un address{};
+        address.sun_family = AF_UNIX;
+        if (path_.size() >= sizeof(address.sun_path)) return false;
+        std::ranges::copy(path_, address.sun_path);
+        socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+        const auto* where = reinterpret_cast<const sockaddr*>(&address);
+        if (socket_ >= 0 && ::connect(socket_, where, sizeof(address)) == 0) return true;
+        close();
+        return false;
+    }
+    void close() {
+        if (socket_ >= 0) ::close(socket_);
+        socket_ = -1;
+    }
+
+    std::string path_;
+    std::string host_;
+    std::string text_;
+    int socket_ = -1;
+};
+
 }  // namespace
 
 struct Trail::State {
     State(const Settings& s, Hooks h, std::atomic<bool>& f)
-        : settings(s), hooks(std::move(h)), failing(f), writer(s, hooks.wall, hooks.start) {
+        : settings(s),
+          hooks(std::move(h)),
+          failing(f),
+          writer(s, hooks.wall, hooks.start),
+          syslog(s.syslog_socket) {
         pending.reserve(std::min<std::size_t>(settings.buffer, 64 * 1024));
     }
 
@@ -50,7 +128,8 @@ struct Trail::State {
     Settings settings;
     std::optional<Settings> next;
     std::string pending;
-    std::uint64_t lost = 0;  ///< not yet recorded
+    std::size_t of_last = 0;  ///< bytes of `pending` from before `next` was wanted
+    std::uint64_t lost = 0;   ///< not yet recorded
     Counters counters;
     bool stop = false;
 
@@ -58,6 +137,8 @@ struct Trail::State {
     Hooks hooks;
     std::atomic<bool>& failing;
     Writer writer;
+    Syslog syslog;
+    std::uint64_t syslog_lost = 0;
     Composer composer;
     std::string taken;
     std::uint64_t failures = 0;
@@ -78,14 +159,22 @@ bool Trail::State::wait(std::unique_lock<std::mutex>& lock) {
     return stop;
 }
 
-/// Call with the lock.
+/// Call with the lock. What was added before another file was wanted belongs to the one before, if
+/// that takes it.
 void Trail::State::take_over() {
-    if (next) {
+    const bool is_drained = of_last == 0 && writer.idle();
+    if (next && (is_drained || failing || next->file == settings.file)) {
         settings = *std::exchange(next, std::nullopt);
         writer.apply(settings);
         anchored = 0;
+        of_last = 0;
     }
     if (!writer.idle()) return;
+    if (next) {
+        taken.assign(pending, 0, of_last);
+        pending.erase(0, std::exchange(of_last, 0));
+        return;
+    }
     const std::uint64_t left_out = std::exchange(lost, 0);
     std::swap(taken, pending);
     if (left_out == 0) return;
@@ -110,6 +199,7 @@ void Trail::State::work() {
     bool good = false;
     std::string why;
     try {
+        if (!taken.empty() && settings.syslog) syslog_lost += syslog.send(taken);
         if (!taken.empty()) writer.take(taken);
         taken.clear();
         good = writer.work();
@@ -131,6 +221,7 @@ void Trail::State::publish() {
     counters.records = writer.records();
     counters.rotations = writer.rotations();
     counters.failures = failures;
+    counters.syslog_lost = syslog_lost;
     counters.failing = failing;
 }
 
@@ -145,12 +236,14 @@ void Trail::State::run() {
         lock.lock();
         publish();
     }
-    if (failing) return;
-    take_over();  // what came while the last try was going on
-    lock.unlock();
-    work();
-    lock.lock();
-    publish();
+    // What came while the last try was going on, and what belongs to another file.
+    for (int i = 0; i < 2 && !failing; ++i) {
+        take_over();
+        lock.unlock();
+        work();
+        lock.lock();
+        publish();
+    }
 }
 
 Trail::Trail(const Settings& settings, Hooks hooks)
@@ -194,7 +287,8 @@ void Trail::add(std::string_view body) {
 void Trail::apply(const Settings& settings) {
     {
         const std::scoped_lock lock(state_->mutex);
-        if (settings == state_->settings) return;
+        if (settings == state_->settings && !state_->next) return;
+        if (!state_->next) state_->of_last = state_->pending.size();
         state_->next = settings;
     }
     state_->wake.notify_one();

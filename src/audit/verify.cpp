@@ -143,7 +143,7 @@ void Verifier::judge(const Sealed& record) {
         return decide(Fault::Kind::added, record_text(record.number) + " stands again behind " +
                                               record_text(report_.last.number));
     }
-    if (digest_.of(report_.last.hash, record.text) != record.hash)
+    if (digest_.of(text_of(report_.last.hash), record.text) != record.hash)
         return suspect(Fault::Kind::changed, &record);
     accept(record);
 }
@@ -177,12 +177,13 @@ void Verifier::look_on(const Sealed& record) {
 /// A record, or a line that is none, did not fit. One more record tells what it was.
 void Verifier::look_on_after_change(const Sealed& record) {
     const std::uint64_t number = suspect_->fault.number;
-    if (record.number == number && digest_.of(report_.last.hash, record.text) == record.hash)
+    if (record.number == number &&
+        digest_.of(text_of(report_.last.hash), record.text) == record.hash)
         return decide(Fault::Kind::added, "a line was added before " + record_text(number));
     if (suspect_->found == 0)
         return decide(Fault::Kind::changed, record_text(number) + " is no record any more");
-    const bool hash_is_right =
-        record.number == number + 1 && digest_.of(suspect_->claimed, record.text) == record.hash;
+    const bool hash_is_right = record.number == number + 1 &&
+                               digest_.of(text_of(suspect_->claimed), record.text) == record.hash;
     std::string text = record_text(number) + " was changed";
     if (number > 1 && hash_is_right)
         text += " (or " + record_text(number - 1) + " together with its hash)";

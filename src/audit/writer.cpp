@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "panelgate/audit/files.hpp"
+
 namespace panelgate::audit {
 
 namespace fs = std::filesystem;
@@ -21,7 +23,6 @@ namespace {
 constexpr std::size_t kTail = 256 * 1024;   // of a file, to find its last record
 constexpr std::size_t kChunk = 128 * 1024;  // written at once
 constexpr std::size_t kTornShown = 512;
-constexpr std::size_t kDigits = 12;
 
 /// Reads `count` bytes at `from`; fewer at the end of the file.
 std::string read_at(int file, off_t from, std::size_t count) {
@@ -36,24 +37,6 @@ std::string read_at(int file, off_t from, std::size_t count) {
     }
     text.resize(got);
     return text;
-}
-
-/// The rotated files, oldest first: their numbers have leading zeros.
-std::vector<std::string> rotated_files(const std::string& file) {
-    const fs::path path(file);
-    const std::string begin = path.filename().string() + '.';
-    std::vector<std::string> found;
-    std::error_code error;
-    const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-    for (const auto& entry : fs::directory_iterator(folder, error)) {
-        const std::string name = entry.path().filename().string();
-        if (name.size() < begin.size() + kDigits || !name.starts_with(begin)) continue;
-        const std::string_view digits = std::string_view(name).substr(begin.size(), kDigits);
-        if (std::ranges::all_of(digits, [](char c) { return c >= '0' && c <= '9'; }))
-            found.push_back(entry.path().string());
-    }
-    std::ranges::sort(found);
-    return found;
 }
 
 /// Renames without ever replacing another file: "NAME", or "NAME-2", ... Returns the name; "" if
@@ -81,12 +64,6 @@ void sync_folder(const std::string& file) {
 
 }  // namespace
 
-std::string rotated_name(const std::string& file, std::uint64_t first) {
-    std::string digits = std::to_string(first);
-    if (digits.size() < kDigits) digits.insert(0, kDigits - digits.size(), '0');
-    return file + '.' + digits;
-}
-
 Writer::Writer(Settings settings, Wall wall, std::string start)
     : settings_(std::move(settings)), wall_(std::move(wall)), start_(std::move(start)) {}
 
@@ -102,13 +79,28 @@ void Writer::apply(const Settings& settings) {
     settings_ = settings;
     if (!other) return;
     close();
+    take_back();
     chain_ = Chain();
     safe_ = {};
-    known_ = begun_ = unclean_ = false;
-    batch_.clear();
+    known_ = begun_ = unclean_ = unsynced_ = false;
+    sealed_ = 0;
+    torn_bytes_ = 0;
+}
+
+/// What another file did not take any more belongs to the next one's chain.
+void Writer::take_back() {
+    std::string bodies;
+    const std::size_t line = sent_ == 0 ? 0 : out_.rfind('\n', sent_ - 1) + 1;  // npos + 1 is 0
+    for (std::size_t at = line; at < out_.size();) {
+        const std::size_t end = std::min(out_.find('\n', at), out_.size());
+        const auto record = parse_line(std::string_view(out_).substr(at, end - at));
+        if (record && sent_ < out_.size()) bodies.append(record->body) += '\n';
+        at = end + 1;
+    }
+    bodies.append(batch_, std::min(at_, batch_.size()));
+    batch_ = std::move(bodies);
     out_.clear();
     at_ = sent_ = 0;
-    torn_bytes_ = 0;
 }
 
 void Writer::take(std::string& bodies) {

@@ -15,9 +15,6 @@
 
 namespace panelgate::audit {
 
-/// A file's name behind which the number of its first record stands: FILE.000000000001.
-std::string rotated_name(const std::string& file, std::uint64_t first);
-
 /// Writes a chain to a file and its successors, synchronously. Nothing that was given to it is
 /// dropped when the disk fails: work() goes on where it stopped. One thread.
 class Writer {
@@ -30,7 +27,8 @@ class Writer {
     Writer(const Writer&) = delete;
     Writer& operator=(const Writer&) = delete;
 
-    /// Another file begins with a record `start` of its own; the chain is that file's.
+    /// Another file begins with a record `start` of its own; the chain is that file's. What the
+    /// file before has not taken is written there.
     void apply(const Settings& settings);
     /// Takes bodies, one a line; only when idle().
     void take(std::string& bodies);
@@ -57,6 +55,7 @@ class Writer {
     void begin_file();
     void begin_run();
     void seal();
+    void take_back();
     bool flush();
     bool sync();
     bool fail(const std::string& what);

@@ -85,8 +85,7 @@ bool is_accepted(const WriteRecord& write, Outcome outcome) {
     return write.transaction != 0 || outcome == Outcome::ok;
 }
 
-std::string place_of(const modbus::Request& request) {
-    const auto written = request.access().write;
+std::string place_of(const std::optional<modbus::Span>& written) {
     if (!written) return "";
     return std::string(modbus::label(written->table)) + '/' + std::to_string(written->first);
 }
@@ -94,16 +93,31 @@ std::string place_of(const modbus::Request& request) {
 }  // namespace
 
 std::optional<WriteRecord> write_record_of(const Request& request) {
-    if (request.poll || !may_write(request.request.pdu())) return std::nullopt;
-    return WriteRecord{
-        request.who, place_of(request.request), hex_of(request.request.pdu()), 0, {}};
+    const modbus::Request& asked = request.request;
+    if (!may_write(asked.pdu())) return std::nullopt;
+    return WriteRecord{request.who, asked.pdu(), asked.access().write, !request.poll};
 }
 
 std::optional<WriteRecord> write_record_of(ByteView pdu, const WhoRef& who) {
     if (!may_write(pdu)) return std::nullopt;
-    const auto request =
-        modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
-    return WriteRecord{who, request ? place_of(*request) : std::string(), hex_of(pdu), 0, {}};
+    WriteRecord write{who, Bytes(pdu.begin(), pdu.end())};
+    if (modbus::check_request(pdu, modbus::QuantityCheck::wide))
+        write.items = modbus::access_of(pdu).write;
+    return write;
+}
+
+std::optional<Refusal> unrecordable(const Settings& settings, std::uint8_t station) {
+    if (!settings.refuses_writes || !settings.refuses_writes()) return std::nullopt;
+    return unrecorded(name_of(settings.stations, station));
+}
+
+void complete(WriteRecord& write, const Answer& answer) {
+    write.transmitted = answer.transmitted;
+    write.transaction = answer.transactions.last();
+    if (answer.pdu && !answer.refusal) write.exception = modbus::exception_of(*answer.pdu);
+    if (!answer.refusal) return;
+    const Rule rule = answer.refusal->rule;
+    write.rule = rule == Rule::denied ? answer.refusal->why : std::string(label(rule));
 }
 
 void log_write(const Settings& settings, std::uint8_t station, const WriteRecord& write,
@@ -112,20 +126,42 @@ void log_write(const Settings& settings, std::uint8_t station, const WriteRecord
         station == 0 ? std::string("broadcast") : name_of(settings.stations, station);
     const std::string full_name = text_of(write.who);
     const std::string client = without_port(full_name);
-    const std::string place = settings.name + '/' + name + ' ' + write.place;
+    const std::string at = place_of(write.items);
+    const std::string pdu = hex_of(write.pdu);
+    const std::string place = settings.name + '/' + name + ' ' + at;
     const std::string ended(label(outcome));
     const bool accepted = is_accepted(write, outcome);
     std::vector<rt::LogField> fields{
         {"line", settings.name}, {"station", name}, {"client", full_name}};
-    if (!write.place.empty()) fields.push_back({"at", write.place});
-    fields.push_back({"pdu", accepted ? write.pdu : shortened(write.pdu)});
+    if (!at.empty()) fields.push_back({"at", at});
+    fields.push_back({"pdu", accepted ? pdu : shortened(pdu)});
     fields.push_back({"outcome", ended});
     const std::string transaction = std::to_string(write.transaction);
     if (write.transaction != 0) fields.push_back({"transaction", transaction});
     if (!write.rule.empty()) fields.push_back({"rule", write.rule});
     if (!accepted) return rt::log_collapsed("write", place + ' ' + client, fields);
-    rt::log_each("write", place, client + ' ' + write.pdu + ' ' + ended, fields);
+    rt::log_each("write", place, client + ' ' + pdu + ' ' + ended, fields);
 }
+
+namespace {
+
+void record_write(const Settings& settings, std::uint8_t station, const WriteRecord& write,
+                  Outcome outcome) {
+    if (!settings.record_write) return;
+    WriteEnd end;
+    end.station = station;
+    end.pdu = write.pdu;
+    end.items = write.items;
+    end.who = write.who;
+    end.outcome = outcome;
+    end.transmitted = write.transmitted;
+    end.transaction = write.transaction;
+    end.exception = write.exception;
+    end.rule = write.rule;
+    settings.record_write(end);
+}
+
+}  // namespace
 
 namespace {
 
@@ -377,7 +413,8 @@ Account::Account(const Settings& settings) : settings_(settings), counters_(sett
 void Account::add(std::uint8_t station, std::uint8_t function,
                   const std::optional<WriteRecord>& write, Outcome outcome, Duration took) {
     counters_.count(station, function, outcome, took);
-    if (write) log_write(settings_, station, *write, outcome);
+    if (write && write->logged) log_write(settings_, station, *write, outcome);
+    if (write) record_write(settings_, station, *write, outcome);
     observe(settings_, TransactionEvent{station, function, outcome, took});
 }
 

@@ -26,20 +26,27 @@ namespace panelgate::bus {
 /// Logs a station event in one line, with a hint.
 void log_event(const Settings& settings, const arbiter::StationEvent& event);
 
-/// What is logged of a client's write when it ends.
+/// What is recorded of a write when it ends.
 struct WriteRecord {
     WhoRef who;
-    std::string place;  ///< "holding-registers/100", or empty
-    std::string pdu;    ///< hex
+    Bytes pdu;                            ///< as asked
+    std::optional<modbus::Span> items{};  ///< that it writes, if it says so
+    bool logged = true;                   ///< false: the gateway's own (relays), only for the audit
+    bool transmitted = false;
     /// The last transaction made for it, as in the trace; 0: none.
     arbiter::Transaction transaction = 0;
-    std::string rule{};  ///< the rule of `access` that denied it; empty: none
+    std::optional<std::uint8_t> exception{};  ///< the panel's
+    std::string rule{};  ///< what refused it: a rule of `access` by its name, or a bus::Rule
 };
 
-/// Returns nullopt for reads and for the gateway's own requests (polls, relays).
+/// Returns nullopt for reads.
 std::optional<WriteRecord> write_record_of(const Request& request);
-/// The same for a PDU that was never submitted; without `place` if it is not a valid request.
+/// The same for a PDU that was never submitted; without `items` if it is not a valid request.
 std::optional<WriteRecord> write_record_of(ByteView pdu, const WhoRef& who);
+/// Refuses a write while none can be recorded.
+std::optional<Refusal> unrecordable(const Settings& settings, std::uint8_t station);
+/// Completes the record of a write that has ended.
+void complete(WriteRecord& write, const Answer& answer);
 /// Logs at info. Every transmitted write is logged with its whole PDU (rt::log_each); writes that
 /// were refused or abandoned before are rate-limited.
 void log_write(const Settings& settings, std::uint8_t station, const WriteRecord& write,
@@ -184,8 +191,7 @@ class Account {
              Outcome outcome, Duration took);
     /// Counts a request that a server refused before submitting it, by a rule of `access` if it is
     /// named. An empty PDU is ignored.
-    void add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who,
-                     std::string rule = {});
+    void add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who, std::string rule = {});
 
     RequestCounters& counters() { return counters_; }
     const RequestCounters& counters() const { return counters_; }

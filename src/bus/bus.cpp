@@ -72,14 +72,14 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     entry.write = write_record_of(request);
     entry.client = request.client;
     clients.count_request(request.client);
-    const bool broadcast = request.station == 0;
-    if (broadcast ? !what.is_broadcastable() : what.is_never_answered()) {
+    if (request.station == 0 ? !what.is_broadcastable() : what.is_never_answered())
         return refuse(std::move(entry), Fault::denied);
-    }
     auto other = translated(settings.stations, request.station, what);
     if (auto refusal = rights.judge(request.who, question_of(request, other)))
         return refuse(std::move(entry), Fault::denied, std::move(refusal));
-    if (auto refusal = rights.judge(request.station, what)) {
+    auto refusal = rights.judge(request.station, what);
+    if (!refusal && entry.write) refusal = unrecordable(settings, request.station);
+    if (refusal) {
         Result<Bytes> reply = answer_to(*refusal, what.function());
         return refuse(std::move(entry), std::move(reply), std::move(refusal));
     }
@@ -167,18 +167,13 @@ void Bus::State::check_delivery(TimePoint now) {
         line->reset("what was sent is not taken: the way to the wire is blocked");
 }
 
-void Bus::State::deny(Pending& entry, const Refusal& by) {
-    ++denials[by.why];
-    if (entry.write) entry.write->rule = by.why;
-}
-
 /// Counts every answer, then delivers it from the loop, never from inside a client's call.
 void Bus::State::answer(Pending entry, Answer result) {
     const TimePoint now = clock.now();
     const Duration took = now - entry.arrived;
     const Outcome outcome = outcome_of(result);
-    if (result.refusal && result.refusal->rule == Rule::denied) deny(entry, *result.refusal);
-    if (entry.write) entry.write->transaction = result.transactions.last();
+    if (result.refusal && result.refusal->rule == Rule::denied) ++denials[result.refusal->why];
+    if (entry.write) complete(*entry.write, result);
     account.add(entry.station, entry.function, entry.write, outcome, took);
     clients.count_outcome(entry.client, outcome, now);
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
@@ -308,7 +303,8 @@ std::optional<Refusal> Bus::refusal_of(const Request& request) const {
 }
 
 std::optional<Refusal> Bus::write_refusal(std::uint8_t station) const {
-    return state_->rights.judge_write(station);
+    auto refusal = state_->rights.judge_write(station);
+    return refusal ? refusal : unrecordable(state_->settings, station);
 }
 
 TracePart Bus::trace(std::size_t last) const { return state_->book.store().part(last); }

@@ -105,7 +105,6 @@ struct Bus::State final : public line::Line::Events {
         --calls;
     }
     void answer(Pending pending, Answer answer);
-    void deny(Pending& entry, const Refusal& by);
     LineCounts counts() const {
         return {arbiter.station_counters(), arbiter.counters().broadcasts, *line};
     }

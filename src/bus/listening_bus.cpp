@@ -345,8 +345,9 @@ Refusal ListeningBus::State::refusal(std::uint8_t station) const {
 
 void ListeningBus::State::refuse(Request request, AnswerHandler handler) {
     const std::uint8_t function = request.request.function();
-    account.add(request.station, function, write_record_of(request), Outcome::refused,
-                Duration::zero());
+    auto write = write_record_of(request);
+    if (write) write->rule = label(Rule::listening);
+    account.add(request.station, function, write, Outcome::refused, Duration::zero());
     Answer answer;
     answer.refusal = refusal(request.station);
     answer.pdu = answer_to(*answer.refusal, function);

@@ -21,6 +21,8 @@ std::string_view label(Rule rule) {
             return "read-only";
         case Rule::denied:
             return "denied";
+        case Rule::unrecorded:
+            return "audit";
     }
     std::abort();
 }
@@ -53,6 +55,8 @@ modbus::ExceptionCode code_of(Rule rule) {
         case Rule::range:
         case Rule::write_protected:  // the manuals disagree about the code
             return modbus::ExceptionCode::illegal_data_address;
+        case Rule::unrecorded:
+            return modbus::ExceptionCode::server_device_busy;
     }
     std::abort();
 }
@@ -62,6 +66,8 @@ Refusal refusal_by(Rule rule, std::string station, std::string why = {}) {
 }
 
 }  // namespace
+
+Refusal unrecorded(std::string station) { return refusal_by(Rule::unrecorded, std::move(station)); }
 
 Result<Bytes> answer_to(const Refusal& refusal, std::uint8_t function) {
     if (is_access(refusal.rule)) return Fault::denied;

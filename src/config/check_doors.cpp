@@ -239,9 +239,9 @@ bool is_container_secret(std::string_view path) {
 
 void warn_of_token(Loading& loading, const Node& node, const web::Token& token) {
     const Node* file = node.find("file");
-    if (token.secret.size() < kShortToken)
+    if (token.characters > 0 && token.characters < kShortToken)
         loading.warn(file->mark, "the token in " + file->scalar + " has " +
-                                     std::to_string(token.secret.size()) + " characters; take " +
+                                     std::to_string(token.characters) + " characters; take " +
                                      std::to_string(kShortToken) +
                                      " or more, such as of `openssl rand -hex 16`");
     if (is_container_secret(file->scalar)) return;

@@ -62,6 +62,7 @@ access:
        range: {table: holding-registers, address: 0, count: 500}}
 log: {level: info}
 realtime: {priority: 20}
+audit: {file: /var/log/panelgate/audit.jsonl}
 )";
 
 /// Certificates, their keys and tokens.

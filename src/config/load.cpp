@@ -319,6 +319,7 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     load_rules(loading, root);
     load_log(loading, root);
     load_realtime(loading, root);
+    load_audit(loading, root);
     load_relays(loading, root);
     const bool mistyped = root.is_mistyped("modbus_tcp") || root.is_mistyped("http") ||
                           std::ranges::any_of(tree.entries, [](const yaml::Entry& entry) {

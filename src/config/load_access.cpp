@@ -78,7 +78,7 @@ std::string path_of(const Node* file) {
     return is_path ? ' ' + file->scalar : "";
 }
 
-/// Reads a token's secret: the file's text without surrounding blanks and byte order mark.
+/// Reads a token, or its hash: the file's text without surrounding blanks and byte order mark.
 /// `elsewhere`: the secret is in the configuration, which is already a problem.
 std::string load_secret(Loading& loading, MapReader& in, bool elsewhere, web::Token& token) {
     constexpr std::string_view kBlanks = " \t\r\n";
@@ -122,6 +122,19 @@ constexpr std::array<yaml::Elsewhere, 4> kTokenKeysElsewhere{{{"token", {}, {}, 
                                                               {"password", {}, {}, kInFile},
                                                               {"value", {}, {}, kInFile}}};
 
+/// `expires`: a day, which is the last one of the token, or an instant; in UTC.
+void load_expiry(MapReader& in, web::Token& token) {
+    in.looks_like("expires", "^[0-9]{4}-[0-9]{2}-[0-9]{2}(T[0-9]{2}:[0-9]{2}:[0-9]{2}Z)?$");
+    const auto typed = in.text("expires");
+    if (!typed) return;
+    token.expires = web::parse_expiry(*typed);
+    if (!token.expires)
+        in.problem("expires",
+                   "expires must be a day such as 2027-12-31, or an instant such as "
+                   "2027-12-31T18:00:00Z, not " +
+                       yaml::quote(*typed));
+}
+
 web::Token load_token(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a token", kTokenExample);
     in.elsewhere(kTokenKeysElsewhere);
@@ -138,7 +151,18 @@ web::Token load_token(Loading& loading, const Node& node) {
          {"admin", Role::admin}}};
     if (in.required_text("role"))
         token.role = in.choice<Role>("role", kRoles).value_or(Role::viewer);
-    token.secret = load_secret(loading, in, elsewhere, token);
+    const std::string secret = load_secret(loading, in, elsewhere, token);
+    if (web::is_token_hash(secret)) {
+        token.hash = secret;
+    } else if (secret.starts_with("sha256:")) {
+        in.problem("file", "the token file " + token.file +
+                               " must hold the token, or sha256: and 64 hex digits, as `panelgate "
+                               "token new` writes it");
+    } else if (!secret.empty()) {
+        token.hash = web::hash_of(secret);
+        token.characters = secret.size();
+    }
+    load_expiry(in, token);
     token_keys().read(in, token);
     in.finish();
     return token;
@@ -155,8 +179,8 @@ void load_tokens(Loading& loading, MapReader& in, std::vector<web::Token>& token
         if (!token.name.empty() &&
             std::ranges::find(tokens, token.name, &web::Token::name) != tokens.end())
             loading.problems.add(node.mark, "there are two tokens '" + token.name + '\'');
-        const auto same = std::ranges::find(tokens, token.secret, &web::Token::secret);
-        if (!token.secret.empty() && same != tokens.end() && same->name != token.name)
+        const auto same = std::ranges::find(tokens, token.hash, &web::Token::hash);
+        if (!token.hash.empty() && same != tokens.end() && same->name != token.name)
             loading.problems.add(
                 node.mark,
                 "the tokens '" + same->name + "' and '" + token.name +

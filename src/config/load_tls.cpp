@@ -1,5 +1,6 @@
 #include "load_tls.hpp"
 
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -61,8 +62,8 @@ bool check_clients(MapReader& in, const tls::Settings& settings) {
     return fits;
 }
 
-void check_files(MapReader& in, const tls::Settings& settings) try {
-    const tls::Context made(settings);
+void make_context(MapReader& in, tls::Settings& settings) try {
+    settings.made = std::make_shared<const tls::Context>(settings);
 } catch (const tls::Unusable& why) {
     in.problem(why.file, why.what());
 }
@@ -77,7 +78,7 @@ std::optional<tls::Settings> load_tls(Loading& loading, MapReader& in) {
     tls::Settings settings;
     const bool readable = load_files(loading, keys, settings);
     tls_keys().read(keys, settings);
-    if (check_clients(keys, settings) && readable) check_files(keys, settings);
+    if (check_clients(keys, settings) && readable) make_context(keys, settings);
     keys.finish();
     if (readable && loading.files.is_readable_by_all(settings.key))
         loading.warn(keys.mark("key"), "every user of this machine can read the key " +

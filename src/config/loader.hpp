@@ -85,5 +85,6 @@ void load_mqtt(Loading& loading, yaml::MapReader& root);
 void load_rules(Loading& loading, yaml::MapReader& root);
 /// Gives each line its rules.
 void apply_rules(Config& config);
+void load_audit(Loading& loading, yaml::MapReader& root);
 
 }  // namespace panelgate::config

@@ -84,7 +84,7 @@ void show_http(const SettingWriter& top, const web::Settings& settings) {
     for (const web::Token& token : settings.tokens) {
         const SettingWriter one = section.item("tokens", token.name);
         token_keys().show(one, token);
-        one.put_secret("secret", token.secret);
+        one.put_secret("secret", token.hash);
     }
     show_tls(section, settings.tls);
 }
@@ -163,6 +163,7 @@ std::vector<Setting> all_settings(const Config& config) {
         relay_keys().show(top.item("relays", relay.name()), relay);
     log_keys().show(top.below("log"), config.log);
     realtime_keys().show(top.below("realtime"), config.realtime);
+    if (config.audit) audit_keys().show(top.below("audit"), *config.audit);
     find_idle(all);
     return all;
 }

@@ -39,7 +39,8 @@ const Keys<Config>& root_keys() {
             .change_needs(kConnectsAnew)
             .other("log", "Log on stderr.")
             .other("realtime", "Priority over other programs, so that frames are on time.")
-            .change_needs(kNextStart);
+            .change_needs(kNextStart)
+            .other("audit", "Record of what was done, by whom, in a file that can be proven.");
     return kKeys;
 }
 

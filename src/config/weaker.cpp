@@ -79,7 +79,8 @@ void compare_tls(Lines& all, const std::string& endpoint,
         all.push_back(endpoint + ": roles of certificates no longer count");
     if (!running->crl.empty() && next->crl.empty())
         all.push_back(endpoint + ": revoked certificates are accepted");
-    if (next->lowest < running->lowest) all.push_back(endpoint + ": tls min_version TLSv1.3 -> TLSv1.2");
+    if (next->lowest < running->lowest)
+        all.push_back(endpoint + ": tls min_version TLSv1.3 -> TLSv1.2");
     if (next->material.ca != running->material.ca)
         all.push_back(endpoint + ": certificates of another CA are accepted");
 }
@@ -228,7 +229,7 @@ void compare_relays(Lines& all, const Config& running, const Config& next) {
 
 void compare_tokens(Lines& all, const web::Settings& running, const web::Settings& next) {
     for (const web::Token& token : next.tokens) {
-        const auto was = std::ranges::find(running.tokens, token.secret, &web::Token::secret);
+        const auto was = std::ranges::find(running.tokens, token.hash, &web::Token::hash);
         if (was == running.tokens.end()) {
             all.push_back("http: token " + token.name + " is valid");
         } else if (token.role > was->role) {
@@ -301,6 +302,20 @@ void compare_rules(Lines& all, const access::Settings& running, const access::Se
     if (order != kept) all.emplace_back("access: the rules have another order");
 }
 
+void compare_audit(Lines& all, const Config& running, const Config& next) {
+    if (!running.audit) return;
+    if (!next.audit) {
+        all.emplace_back("audit: is switched off");
+        return;
+    }
+    if (next.audit->file != running.audit->file)
+        all.push_back("audit: file " + running.audit->file + " -> " + next.audit->file);
+    if (next.audit->on_failure < running.audit->on_failure)
+        all.emplace_back("audit: on_failure refuse_writes -> continue");
+    if (next.audit->keep * next.audit->rotate < running.audit->keep * running.audit->rotate)
+        all.emplace_back("audit: keeps less");
+}
+
 }  // namespace
 
 std::vector<std::string> weaker(const Config& running, const Config& next) {
@@ -312,6 +327,7 @@ std::vector<std::string> weaker(const Config& running, const Config& next) {
     compare_http(all, running, next);
     compare_mqtt(all, running, next);
     compare_rules(all, running.access, next.access);
+    compare_audit(all, running, next);
     return all;
 }
 

@@ -99,8 +99,13 @@ void add_http(Families& out, const Snapshot& snapshot) {
     Family failures =
         make_counter("panelgate_login_failures_total", "HTTP requests with an unknown token.");
     failures.counter({}, snapshot.http->login_failures);
+    Family uses = make_gauge("panelgate_token_last_use_timestamp_seconds",
+                             "When a request came with the token last; absent until the first.");
+    for (const auto& [token, when] : snapshot.http->token_uses)
+        uses.gauge({{"token", token}}, when);
     out.push_back(requests.take());
     out.push_back(failures.take());
+    out.push_back(uses.take());
 }
 
 namespace {
@@ -144,6 +149,25 @@ void add_mqtt(Families& out, const Snapshot& snapshot) {
     add_counter(out, "panelgate_mqtt_reconnects_total",
                 "Connections to the broker after the first.", mqtt.reconnects);
     add_writes(out, mqtt);
+}
+
+void add_audit(Families& out, const Snapshot& snapshot) {
+    if (!snapshot.audit) return;
+    const audit::Counters& audit = *snapshot.audit;
+    Family up = make_gauge("panelgate_audit_up", "1 while records of the audit reach the disk.");
+    up.gauge({}, audit.failing ? 0 : 1);
+    out.push_back(up.take());
+    add_counter(out, "panelgate_audit_records_total", "Records of the audit that are on the disk.",
+                audit.records);
+    add_counter(out, "panelgate_audit_lost_total",
+                "Records lost because the disk took nothing for longer than the buffer lasts.",
+                audit.lost);
+    add_counter(out, "panelgate_audit_failures_total", "Times that writing the audit has failed.",
+                audit.failures);
+    add_counter(out, "panelgate_audit_syslog_lost_total",
+                "Records that syslog did not take; they are in the file.", audit.syslog_lost);
+    add_counter(out, "panelgate_audit_rotations_total", "Files of the audit that have been filled.",
+                audit.rotations);
 }
 
 void add_points(Families& out, const Snapshot& snapshot) {

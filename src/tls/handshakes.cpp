@@ -56,6 +56,10 @@ std::string spoken(ByteView first) {
     return "it does not speak TLS; give it TLS, or a listener without tls";
 }
 
+std::shared_ptr<const Context> context_of(const Settings& settings) {
+    return settings.made ? settings.made : std::make_shared<const Context>(settings);
+}
+
 rt::LogLevel level_of(Outcome outcome) {
     const bool is_passing =
         outcome == Outcome::broken || outcome == Outcome::timeout || outcome == Outcome::displaced;
@@ -191,14 +195,14 @@ void Handshakes::Conversation::finish(Outcome outcome, const std::string& why) {
 Handshakes::Handshakes(asio::any_io_executor executor, std::string name, Settings settings)
     : name_(std::move(name)),
       settings_(std::move(settings)),
-      context_(std::make_shared<const Context>(settings_)),
+      context_(context_of(settings_)),
       worker_(std::move(executor)) {}
 
 Handshakes::~Handshakes() = default;
 
 void Handshakes::apply(const Settings& settings) try {
     if (settings == settings_) return;
-    apply(settings, std::make_shared<const Context>(settings));
+    apply(settings, context_of(settings));
 } catch (const Unusable& why) {
     rt::log(rt::LogLevel::error, "certificate not renewed",
             {{"listener", name_}, {"reason", why.what()}});

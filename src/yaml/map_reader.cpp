@@ -94,9 +94,7 @@ const Node* MapReader::find(std::string_view key) {
 bool MapReader::has(std::string_view key) { return find(key) != nullptr; }
 
 bool MapReader::require(std::string_view key) {
-    KeyShape shape;
-    shape.required = true;
-    describe(key, std::move(shape));
+    describe(key, [](KeyShape& shape) { shape.required = true; });
     if (has(key)) return true;
     if (is_mistyped(key)) {
         excused_.emplace_back(key);
@@ -119,9 +117,8 @@ const Node* MapReader::scalar(std::string_view key, std::string_view wanted) {
     return nullptr;
 }
 
-void MapReader::describe(std::string_view key, KeyShape shape) {
-    if (Description* description = problems_->description())
-        description->tell(*node_, key, std::move(shape));
+void MapReader::tell(std::string_view key, KeyShape shape) {
+    problems_->description()->tell(*node_, key, std::move(shape));
 }
 
 const Node* MapReader::below(std::string_view key, const Node* node) {
@@ -148,11 +145,11 @@ std::optional<std::string> MapReader::required_text(std::string_view key) {
 
 std::optional<std::int64_t> MapReader::integer(std::string_view key, std::int64_t min,
                                                std::int64_t max) {
-    KeyShape shape;
-    shape.kind = KeyShape::Kind::integer;
-    shape.min = min;
-    shape.max = max;
-    describe(key, std::move(shape));
+    describe(key, [=](KeyShape& shape) {
+        shape.kind = KeyShape::Kind::integer;
+        shape.min = min;
+        shape.max = max;
+    });
     const std::string wanted =
         "a whole number from " + std::to_string(min) + " to " + std::to_string(max);
     const Node* node = scalar(key, wanted);
@@ -205,11 +202,11 @@ std::optional<bool> MapReader::boolean(std::string_view key) {
 }
 
 std::optional<Duration> MapReader::duration(std::string_view key, Duration min, Duration max) {
-    KeyShape shape;
-    shape.kind = KeyShape::Kind::duration;
-    shape.shortest = min;
-    shape.longest = max;
-    describe(key, std::move(shape));
+    describe(key, [=](KeyShape& shape) {
+        shape.kind = KeyShape::Kind::duration;
+        shape.shortest = min;
+        shape.longest = max;
+    });
     const Node* node = scalar(key, "a duration such as 300ms");
     if (node == nullptr) return std::nullopt;
     const auto value = parse_duration(node->scalar);
@@ -226,10 +223,10 @@ std::optional<Duration> MapReader::duration(std::string_view key, Duration min, 
 std::optional<std::size_t> MapReader::choice_index(std::string_view key,
                                                    std::span<const std::string_view> words,
                                                    const Hint& hint) {
-    KeyShape shape;
-    shape.kind = KeyShape::Kind::word;
-    shape.words.assign(words.begin(), words.end());
-    describe(key, std::move(shape));
+    describe(key, [words](KeyShape& shape) {
+        shape.kind = KeyShape::Kind::word;
+        shape.words.assign(words.begin(), words.end());
+    });
     const Node* node = scalar(key, join(words));
     if (node == nullptr) return std::nullopt;
     for (std::size_t i = 0; i < words.size(); ++i) {
@@ -243,9 +240,7 @@ std::optional<std::size_t> MapReader::choice_index(std::string_view key,
 }
 
 bool MapReader::is_word(std::string_view key, std::string_view word) {
-    KeyShape shape;
-    shape.words.emplace_back(word);
-    describe(key, std::move(shape));
+    describe(key, [word](KeyShape& shape) { shape.words.emplace_back(word); });
     const Node* node = find(key);
     return node != nullptr && node->kind == Node::Kind::scalar && node->scalar == word;
 }

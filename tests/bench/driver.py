@@ -18,7 +18,7 @@ import traceback
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
-from measures import (counts, crowd, dead, figures, growth, latency, lines, master, memory,  # noqa: E402
+from measures import (audit, counts, crowd, dead, figures, growth, latency, lines, master, memory,  # noqa: E402
                       micro, plot, readers, reload, report, rig, rivals, saturated, scrape)
 
 Run = collections.namedtuple("Run", "tools gateways rivals quick rates left_out")
@@ -44,11 +44,12 @@ TOPICS = {
     "allocations": counts.measure_allocations,
     "scrape": scrape.measure,
     "reload": reload.measure,
+    "audit": audit.measure,
     "growth": growth.measure,
     "micro": micro.measure,
 }
 BROKEN = "broken off:"
-BARS = [bar for topic in (saturated, latency, crowd, master, lines, memory, counts, scrape, readers, reload)
+BARS = [bar for topic in (saturated, latency, crowd, master, lines, memory, counts, scrape, readers, reload, audit)
         for bar in topic.BARS]
 
 

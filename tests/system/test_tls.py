@@ -6,6 +6,7 @@ import importlib.util
 import itertools
 import os
 import re
+import signal
 import socket
 import ssl
 import struct
@@ -365,6 +366,33 @@ class Replaced(Tls):
             held.close()
             self.assertEqual(failed, [])
             self.assertEqual(len(shown), times)
+
+    def test_a_reload_turns_tls_on_and_off(self):
+        with plant() as own, served(own) as program:
+            file = own.folder / "panelgate.yaml"
+            plain = file.read_text()
+            ports = program.modbus_port(), program.http_port()
+            plain = plain.replace('modbus_tcp: [{listen: "127.0.0.1:0"',
+                                  f'modbus_tcp: [{{listen: "127.0.0.1:{ports[0]}"')
+            plain = plain.replace('http: {listen: "127.0.0.1:0"',
+                                  f'http: {{listen: "127.0.0.1:{ports[1]}"')
+        with plant() as own:
+            file = own.folder / "panelgate.yaml"
+            file.write_text(plain)
+            with harness.Program("run", "-c", str(file)) as program:
+                program.http_port()
+                for count, tls in enumerate((own.tls(), "", own.tls()), 1):
+                    file.write_text(plain.replace("anonymous", tls + ", anonymous") if tls
+                                    else plain)
+                    program.process.send_signal(signal.SIGHUP)
+                    program.log.wait_for("reload outcome=applied", count)
+                    context = own.context() if tls else None
+                    connection = (http.client.HTTPSConnection("localhost", ports[1], timeout=30,
+                                                              context=context) if tls else
+                                  http.client.HTTPConnection("localhost", ports[1], timeout=30))
+                    connection.request("GET", "/readyz")
+                    self.assertEqual(connection.getresponse().status, 200)
+                    connection.close()
 
     def test_a_bad_new_one_keeps_the_old_one_and_says_so(self):
         with plant() as own, served(own, http=own.tls()) as program:

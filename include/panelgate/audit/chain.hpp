@@ -1,18 +1,16 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 
+#include "panelgate/base/sha256.hpp"
+
 namespace panelgate::audit {
 
-/// A SHA-256 as 64 hex digits.
-using Hash = std::array<char, 64>;
-inline std::string_view text_of(const Hash& hash) { return {hash.data(), hash.size()}; }
+using Hash = HexDigest;
 /// What the first record of a chain follows: 64 times '0'.
 Hash no_hash();
 std::optional<Hash> parse_hash(std::string_view text);
@@ -22,22 +20,6 @@ struct Position {
     std::uint64_t number = 0;
     Hash hash = no_hash();
     friend bool operator==(const Position&, const Position&) = default;
-};
-
-/// SHA-256 of a previous hash and a text; keeps its OpenSSL context.
-class Digest {
-  public:
-    Digest();
-    ~Digest();
-    Digest(Digest&&) noexcept;
-    Digest& operator=(Digest&&) noexcept;
-
-    /// Throws std::runtime_error if OpenSSL has no SHA-256.
-    Hash of(const Hash& previous, std::string_view text);
-
-  private:
-    struct Context;
-    std::unique_ptr<Context> context_;
 };
 
 /// Makes records of bodies: `{"n":N,BODY,"hash":"H"}` and a newline. H is SHA-256 of the previous
@@ -52,7 +34,7 @@ class Chain {
 
   private:
     Position last_;
-    Digest digest_;
+    Sha256 digest_;
 };
 
 /// The parts of a line; views of it.

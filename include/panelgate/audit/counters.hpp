@@ -11,6 +11,7 @@ struct Counters {
     std::uint64_t rotations = 0;
     std::uint64_t waiting_bytes = 0;
     bool failing = false;
+    std::uint64_t syslog_lost = 0;  ///< records that syslog did not take
 };
 
 }  // namespace panelgate::audit

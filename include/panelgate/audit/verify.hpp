@@ -81,7 +81,7 @@ class Verifier {
     void check_end();
 
     Anchors anchors_;
-    Digest digest_;
+    Sha256 digest_;
     Report report_;
     std::optional<Suspect> suspect_;
     std::string file_;

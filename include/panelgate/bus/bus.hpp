@@ -1,13 +1,18 @@
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
+#include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 
 #include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/who.hpp"
 #include "panelgate/base/words.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/bus/counters.hpp"
@@ -32,6 +37,19 @@ struct TransactionEvent {
     Outcome outcome = Outcome::ok;
     Duration took{};  ///< from arrival to answer
 };
+/// A write by any face, once, when it has ended: what an audit records. Valid for the call only.
+struct WriteEnd {
+    std::uint8_t station = 0;  ///< 0: a broadcast
+    ByteView pdu{};  ///< as asked; what was refused before it was submitted may be anything
+    std::optional<modbus::Span> items{};  ///< that it writes, if it says so
+    WhoRef who{};
+    Outcome outcome = Outcome::ok;
+    bool transmitted = false;
+    arbiter::Transaction transaction = 0;     ///< the last one made for it; 0: none
+    std::optional<std::uint8_t> exception{};  ///< the panel's
+    std::string_view rule{};                  ///< what refused it; "" nothing did
+};
+
 /// What a bus reports to its observer.
 using BusEvent =
     std::variant<LineEvent, arbiter::StationEvent, TransactionEvent, WriteEvent, tap::Transaction>;
@@ -46,7 +64,10 @@ struct Settings {
     IncidentSettings incidents;
     doctor::Settings doctor;
     ClientSettings clients{};
-    std::shared_ptr<const access::LineRules> access{};  ///< null: everybody may do everything
+    std::shared_ptr<const access::LineRules> access{};    ///< null: everybody may do everything
+    std::function<void(const WriteEnd&)> record_write{};  ///< may be empty; must not call the bus
+    /// True while no write may be sent, as it could not be recorded. May be empty.
+    std::function<bool()> refuses_writes{};
 };
 
 /// Drives one line with one arbiter. Not thread-safe: use it only on the executor's thread.

@@ -29,8 +29,9 @@ enum class Rule : std::uint8_t {
     listening,        ///< the line is in listen mode
     write_protected,  ///< the items are read-only in the panel
     denied,           ///< a rule of `access`, or its default
+    unrecorded,       ///< no write is sent while it cannot be recorded (audit.on_failure)
 };
-/// Returns "access", "function", "quantity", "range", "listen", "read-only" or "denied":
+/// Returns "access", "function", "quantity", "range", "listen", "read-only", "denied" or "audit":
 /// stable identifiers.
 std::string_view label(Rule rule);
 inline bool is_access(Rule rule) {
@@ -85,6 +86,9 @@ struct Refusal {
 
     friend bool operator==(const Refusal&, const Refusal&) = default;
 };
+
+/// Refuses a write that could not be recorded: a client should try again later.
+Refusal unrecorded(std::string station);
 
 /// Returns the answer to a refused request: Fault::denied, or for a guard the exception that the
 /// panel would have returned.

@@ -11,6 +11,7 @@
 #include "panelgate/access/line_rules.hpp"
 #include "panelgate/access/settings.hpp"
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/audit/settings.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/points/settings.hpp"
@@ -88,6 +89,7 @@ struct Config {
     access::Settings access;             ///< who may do what
     rt::LogSettings log;
     rt::RealtimeSettings realtime;
+    std::optional<audit::Settings> audit{};  ///< empty: nothing is recorded
     /// Where each line's name stands, by that name.
     std::map<std::string, yaml::Mark> line_marks;
     /// Warnings of legal but questionable settings ("8N1 is outside the standard"), as

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/audit/counters.hpp"
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/config/counters.hpp"
 #include "panelgate/metrics/process.hpp"
@@ -28,6 +29,7 @@ struct Snapshot {
     std::vector<points::RelaySample> relays;
     std::optional<web::Counters> http;
     std::optional<mqtt::Counters> mqtt;             ///< nullopt: no broker
+    std::optional<audit::Counters> audit{};         ///< nullopt: no audit
     std::optional<config::ReloadCounters> reloads;  ///< nullopt: built-in configuration
     std::string version;
     std::string commit;    ///< empty: unknown

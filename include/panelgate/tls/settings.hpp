@@ -2,11 +2,15 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
+#include <tuple>
 
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::tls {
+
+class Context;
 
 /// Whether clients show a certificate. One that is shown must always be good.
 enum class ClientCertificate : std::uint8_t { none, optional, required };
@@ -34,7 +38,17 @@ struct Settings {
     std::size_t max_handshakes = 128;  ///< at the same time; beyond it the oldest gives way
     std::size_t max_handshakes_per_address = 16;
     Material material{};
-    friend bool operator==(const Settings&, const Settings&) = default;
+    /// Made of all this by whoever read the files, which takes milliseconds; null: not yet.
+    std::shared_ptr<const Context> made{};
+
+    friend bool operator==(const Settings& one, const Settings& other) {
+        const auto all = [](const Settings& of) {
+            return std::tie(of.certificate, of.key, of.ca, of.crl, of.client,
+                            of.role_from_certificate, of.lowest, of.handshake_timeout,
+                            of.max_handshakes, of.max_handshakes_per_address, of.material);
+        };
+        return all(one) == all(other);
+    }
 };
 
 }  // namespace panelgate::tls

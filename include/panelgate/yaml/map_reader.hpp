@@ -122,12 +122,18 @@ class MapReader {
     void finish();
 
   private:
-    void describe(std::string_view key, KeyShape shape);
-    void describe(std::string_view key, KeyShape::Kind kind) {
+    /// A shape is made only where somebody records it: a large file asks for a million keys.
+    template <class Fill>
+    void describe(std::string_view key, const Fill& fill) {
+        if (problems_->description() == nullptr) return;
         KeyShape shape;
-        shape.kind = kind;
-        describe(key, std::move(shape));
+        fill(shape);
+        tell(key, std::move(shape));
     }
+    void describe(std::string_view key, KeyShape::Kind kind) {
+        describe(key, [kind](KeyShape& shape) { shape.kind = kind; });
+    }
+    void tell(std::string_view key, KeyShape shape);
     const Node* below(std::string_view key, const Node* node);
     const Node* find(std::string_view key);
     const Node* scalar(std::string_view key, std::string_view wanted);

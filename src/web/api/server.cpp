@@ -33,6 +33,8 @@ std::shared_ptr<const Site> Server::site_of(Settings settings,
     site->settings = std::move(settings);
     site->product = "panelgate/" + providers_.version;
     site->now = providers_.now;
+    site->record = providers_.record;
+    site->wall = providers_.wall;
     site->routes =
         surface_ == Surface::gateway ? routes(std::move(api)) : simulator_routes(std::move(api));
     site->next_caller = bus::next_client_id;

@@ -157,6 +157,9 @@ std::string detail_of(const bus::Refusal& refusal) {
                         ? "no rule of access allows it, and the default is deny"
                         : "the rule '" + refusal.why + "' of access denies it") +
                    std::string(refusal.station.empty() ? "" : " at " + station);
+        case bus::Rule::unrecorded:
+            return "a write to " + station +
+                   " could not be recorded: the audit's file takes nothing now";
         case bus::Rule::function:
         case bus::Rule::quantity:
         case bus::Rule::range:
@@ -176,6 +179,7 @@ Problem refused(unsigned status, bus::Rule rule, std::string detail) {
 
 unsigned status_of(bus::Rule rule) {
     if (rule == bus::Rule::listening) return 409;
+    if (rule == bus::Rule::unrecorded) return 503;
     return bus::is_access(rule) ? 403 : 422;
 }
 

@@ -1,5 +1,6 @@
 #include "panelgate/web/http/listener.hpp"
 
+#include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <exception>
 #include <utility>
@@ -40,17 +41,32 @@ error_code HttpListener::open() {
     return acceptor_.open(settings.address, settings.port, settings.ipv6_only);
 }
 
+namespace {
+
+/// True if what the caller has shown means the same as before.
+bool has_same_right(const Caller& caller, const Settings& before, const Settings& now) {
+    if (caller.token().empty()) return before.anonymous == now.anonymous;
+    const auto in = [&](const Settings& settings) {
+        return std::ranges::find(settings.tokens, caller.token(), &Token::name);
+    };
+    const auto was = in(before);
+    const auto is = in(now);
+    return was != before.tokens.end() && is != now.tokens.end() && was->hash == is->hash &&
+           was->role == is->role;
+}
+
+}  // namespace
+
 void HttpListener::apply(std::shared_ptr<const Site> site) {
     allowed_ = rt::AccessList(site->settings.allow);
-    const bool rights_changed = site->settings.tokens != shared_->site->settings.tokens ||
-                                site->settings.anonymous != shared_->site->settings.anonymous;
+    const std::shared_ptr<const Site> before = shared_->site;
     if (handshakes_ && site->settings.tls) handshakes_->apply(*site->settings.tls);
     shared_->serve(std::move(site));
     const auto sessions = sessions_;
     for (const auto& [id, session] : sessions) {
         if (!allowed_.allows(session->peer())) {
             session->stop(shared_->site->settings.request_timeout);
-        } else if (rights_changed) {
+        } else if (!has_same_right(session->caller(), before->settings, shared_->site->settings)) {
             session->end_events();
         }
     }

@@ -1,11 +1,15 @@
 #include "router.hpp"
 
 #include <algorithm>
+#include <array>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/system/error_code.hpp>
+#include <charconv>
+#include <chrono>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +17,7 @@
 #include <vector>
 
 #include "admission.hpp"
+#include "panelgate/base/sha256.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/problem.hpp"
@@ -22,13 +27,79 @@ namespace panelgate::web {
 
 namespace {
 
-/// Compares in a time independent of where the texts differ.
-bool same_secret(std::string_view given, std::string_view secret) {
-    unsigned difference = given.size() == secret.size() ? 0 : 1;
-    for (std::size_t i = 0; i < given.size(); ++i) {
-        const char expected = secret.empty() ? '\0' : secret[i % secret.size()];
-        difference |= static_cast<unsigned char>(given[i] ^ expected);
+constexpr std::string_view kHashOf = "sha256:";
+
+/// Takes a number of `width` digits off; nullopt if it is none.
+std::optional<int> take_number(std::string_view& text, std::size_t width) {
+    if (text.size() < width) return std::nullopt;
+    int number = 0;
+    const auto [end, wrong] = std::from_chars(text.data(), text.data() + width, number);
+    if (wrong != std::errc{} || end != text.data() + width || number < 0) return std::nullopt;
+    text.remove_prefix(width);
+    return number;
+}
+
+/// The same for numbers between which `between` stands.
+std::optional<std::array<int, 3>> take_three(std::string_view& text, std::size_t first,
+                                             char between) {
+    std::array<int, 3> numbers{};
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+        if (i > 0 && !text.starts_with(between)) return std::nullopt;
+        if (i > 0) text.remove_prefix(1);
+        const auto number = take_number(text, i == 0 ? first : 2);
+        if (!number) return std::nullopt;
+        numbers[i] = *number;
     }
+    return numbers;
+}
+
+}  // namespace
+
+std::string hash_of(std::string_view token) {
+    thread_local Sha256 sha256;
+    return std::string(kHashOf) + std::string(text_of(sha256.of(token)));
+}
+
+bool is_token_hash(std::string_view text) {
+    if (!text.starts_with(kHashOf)) return false;
+    text.remove_prefix(kHashOf.size());
+    return text.size() == HexDigest().size() && std::ranges::all_of(text, [](char c) {
+               return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
+           });
+}
+
+std::optional<WallTime> parse_expiry(std::string_view text) {
+    using namespace std::chrono;
+    const auto date = take_three(text, 4, '-');
+    if (!date) return std::nullopt;
+    const year_month_day day{year((*date)[0]), month(static_cast<unsigned>((*date)[1])),
+                             std::chrono::day(static_cast<unsigned>((*date)[2]))};
+    if (!day.ok()) return std::nullopt;
+    if (text.empty()) return WallTime(sys_days(day) + days(1));
+    if (!text.starts_with('T') || !text.ends_with('Z')) return std::nullopt;
+    text.remove_prefix(1);
+    const auto time = take_three(text, 2, ':');
+    if (!time || text != "Z") return std::nullopt;
+    const auto [hour, minute, second] = *time;
+    if (hour > 23 || minute > 59 || second > 59) return std::nullopt;
+    return WallTime(sys_days(day) + hours(hour) + minutes(minute) + seconds(second));
+}
+
+std::string expiry_text(WallTime expires) {
+    using namespace std::chrono;
+    const auto day = floor<days>(expires);
+    if (expires == day) return rfc3339(day - days(1)).substr(0, 10);
+    return rfc3339(expires).substr(0, 19) + 'Z';
+}
+
+namespace {
+
+/// Compares in a time independent of where the hashes differ.
+bool same_hash(std::string_view given, std::string_view known) {
+    if (given.size() != known.size()) return false;  // all have one length
+    unsigned difference = 0;
+    for (std::size_t i = 0; i < given.size(); ++i)
+        difference |= static_cast<unsigned char>(given[i] ^ known[i]);
     return difference == 0;
 }
 
@@ -50,11 +121,22 @@ std::optional<std::string_view> bearer_token(std::string_view authorization) {
 const Token* token_of(const HttpRequest& request, const Settings& settings) {
     const auto given = bearer_token(header(request, "authorization"));
     if (!given) return nullptr;
+    const std::string hash = hash_of(*given);
     const Token* found = nullptr;
     for (const Token& known : settings.tokens) {
-        if (same_secret(*given, known.secret) && !known.secret.empty()) found = &known;
+        if (same_hash(hash, known.hash)) found = &known;
     }
     return found;
+}
+
+bool has_expired(const Token& token, const HttpRequest& request) {
+    return token.expires && *token.expires <= request.at;
+}
+
+/// The same; null too if it has expired.
+const Token* valid_token_of(const HttpRequest& request, const Settings& settings) {
+    const Token* token = token_of(request, settings);
+    return token == nullptr || has_expired(*token, request) ? nullptr : token;
 }
 
 Problem unauthorized(std::string detail) {
@@ -92,6 +174,8 @@ std::optional<Problem> check_access(const HttpRequest& request, Role needed,
         return unauthorized("this gateway knows tokens only; send 'Authorization: Bearer TOKEN'");
     const Token* token = token_of(request, settings);
     if (token == nullptr) return unauthorized("this token is not known");
+    if (has_expired(*token, request))
+        return unauthorized("this token has expired, on " + rfc3339(*token->expires));
     if (token->role < needed)
         return problem(403, "this needs the role " + std::string(label(needed)));
     return std::nullopt;
@@ -116,12 +200,12 @@ Role role_of(const HttpRequest& request, const Settings& settings) {
         return std::max(settings.anonymous,
                         certified ? *request.caller->certificate_role() : Role::none);
     }
-    const Token* token = token_of(request, settings);
+    const Token* token = valid_token_of(request, settings);
     return token == nullptr ? Role::none : token->role;
 }
 
 std::string token_name(const HttpRequest& request, const Settings& settings) {
-    const Token* token = token_of(request, settings);
+    const Token* token = valid_token_of(request, settings);
     return token == nullptr ? std::string() : token->name;
 }
 
@@ -214,6 +298,18 @@ void record_login(const HttpRequest& request, bool failed, Shared& shared) {
             {{"listener", shared.site->settings.name()}, {"client", address}});
 }
 
+/// When each token was used last, for metrics; those that are gone are forgotten.
+void record_use(const Caller& caller, Shared& shared) {
+    if (caller.token().empty() || !shared.site->wall) return;
+    auto& uses = shared.counters.token_uses;
+    uses[caller.token()] = wall_seconds_of(shared.site->wall());
+    if (uses.size() <= shared.site->settings.tokens.size()) return;
+    std::erase_if(uses, [&](const auto& use) {
+        return std::ranges::find(shared.site->settings.tokens, use.first, &Token::name) ==
+               shared.site->settings.tokens.end();
+    });
+}
+
 /// Logs a token with insufficient rights; unknown tokens are logged as failed logins.
 void count_refused(const HttpRequest& request, const Problem& why) {
     if (why.status != 403) return;
@@ -250,6 +346,33 @@ asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, Role n
     co_return refused;
 }
 
+/// What an audit needs of a request that its handler takes away.
+class Witness {
+  public:
+    Witness(const HttpRequest& request, const Site& site)
+        : site_(&site), changes_(request.method != "GET" && request.method != "HEAD") {
+        if (!site.record) return;
+        method_ = request.method;
+        for (const std::string& segment : request.path) path_ += '/' + segment;
+        if (changes_) body_ = request.body.substr(0, Deed::kMostOfBody);
+        caller_ = request.caller;
+    }
+    /// Refusals are recorded whatever was asked for.
+    void record(const HttpResponse& response) const {
+        const bool is_refusal = response.status == 401 || response.status == 403;
+        if (!site_->record || (!changes_ && !is_refusal)) return;
+        site_->record({caller_->who(), method_, path_, body_, response.status, response.body});
+    }
+
+  private:
+    const Site* site_;
+    bool changes_;
+    std::string method_;
+    std::string path_;
+    std::string body_;
+    std::shared_ptr<Caller> caller_;
+};
+
 }  // namespace
 
 Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> barred) {
@@ -267,14 +390,19 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     }
     if (request.method == "OPTIONS") co_return options(found, request, *site);
     if (found.route == nullptr) co_return to_response(not_found(found));
+    if (site->wall) request.at = site->wall();
     const auto refused = co_await admit(&request, found.route->needed, shared);
     if (request.caller->has_left()) co_return HttpResponse();
     request.role = role_of(request, site->settings);
     request.caller->identify(token_name(request, site->settings), request.role,
                              site->settings.name());
+    record_use(*request.caller, *shared);
+    const Witness witness(request, *site);
     if (refused) {
         count_refused(request, *refused);
-        co_return to_response(*refused);
+        HttpResponse response = to_response(*refused);
+        witness.record(response);
+        co_return response;
     }
     // Probes are answered with any query.
     auto mistaken = probe ? std::nullopt : check_queries(request, found.route->queries);
@@ -284,6 +412,7 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     Handling handling = found.route->handler(std::move(request));
     HttpResponse response = co_await std::move(handling);
     response.probe = probe;
+    witness.record(response);
     co_return response;
 }
 

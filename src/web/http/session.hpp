@@ -71,6 +71,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     /// Answers the running request, then closes; without one, closes at once. From now on a client
     /// has at most `reading` to take a reply.
     void stop(Duration reading);
+    const Caller& caller() const { return *caller_; }
     /// Ends an event stream after the pending events.
     void end_events();
     /// Returns the peer's address.

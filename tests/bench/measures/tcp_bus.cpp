@@ -1,6 +1,7 @@
 // tcp_bus: stations 1 to 247 behind a TCP port, RTU frames, no pacing: each read of registers (03)
-// is answered at once with unit * 257 + address * 31 + 7, as rtubus does. One master at a time.
-// Prints "listening PORT"; each line on stdin is answered by {"replies": N}; ends with stdin.
+// is answered at once with unit * 257 + address * 31 + 7, as rtubus does, and each write of one
+// (06) with itself. One master at a time. Prints "listening PORT"; each line on stdin is answered
+// by {"replies": N}; ends with stdin.
 #include <arpa/inet.h>
 #include <netinet/tcp.h>
 #include <poll.h>
@@ -15,9 +16,10 @@
 
 namespace {
 
-constexpr std::size_t kRead = 8;  // a request of function 03 with its CRC
+constexpr std::size_t kRead = 8;  // a request of function 03 or 06 with its CRC
 
 Bytes reply_to(const std::uint8_t* request) {
+    if (request[1] == 6) return Bytes(request, request + kRead);
     const unsigned address = request[2] << 8 | request[3];
     const unsigned count = request[5];
     Bytes reply{request[0], 3, static_cast<std::uint8_t>(2 * count)};

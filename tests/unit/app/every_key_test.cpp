@@ -119,7 +119,7 @@ serial_masters:
      broadcast: silent, on_failure: silence, echo: auto, response_timeout: 2s}
   - {name: hmi, device: /dev/ttyS3, lines: [a], framing: rtu}
 http:
-  tokens: [{name: ops, role: operator, file: /run/secrets/ops},
+  tokens: [{name: ops, role: operator, file: /run/secrets/ops, expires: 2027-12-31},
            {name: two, role: viewer, file: /run/secrets/two}]
   tls: {certificate: /tls/a.crt, key: /tls/a.key, ca: /tls/a-ca.crt, client: optional}
 access:
@@ -134,6 +134,7 @@ mqtt: {broker: "mqtts://b:8883", topic: x, qos: 1, client_id: x, username: x, st
        certificate: /run/secrets/ops, key: /run/secrets/ops}
 relays: [{from: a-1/400001, to: a-1/400101, on_change: true, refresh: 60s}]
 realtime: {priority: 20, lock_memory: true}
+audit: {file: /var/log/audit.jsonl, rotate: 10MiB, keep: 5, on_failure: refuse_writes, syslog: true}
 )";
 
 /// Keys that the values of their neighbours there rule out.
@@ -150,7 +151,7 @@ constexpr const char* kWords =
     "viewer operator warn json u16 i16 BADC UW120 GDT220 UB190 400009 400109 "
     "a-1/400209 panasonic-gt b 127.0.0.1:99 10.0.0.0/8 /dev/ttyS9 press/UW140 oven/GDT300 "
     "a/2 floor1/20 /run/secrets/other /profiles /tls/b.crt /tls/b.key /tls/b-ca.crt /tls/b.crl "
-    "optional TLSv1.3 read two mqtt coils 127.0.0.1:503 allow ";
+    "optional TLSv1.3 read two mqtt coils 127.0.0.1:503 allow 20MiB continue 2028-01-31 ";
 
 /// Alternative values, likely ones first.
 std::vector<std::string> others(const yaml::Node& value) {

@@ -1,8 +1,12 @@
 #include "panelgate/audit/trail.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <condition_variable>
 #include <filesystem>
 #include <fstream>
@@ -112,17 +116,55 @@ TEST_F(AuditTrail, WhatFindsNoRoomIsCountedAndTheCountIsRecorded) {
     EXPECT_EQ(trail.counters().failures, 1U);
 }
 
-TEST_F(AuditTrail, AnotherFileHasAChainOfItsOwn) {
-    Trail trail(settings(), told.hooks());
-    told.wait_for(Notice::Kind::anchor);
-    Settings other = settings();
-    other.file += ".other";
-    trail.apply(other);
-    trail.add(body(1));
+TEST_F(AuditTrail, AnotherFileHasAChainOfItsOwnAndWhatCameBeforeIsInTheFirst) {
+    for (const bool waits : {true, false}) {
+        Settings first = settings();
+        first.file += waits ? ".a" : ".b";
+        Trail trail(first, told.hooks());
+        if (waits) told.wait_for(Notice::Kind::anchor);
+        for (int i = 0; i < 10; ++i) trail.add(body(i));
+        Settings other = first;
+        other.file += ".other";
+        trail.apply(other);
+        trail.add(body(10));
+        trail.close();
+        EXPECT_EQ(verify(first.file).records, 12U);
+        const Report report = verify(other.file);
+        EXPECT_FALSE(report.fault);
+        EXPECT_EQ(report.records, 3U);
+        EXPECT_FALSE(verify(first.file).fault);
+    }
+}
+
+TEST_F(AuditTrail, SyslogGetsEachRecordAsWellAndMayBeAway) {
+    const std::string path = (folder.path() / "log").string();
+    Settings both = settings();
+    both.syslog = true;
+    both.syslog_socket = path;
+    {
+        Trail trail(both, told.hooks());
+        trail.add(body(0));
+        trail.close();
+        EXPECT_EQ(trail.counters().syslog_lost, 1U);
+    }
+    const int reader = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.copy(address.sun_path, sizeof(address.sun_path) - 1);
+    ASSERT_EQ(::bind(reader, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+    Trail trail(both, told.hooks());
+    trail.add(body(7));
     trail.close();
-    const Report report = verify(other.file);
-    EXPECT_FALSE(report.fault);
-    EXPECT_EQ(report.first, 1U);
+    EXPECT_EQ(trail.counters().syslog_lost, 0U);
+    std::array<char, 500> text{};
+    const ssize_t got = ::recv(reader, text.data(), text.size(), MSG_DONTWAIT);
+    ::close(reader);
+    ASSERT_GT(got, 0);
+    const std::string message(text.data(), static_cast<std::size_t>(got));
+    EXPECT_TRUE(message.starts_with("<110>1 T ")) << message;
+    const std::string own =
+        " panelgate " + std::to_string(::getpid()) + " write - {" + body(7) + '}';
+    EXPECT_NE(message.find(own), std::string::npos) << message;
     EXPECT_FALSE(verify(file).fault);
 }
 

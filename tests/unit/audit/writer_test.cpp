@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "panelgate/audit/files.hpp"
 #include "panelgate/audit/verify.hpp"
 #include "support/temp_dir.hpp"
 
@@ -231,6 +232,25 @@ TEST_F(AuditWriter, AFullDiskLosesNothingThatWasTaken) {
     const Report report = verify({file});
     EXPECT_FALSE(report.fault);
     EXPECT_EQ(report.records, 51U);
+}
+
+TEST_F(AuditWriter, WhatAFullDiskDidNotTakeIsWrittenToAnotherFile) {
+    const auto writer = make(settings());
+    ASSERT_TRUE(write(*writer, 0, 2));
+    const auto size = fs::file_size(file);
+    {
+        const FullDisk full(size + 300);
+        EXPECT_FALSE(write(*writer, 2, 40));
+    }
+    Settings other = settings();
+    other.file += ".other";
+    writer->apply(other);
+    ASSERT_TRUE(writer->work()) << writer->why();
+    const Report report = verify({other.file});
+    EXPECT_FALSE(report.fault);
+    EXPECT_GE(report.records, 2U + 36U);  // one or two fitted
+    EXPECT_NE(read(other.file).find(R"("value":39)"), std::string::npos);
+    EXPECT_FALSE(verify({other.file}).fault);
 }
 
 TEST_F(AuditWriter, SaysWhyAFileCannotBeOpened) {

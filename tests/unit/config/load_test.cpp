@@ -175,7 +175,7 @@ TEST(ConfigLoad, TakesNothingFromTheEnvironmentIntoASecret) {
                                  return name == "DIR" ? "/run/secrets" : "38400";
                              });
     ASSERT_TRUE(config) << problems.text();
-    EXPECT_EQ(config->http->tokens.at(0).secret, "${BAUD}$$0123456789");
+    EXPECT_EQ(config->http->tokens.at(0).hash, web::hash_of("${BAUD}$$0123456789"));
 }
 
 TEST(ConfigLoad, ReadsByWhichNamesAndFromWhereAndWithWhichTokensHttpMayBeAsked) {
@@ -195,7 +195,7 @@ TEST(ConfigLoad, ReadsByWhichNamesAndFromWhereAndWithWhichTokensHttpMayBeAsked) 
     ASSERT_EQ(config.http->tokens.size(), 1U);
     EXPECT_EQ(config.http->tokens[0].name, "ops");
     EXPECT_EQ(config.http->tokens[0].role, Role::operator_);
-    EXPECT_EQ(config.http->tokens[0].secret, "s3cret");
+    EXPECT_EQ(config.http->tokens[0].hash, web::hash_of("s3cret"));
     EXPECT_EQ(config.log.level, rt::LogLevel::trace);
     EXPECT_EQ(config.log.format, rt::LogFormat::json);
 }

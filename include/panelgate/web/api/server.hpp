@@ -63,6 +63,8 @@ struct Providers {
     DiscoverySource* discovery = nullptr;  ///< null only without lines; outlives the server
     ReloadSource* reload = nullptr;        ///< null: reload is not available; outlives the server
     SharedText configuration;  ///< the active one, a JSON object without secrets; null: not shown
+    /// Told of what clients change or are refused, for an audit; may be empty.
+    std::function<void(const Deed&)> record{};
     ApiSettings settings{};
 };
 

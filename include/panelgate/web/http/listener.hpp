@@ -31,8 +31,9 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
     /// Opens the port. On an error (address in use, invalid address…) nothing is open.
     boost::system::error_code open();
     /// Serves `site` from the next request on; running requests finish on the previous one. Clients
-    /// no longer allowed get their reply and are closed; event streams end if tokens changed, and
-    /// their clients reconnect. Requires settings.is_same_listener().
+    /// no longer allowed get their reply and are closed; event streams end of those whose token
+    /// (or, without one, whose role) changed, and their clients reconnect. Requires
+    /// settings.is_same_listener().
     void apply(std::shared_ptr<const Site> site);
     /// Returns the bound port; 0 before open().
     std::uint16_t port() const;

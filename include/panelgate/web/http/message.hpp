@@ -103,6 +103,7 @@ struct HttpRequest {
     std::vector<std::string> arguments;  ///< segments matched by the route's {}
     std::shared_ptr<Caller> caller;
     Role role = Role::none;  ///< of the client
+    WallTime at{};           ///< when it was judged: tokens expire
     bool folder = false;     ///< the path ends with '/'
 };
 /// The request headers that are read; each may occur once.
@@ -140,6 +141,18 @@ struct Route {
     bool probe = false;  ///< answered for any host name and query, even when all else is barred
 };
 
+/// What a client changed or was refused: for an audit. Valid for the call only.
+struct Deed {
+    WhoRef who;
+    std::string_view method;
+    std::string_view path;
+    std::string_view body;  ///< of the request, at most kMostOfBody bytes
+    unsigned status = 0;
+    std::string_view answer{};  ///< the reply's body
+
+    static constexpr std::size_t kMostOfBody = 1024;
+};
+
 /// What a server serves. Shared by its sessions; the first matching route is used.
 struct Site {
     Settings settings;
@@ -147,6 +160,8 @@ struct Site {
     std::vector<Route> routes;
     std::function<std::uint64_t()> next_caller;  ///< returns connection ids
     std::function<TimePoint()> now;              ///< required unless all routes are public
+    std::function<void(const Deed&)> record{};   ///< may be empty; must not throw
+    std::function<WallTime()> wall{};            ///< empty: no token expires
 };
 
 /// Logs at info what a client did or was refused: its name (address, token) first, as `client`.

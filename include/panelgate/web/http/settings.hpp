@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "panelgate/base/network.hpp"
@@ -16,10 +17,20 @@ namespace panelgate::web {
 struct Token {
     std::string name;
     Role role = Role::viewer;
-    std::string secret;  ///< read from its file at load
+    std::string hash;  ///< hash_of() the token, whose file holds it or its hash
     std::string file{};
+    std::size_t characters = 0;         ///< of the token; 0: its file holds the hash
+    std::optional<WallTime> expires{};  ///< from then on it is not known any more
     friend bool operator==(const Token&, const Token&) = default;
 };
+
+/// What a file may hold in place of a token, and what is kept of it: "sha256:" and 64 hex digits.
+std::string hash_of(std::string_view token);
+bool is_token_hash(std::string_view text);
+/// Parses a token's last day ("2027-12-31": until its end) or an instant ("2027-12-31T18:00:00Z"),
+/// in UTC.
+std::optional<WallTime> parse_expiry(std::string_view text);
+std::string expiry_text(WallTime expires);
 
 /// Throttling of token guesses, per address.
 struct LoginSettings {

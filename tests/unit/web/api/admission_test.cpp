@@ -84,7 +84,7 @@ class LoginAttempts : public HttpRig {
   protected:
     LoginAttempts() {
         settings.anonymous = Role::none;
-        settings.tokens.push_back({"ops", Role::operator_, "right"});
+        settings.tokens.push_back({"ops", Role::operator_, hash_of("right")});
         settings.logins.free = 2;
         settings.logins.hold = 1ms;
         start();

@@ -186,7 +186,7 @@ TEST_F(Configuration, IsShownWithThePathsAndTheRoleOfWhoAsks) {
     EXPECT_EQ(get("/api/v1/configuration").status(), 404u) << "a program without";
     configuration = std::make_shared<const std::string>(R"({"lines":[]})");
     settings.anonymous = Role::viewer;
-    settings.tokens = {{"ops", Role::operator_, "let-me"}};
+    settings.tokens = {{"ops", Role::operator_, hash_of("let-me")}};
     start();
     const Reply mine = get("/api/v1/configuration");
     EXPECT_EQ(status_and(mine, "role version configuration"), R"(200 viewer 1.2.3 {"lines":[]})");

@@ -120,7 +120,7 @@ TEST_F(ApiKeyed, P2AnUnknownOutcomeIsRememberedTooAndWhatNeverLeftMayBeTriedAgai
 }
 
 TEST_F(ApiKeyed, AnotherRequestWithTheSameKeyIsRefusedUnlessItBringsAnotherToken) {
-    settings.tokens.push_back({"ops", Role::operator_, "let-me"});
+    settings.tokens.push_back({"ops", Role::operator_, hash_of("let-me")});
     put("k");
     EXPECT_EQ(status_and(put("k", R"({"values":[8]})"), "detail"),
               "422 this Idempotency-Key was that of another request");

@@ -14,10 +14,10 @@ constexpr const char* kRaw = "/api/v1/lines/floor1/raw";
 class Access : public HttpRig {
   protected:
     Access() {
-        settings.tokens.push_back({"panel", Role::viewer, "see-me"});
-        settings.tokens.push_back({"ops", Role::operator_, "let-me"});
-        settings.tokens.push_back({"lab", Role::engineer, "make-me"});
-        settings.tokens.push_back({"boss", Role::admin, "trust-me"});
+        settings.tokens.push_back({"panel", Role::viewer, hash_of("see-me")});
+        settings.tokens.push_back({"ops", Role::operator_, hash_of("let-me")});
+        settings.tokens.push_back({"lab", Role::engineer, hash_of("make-me")});
+        settings.tokens.push_back({"boss", Role::admin, hash_of("trust-me")});
         settings.tokens.push_back({"broken", Role::operator_, ""});
     }
     /// Status of a request with this token; "" sends none.

@@ -19,8 +19,8 @@ using Headers = std::vector<std::pair<std::string, std::string>>;
 Settings with_tokens(Role anonymous) {
     Settings settings;
     settings.anonymous = anonymous;
-    settings.tokens.push_back({"panel", Role::viewer, "see-me"});
-    settings.tokens.push_back({"ops", Role::operator_, "let-me"});
+    settings.tokens.push_back({"panel", Role::viewer, hash_of("see-me")});
+    settings.tokens.push_back({"ops", Role::operator_, hash_of("let-me")});
     settings.tokens.push_back({"broken", Role::operator_, ""});
     return settings;
 }
@@ -268,6 +268,44 @@ TEST_F(Origin, MayBeALinkOfAnotherSiteToAPage) {
     request.method = "GET";
     browse("cross-site", "navigate", "iframe");
     EXPECT_EQ(refusal(), 403u);
+}
+
+TEST(Tokens, AreKeptAsHashesWhichAreNoTokens) {
+    EXPECT_EQ(hash_of("let-me"),
+              "sha256:70bda1fac83224812e277ec4e1c2c121bca3464e1b8d5f7f2fdb6ba70a9ee0c2");
+    EXPECT_TRUE(is_token_hash(hash_of("let-me")));
+    EXPECT_FALSE(is_token_hash("let-me"));
+    EXPECT_FALSE(is_token_hash("sha256:12"));
+    EXPECT_EQ(refusal(asking("Bearer " + hash_of("let-me")), Role::viewer, Role::none), 401U);
+    EXPECT_EQ(refusal(asking("Bearer "), Role::viewer, Role::none), 401U);
+}
+
+TEST(Tokens, AreNotKnownAfterTheirLastDay) {
+    Settings settings = with_tokens(Role::none);
+    settings.tokens[1].expires = parse_expiry("2027-12-31");
+    HttpRequest request = asking("Bearer let-me");
+    request.at = *parse_expiry("2027-12-31T23:59:59Z");
+    EXPECT_FALSE(check_access(request, Role::operator_, settings));
+    EXPECT_EQ(role_of(request, settings), Role::operator_);
+    EXPECT_EQ(token_name(request, settings), "ops");
+    request.at = *parse_expiry("2028-01-01T00:00:00Z");
+    const auto refused = check_access(request, Role::operator_, settings);
+    ASSERT_TRUE(refused);
+    EXPECT_EQ(refused->status, 401U);
+    EXPECT_EQ(role_of(request, settings), Role::none);
+    EXPECT_EQ(token_name(request, settings), "");
+}
+
+TEST(Tokens, ExpireOnADayOrAtAnInstant) {
+    for (const char* text : {"2027-12-31", "2028-02-29", "2027-12-31T18:00:00Z"}) {
+        const auto expires = parse_expiry(text);
+        ASSERT_TRUE(expires) << text;
+        EXPECT_EQ(expiry_text(*expires), text);
+    }
+    for (const char* text :
+         {"", "2027", "2027-13-01", "2027-02-29", "2027-1-1", "31.12.2027", "2027-12-31T24:00:00Z",
+          "2027-12-31T18:00:00", "2027-12-31 ", "-027-12-31"})
+        EXPECT_FALSE(parse_expiry(text)) << text;
 }
 
 }  // namespace

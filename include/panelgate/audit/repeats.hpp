@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panelgate/base/time.hpp"
+
+namespace panelgate::audit {
+
+/// Gathers what one client tries again and again without effect, so that it cannot push what had an
+/// effect out of the files: the first ones are recorded in full, further ones are counted for an
+/// interval. Bounded: what finds no place shares one. Pure.
+class Repeats {
+  public:
+    static constexpr Duration kInterval = 1min;
+    static constexpr std::size_t kMost = 1024;
+
+    /// What was counted under one key.
+    struct Counted {
+        std::string members;  ///< as given with the first one
+        std::uint64_t count = 0;
+        WallTime first{};
+        WallTime last{};
+    };
+
+    /// True if this one is to be recorded in full: one of the first `in_full` of its interval;
+    /// otherwise it was counted. `members` makes the JSON members that tell what is repeated
+    /// (`,"client":"..."`), for a new key.
+    bool is_new(TimePoint now, WallTime wall, std::string_view key, unsigned in_full,
+                const std::function<std::string()>& members);
+    /// Takes what is to be recorded of intervals that have ended; `all`: of all.
+    std::vector<Counted> due(TimePoint now, bool all = false);
+    bool empty() const { return entries_.empty(); }
+
+  private:
+    struct Entry {
+        TimePoint began{};
+        unsigned in_full = 0;
+        Counted counted;
+    };
+    std::map<std::string, Entry, std::less<>> entries_;
+};
+
+}  // namespace panelgate::audit

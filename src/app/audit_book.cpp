@@ -1,0 +1,421 @@
+#include "audit_book.hpp"
+
+#include <algorithm>
+#include <boost/asio/post.hpp>
+#include <boost/json/object.hpp>
+#include <boost/json/parse.hpp>
+#include <boost/json/value.hpp>
+#include <span>
+#include <utility>
+
+#include "build_info.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/profile/notation.hpp"
+#include "panelgate/rt/log.hpp"
+#include "snapshot.hpp"
+
+namespace panelgate::app {
+
+namespace {
+
+using audit::Composer;
+using audit::Kind;
+
+void add_who(Composer& record, const WhoRef& who) {
+    if (!who) return;
+    record.text("client", who->name).text("face", label(who->face));
+    record.text("listener", who->listener).text("token", who->token);
+    if (who->role != Role::none) record.text("role", label(who->role));
+    record.text("certificate", who->certificate).text("certificate_role", who->certificate_role);
+    record.text("user", who->user);
+}
+
+/// How a write ended, for somebody who asks whether the panel has changed.
+std::string_view outcome_of(const bus::WriteEnd& end) {
+    if (end.outcome == Outcome::refused) return "refused";
+    if (end.transmitted && end.exception) return "refused";
+    if (end.outcome == Outcome::ok || end.outcome == Outcome::shared)
+        return end.station == 0 ? "sent" : "confirmed";
+    return end.transmitted ? "unknown" : "not_sent";
+}
+
+void add_outcome(Composer& record, const bus::WriteEnd& end) {
+    const std::string_view outcome = outcome_of(end);
+    record.text("outcome", outcome);
+    if (outcome == "unknown" || outcome == "not_sent") record.text("why", label(end.outcome));
+    if (end.exception) record.text("by", "panel").number("exception", *end.exception);
+    record.text("rule", end.rule);
+    if (end.transaction != 0) record.number("transaction", end.transaction);
+}
+
+std::uint16_t register_at(ByteView bytes, std::size_t at) {
+    return static_cast<std::uint16_t>(bytes[at] << 8U | bytes[at + 1]);
+}
+
+/// Where the values of a write begin; 0: it has none that are simply values.
+std::size_t values_at(std::uint8_t function) {
+    switch (function) {
+        case modbus::kWriteSingleCoil:
+        case modbus::kWriteSingleRegister:
+            return 3;
+        case modbus::kWriteMultipleCoils:
+        case modbus::kWriteMultipleRegisters:
+            return 6;
+        case modbus::kReadWriteMultipleRegisters:
+            return 10;
+        default:
+            return 0;
+    }
+}
+
+/// What one client may have of one kind of refusal is counted under this.
+void make_key(std::string& key, const WhoRef& who, std::string_view what) {
+    key.clear();
+    if (who) {
+        // A serial master and the gateway's own have no address, but a name without a port.
+        key += who->address.empty() && who->user.empty() ? who->name : who->address;
+        key += '\t';
+        key += who->token;
+        key += '\t';
+        key += who->user;
+    }
+    key += '\t';
+    key += what;
+}
+
+/// A client without the port, which each of its connections has anew.
+std::string client_members(const WhoRef& who) {
+    Composer members;
+    members.begin({}, Kind::repeats);
+    const std::size_t begin = members.body().size();
+    if (who) {
+        members.text("address", who->address).text("face", label(who->face));
+        if (who->address.empty()) members.text("client", who->name);
+        members.text("token", who->token).text("user", who->user);
+    }
+    return std::string(members.body().substr(begin));
+}
+
+std::string member(std::string_view key, std::string_view value) {
+    std::string text = ",\"" + std::string(key) + "\":";
+    audit::append_json(text, value);
+    return text;
+}
+
+/// The sentence of a problem (RFC 9457); "" of another body.
+std::string detail_of(std::string_view body) {
+    boost::system::error_code wrong;
+    const boost::json::value value = boost::json::parse(body, wrong);
+    const auto* object = wrong ? nullptr : value.if_object();
+    const auto* detail = object != nullptr ? object->if_contains("detail") : nullptr;
+    const auto* text = detail != nullptr ? detail->if_string() : nullptr;
+    return text != nullptr ? std::string(*text) : std::string();
+}
+
+}  // namespace
+
+AuditBook::AuditBook(boost::asio::any_io_executor executor, rt::Clock& clock)
+    : executor_(std::move(executor)), clock_(clock), alarm_(clock.make_alarm()) {}
+
+AuditBook::~AuditBook() { close(); }
+
+void AuditBook::apply(const std::optional<audit::Settings>& settings) {
+    if (!settings) {
+        if (!trail_) return;
+        record_repeats(true);
+        begin(Kind::end).text("why", "the audit is switched off");
+        record();
+        std::shared_ptr<audit::Trail> last = std::move(trail_);
+        if (!closing_) closing_.emplace(executor_);
+        closing_->run([last] { last->close(); }, [] {});  // the disk may be slow
+        return;
+    }
+    if (trail_ && file_ != settings->file) {
+        record_repeats(true);
+        begin(Kind::end).text("why", "the audit goes on in " + settings->file);
+        record();
+    }
+    on_failure_ = settings->on_failure;
+    file_ = settings->file;
+    if (trail_) return trail_->apply(*settings);
+    audit::Trail::Hooks hooks;
+    hooks.wall = rt::wall_now;
+    hooks.start = member("version", PANELGATE_VERSION) + member("commit", build_commit());
+    hooks.tell = [this, executor = executor_, life = std::weak_ptr(alive_)](audit::Notice notice) {
+        boost::asio::post(executor, [this, life, notice = std::move(notice)] {
+            if (!life.expired()) tell(notice);
+        });
+    };
+    trail_ = std::make_unique<audit::Trail>(*settings, std::move(hooks));
+}
+
+void AuditBook::tell(const audit::Notice& notice) {
+    using Notice = audit::Notice::Kind;
+    switch (notice.kind) {
+        case Notice::failing:
+            return rt::log(
+                rt::LogLevel::error, "audit fails",
+                {{"file", file_}, {"why", notice.text}, {"writes", writes_while_failing()}});
+        case Notice::recovered:
+            return rt::log(rt::LogLevel::info, "audit recovered",
+                           {{"file", file_}, {"lost", std::to_string(counters().lost)}});
+        case Notice::anchor:
+            return rt::log(rt::LogLevel::info, "audit anchor",
+                           {{"number", std::to_string(notice.at.number)},
+                            {"hash", std::string(text_of(notice.at.hash))}});
+        case Notice::remark:
+            return rt::log(rt::LogLevel::warn, "audit file",
+                           {{"file", file_}, {"why", notice.text}});
+    }
+}
+
+std::string AuditBook::writes_while_failing() const {
+    return on_failure_ == audit::OnFailure::refuse_writes ? "are refused"
+                                                          : "go on, and are recorded later";
+}
+
+void AuditBook::close() {
+    if (!trail_) return;
+    record_repeats(true);
+    begin(Kind::end);
+    record();
+    const audit::Position last = trail_->close();
+    if (last.number > 0) tell({audit::Notice::Kind::anchor, {}, last});
+    trail_.reset();
+}
+
+void AuditBook::show(std::shared_ptr<const Snapshot> snapshot) {
+    std::map<std::string, std::map<std::uint8_t, Known>, std::less<>> next;
+    for (const Station& station : snapshot->plant.stations()) {
+        Known& known = next[station.line][station.id];
+        known.station = &station;
+        if (const Known* before = find(station.line, station.id)) known.written = before->written;
+    }
+    known_ = std::move(next);
+    snapshot_ = std::move(snapshot);
+}
+
+AuditBook::Known* AuditBook::find(const std::string& line, std::uint8_t id) {
+    const auto stations = known_.find(line);
+    if (stations == known_.end()) return nullptr;
+    const auto found = stations->second.find(id);
+    return found == stations->second.end() ? nullptr : &found->second;
+}
+
+const std::string& AuditBook::notation_of(Known& known, const modbus::Span& items) {
+    const auto key = static_cast<std::uint32_t>(items.table) << 16U | items.first;
+    const auto found = known.notations.find(key);
+    if (found != known.notations.end()) return found->second;
+    if (known.notations.size() >= kNotations) known.notations.clear();
+    std::string text = profile::format_notation(*known.station->configured->profile, items.table,
+                                                static_cast<std::uint16_t>(items.first));
+    return known.notations.emplace(key, std::move(text)).first->second;
+}
+
+void AuditBook::write(const std::string& line, const bus::WriteEnd& end) {
+    if (!trail_) return;
+    Known* known = find(line, end.station);
+    const bool is_vain = !end.transmitted && end.outcome != Outcome::ok;
+    if (is_vain && is_vain_repeat(line, end, known)) return;
+    add_write(line, end, known);
+    record();
+    if (!end.transmitted) return;
+    const TimePoint now = clock_.now();
+    if (known != nullptr) known->written = now;
+    if (end.station != 0) return;
+    for (auto& [id, each] : known_[line]) each.written = now;
+}
+
+void AuditBook::add_write(const std::string& line, const bus::WriteEnd& end, Known* known) {
+    Composer& record = begin(Kind::write);
+    add_who(record, end.who);
+    record.text("line", line);
+    if (known != nullptr) record.text("station", known->station->name);
+    record.number("id", end.station);
+    if (end.items && known != nullptr) record.text("at", notation_of(*known, *end.items));
+    if (!end.pdu.empty()) record.number("function", end.pdu[0]);
+    if (end.items) {
+        record.text("table", modbus::label(end.items->table)).number("address", end.items->first);
+        record.number("count", end.items->count);
+        add_values(end.pdu, *end.items);
+        if (known != nullptr) add_before(*known, *end.items);
+    } else {
+        record.hex("pdu", end.pdu);
+    }
+    add_outcome(record, end);
+}
+
+void AuditBook::add_values(ByteView pdu, const modbus::Span& items) {
+    const std::size_t at = values_at(pdu[0]);
+    const std::size_t each = modbus::is_bit_table(items.table) ? 0 : 2;
+    if (pdu[0] == modbus::kMaskWriteRegister && pdu.size() == 7) {
+        composer_.number("and_mask", register_at(pdu, 3)).number("or_mask", register_at(pdu, 5));
+    } else if (at == 0 || pdu.size() < at + std::max<std::size_t>(each * items.count, 1)) {
+        composer_.hex("pdu", pdu);
+    } else {
+        values_.clear();
+        for (std::size_t i = 0; i < items.count; ++i) {
+            const bool single = pdu[0] == modbus::kWriteSingleCoil;
+            const std::size_t byte = std::min(at + i / 8, pdu.size() - 1);
+            const unsigned bit = single ? pdu[at] != 0 : pdu[byte] >> (i % 8) & 1U;
+            values_.push_back(each == 0 ? static_cast<std::uint16_t>(bit)
+                                        : register_at(pdu, at + 2 * i));
+        }
+        composer_.numbers("values", values_);
+    }
+}
+
+/// The value that was polled last, if no write of ours came between.
+void AuditBook::add_before(const Known& known, const modbus::Span& items) {
+    if (!known.station->points) return;
+    const points::StationPoints& points = *known.station->points;
+    const auto holds = [&](const points::Point& point) {
+        return modbus::Span{point.table, point.address, point.count()}.contains(items);
+    };
+    const auto found = std::ranges::find_if(points.points(), holds);
+    if (found == points.points().end()) return;
+    const std::vector<std::uint16_t>& polled = points.items(*found);
+    const TimePoint now = clock_.now();
+    const auto age = points.read(*found, now).age;
+    const std::size_t from = items.first - found->address;
+    if (!age || polled.size() < from + items.count) return;
+    if (known.written && now - *age <= *known.written) return;
+    composer_.numbers("before", std::span(polled).subspan(from, items.count));
+    composer_.number("before_age_ms", static_cast<std::uint64_t>(to_milliseconds(*age)));
+}
+
+bool AuditBook::is_vain_repeat(const std::string& line, const bus::WriteEnd& end,
+                               const Known* known) {
+    const bool refused = end.outcome == Outcome::refused;
+    std::string& what = what_;
+    what = line;
+    what += '/';
+    what += std::to_string(end.station);
+    what += '\t';
+    what += label(end.outcome);
+    what += '\t';
+    what += end.rule;
+    const std::string station =
+        known != nullptr ? known->station->name : std::to_string(end.station);
+    return is_repeat(end.who, what, refused ? 1 : kNotSent, [&] {
+        return member("line", line) + member("station", station) +
+               member("outcome", outcome_of(end)) +
+               (refused ? end.rule.empty() ? std::string() : member("rule", end.rule)
+                        : member("why", label(end.outcome)));
+    });
+}
+
+bool AuditBook::is_repeat(const WhoRef& who, std::string_view what, unsigned in_full,
+                          const std::function<std::string()>& more) {
+    make_key(key_, who, what);
+    const bool is_new = repeats_.is_new(clock_.now(), rt::wall_now(), key_, in_full,
+                                        [&] { return client_members(who) + more(); });
+    if (!waits_) wait_for_repeats();
+    return !is_new;
+}
+
+void AuditBook::wait_for_repeats() {
+    constexpr Duration kLook = 10s;
+    waits_ = !repeats_.empty();
+    if (!waits_) return;
+    alarm_->arm(clock_.now() + kLook, [this] {
+        record_repeats(false);
+        wait_for_repeats();
+    });
+}
+
+void AuditBook::record_repeats(bool all) {
+    for (const audit::Repeats::Counted& counted : repeats_.due(clock_.now(), all)) {
+        if (!trail_) return;
+        begin(Kind::repeats).number("count", counted.count);
+        composer_.time("first", counted.first).time("last", counted.last);
+        trail_->add(std::string(composer_.body()) + counted.members);
+    }
+}
+
+std::function<void(const web::Deed&)> AuditBook::deeds() {
+    return [this, life = std::weak_ptr(alive_)](const web::Deed& what) {
+        if (!life.expired()) deed(what);
+    };
+}
+
+void AuditBook::deed(const web::Deed& deed) {
+    if (!trail_) return;
+    const bool discovers = deed.path.ends_with("/discover");
+    const bool simulates = deed.path.find("/simulator/") != deed.path.npos;
+    if (deed.status == 401) {
+        if (is_repeat(deed.who, "login", 1, [&] { return member("outcome", "log-in failed"); }))
+            return;
+        add_who(begin(Kind::login), deed.who);
+        composer_.text("outcome", "failed").text("path", deed.path);
+        composer_.text("why", detail_of(deed.answer));
+    } else if (deed.status >= 400) {
+        return refusal(deed);
+    } else if (discovers || simulates) {
+        add_who(begin(discovers ? Kind::discovery : Kind::simulator), deed.who);
+        composer_.text("method", deed.method).text("path", deed.path).text("body", deed.body);
+    } else {
+        return;  // the bus tells of writes, the reloader of reloads
+    }
+    record();
+}
+
+/// What was refused before it came to a bus. A bus tells of what it refuses itself.
+void AuditBook::refusal(const web::Deed& deed) {
+    const bool is_refusal = deed.status == 403 || deed.status == 409 || deed.status == 422;
+    if (!is_refusal) return;
+    std::string& what = what_;
+    what = deed.method;
+    what += '\t';
+    what += std::to_string(deed.status);
+    if (is_repeat(deed.who, what, 1, [&] {
+            return member("method", deed.method) + member("path", deed.path) +
+                   member("outcome", "refused");
+        }))
+        return;
+    add_who(begin(Kind::refusal), deed.who);
+    composer_.text("method", deed.method).text("path", deed.path).text("body", deed.body);
+    composer_.number("status", deed.status).text("why", detail_of(deed.answer));
+    record();
+}
+
+void AuditBook::reload(const web::ReloadVerdict& verdict) {
+    if (!trail_) return;
+    begin(Kind::reload).text("cause", verdict.cause).flag("rollback", verdict.rollback);
+    composer_.text("outcome", label(verdict.outcome)).text("why", verdict.why);
+    const std::span<const std::string> changes(verdict.changes);
+    composer_.texts("changes", changes.first(std::min(changes.size(), kChanges)));
+    if (changes.size() > kChanges) composer_.number("more_changes", changes.size() - kChanges);
+    if (!verdict.faults.empty()) composer_.number("faults", verdict.faults.size());
+    record();
+}
+
+void AuditBook::tokens(const std::vector<web::Token>& before, const std::vector<web::Token>& now) {
+    if (!trail_) return;
+    const auto tell_of = [this](const web::Token& token, std::string_view event) {
+        begin(Kind::token).text("token", token.name).text("role", label(token.role));
+        composer_.text("event", event);
+        if (token.expires) composer_.text("expires", web::expiry_text(*token.expires));
+        record();
+    };
+    for (const web::Token& token : now) {
+        const auto old = std::ranges::find(before, token.name, &web::Token::name);
+        if (old == before.end()) {
+            tell_of(token, "added");
+        } else if (*old != token) {
+            const bool other = old->hash != token.hash;
+            tell_of(token, old->role != token.role ? "role changed"
+                           : other                 ? "replaced"
+                                                   : "changed");
+        }
+    }
+    for (const web::Token& token : before)
+        if (std::ranges::find(now, token.name, &web::Token::name) == now.end())
+            tell_of(token, "removed");
+}
+
+audit::Counters AuditBook::counters() const {
+    return trail_ ? trail_->counters() : audit::Counters{};
+}
+
+}  // namespace panelgate::app

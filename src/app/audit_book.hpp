@@ -1,0 +1,123 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "panelgate/audit/counters.hpp"
+#include "panelgate/audit/record.hpp"
+#include "panelgate/audit/repeats.hpp"
+#include "panelgate/audit/settings.hpp"
+#include "panelgate/audit/trail.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/base/who.hpp"
+#include "panelgate/bus/bus.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/rt/clock.hpp"
+#include "panelgate/rt/process.hpp"
+#include "panelgate/web/api/sources.hpp"
+#include "panelgate/web/http/message.hpp"
+#include "panelgate/web/http/settings.hpp"
+#include "plant.hpp"
+
+namespace panelgate::app {
+
+struct Snapshot;
+
+/// Keeps the audit: what is recorded of each thing that happens, and in which words. Without
+/// `audit:` it records nothing. One thread.
+class AuditBook {
+  public:
+    static constexpr std::size_t kNotations = 4096;  ///< of a station, kept
+    static constexpr std::size_t kChanges = 200;     ///< of a reload, told
+    static constexpr unsigned kNotSent = 30;  ///< writes of a client that were not sent, in full
+
+    /// The clock outlives it.
+    AuditBook(boost::asio::any_io_executor executor, rt::Clock& clock);
+    ~AuditBook();
+    AuditBook(const AuditBook&) = delete;
+    AuditBook& operator=(const AuditBook&) = delete;
+
+    /// Keeps it as configured from now on; nullopt: no more.
+    void apply(const std::optional<audit::Settings>& settings);
+    /// The stations whose names, notations and last values are recorded from now on.
+    void show(std::shared_ptr<const Snapshot> snapshot);
+    /// The gateway ends in order: records it, and ends the trail.
+    void close();
+
+    void write(const std::string& line, const bus::WriteEnd& end);
+    /// True while writes must not be sent.
+    bool refuses_writes() const {
+        return trail_ && on_failure_ == audit::OnFailure::refuse_writes && trail_->is_failing();
+    }
+    bool is_kept() const { return trail_ != nullptr; }
+
+    /// A client of deed() that may outlive this.
+    std::function<void(const web::Deed&)> deeds();
+    /// What a client of REST changed, or was refused; writes are the buses'.
+    void deed(const web::Deed& deed);
+    /// A reload or a rollback, and what it changed.
+    void reload(const web::ReloadVerdict& verdict);
+    /// Tokens that came, went, changed or expired.
+    void tokens(const std::vector<web::Token>& before, const std::vector<web::Token>& now);
+
+    /// Zeros without an audit.
+    audit::Counters counters() const;
+
+  private:
+    using Composer = audit::Composer;
+
+    struct Known;
+
+    Composer& begin(audit::Kind kind) { return composer_.begin(rt::wall_now(), kind); }
+    void add_write(const std::string& line, const bus::WriteEnd& end, Known* known);
+    void add_values(ByteView pdu, const modbus::Span& items);
+    void add_before(const Known& known, const modbus::Span& items);
+    /// True if it was counted. `more`: members that tell what is repeated, besides the client.
+    bool is_repeat(const WhoRef& who, std::string_view what, unsigned in_full,
+                   const std::function<std::string()>& more);
+    bool is_vain_repeat(const std::string& line, const bus::WriteEnd& end, const Known* known);
+    void refusal(const web::Deed& deed);
+    void record() { trail_->add(composer_.body()); }
+    void record_repeats(bool all);
+    void wait_for_repeats();
+    void tell(const audit::Notice& notice);
+    std::string writes_while_failing() const;
+
+    boost::asio::any_io_executor executor_;
+    rt::Clock& clock_;
+    std::unique_ptr<rt::Alarm> alarm_;
+    std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+    audit::OnFailure on_failure_ = audit::OnFailure::keep_on;
+    std::string file_;
+    std::optional<rt::Worker> closing_;    ///< ends trails: a disk may be slow
+    std::unique_ptr<audit::Trail> trail_;  ///< null without an audit
+    audit::Composer composer_;
+    audit::Repeats repeats_;
+    bool waits_ = false;
+
+    /// A station as records name it.
+    struct Known {
+        const Station* station = nullptr;
+        std::unordered_map<std::uint32_t, std::string> notations{};  ///< by table and address
+        std::optional<TimePoint> written{};  ///< the last write that may have had an effect
+    };
+    Known* find(const std::string& line, std::uint8_t id);
+    const std::string& notation_of(Known& known, const modbus::Span& items);
+
+    std::shared_ptr<const Snapshot> snapshot_;
+    std::map<std::string, std::map<std::uint8_t, Known>, std::less<>> known_;
+    std::vector<std::uint16_t> values_;
+    std::string key_;
+    std::string what_;
+};
+
+}  // namespace panelgate::app

@@ -1,0 +1,182 @@
+#include <algorithm>
+#include <boost/json/object.hpp>
+#include <boost/json/parse.hpp>
+#include <boost/json/value.hpp>
+#include <filesystem>
+#include <iostream>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "commands.hpp"
+#include "load.hpp"
+#include "panelgate/audit/files.hpp"
+#include "panelgate/audit/verify.hpp"
+#include "panelgate/cli/audit_text.hpp"
+#include "panelgate/rt/clock.hpp"
+
+namespace panelgate::app {
+
+namespace {
+
+using Files = std::vector<std::string>;
+
+ExitCode cannot_read(const std::string& file, const std::string& why) {
+    std::cerr << "panelgate: cannot read " << file << ": " << why << '\n';
+    return kNoInput;
+}
+
+std::string head_of(const std::string& file) {
+    std::string head;
+    audit::read_lines(file, [&](std::string_view line, bool) {
+        head = line;
+        return false;
+    });
+    return head;
+}
+
+/// The files that were named, or those of the configuration, oldest first.
+std::optional<Files> files_of(const AuditOptions& options, ExitCode& code) {
+    Files files = options.files;
+    if (files.empty()) {
+        Loaded loaded = load_file(options.config);
+        code = loaded.code;
+        if (!loaded.config) return std::nullopt;
+        if (!loaded.config->audit) {
+            std::cerr << "panelgate: " << options.config
+                      << " has no `audit:`; name the files of an audit\n";
+            code = kUsage;
+            return std::nullopt;
+        }
+        const std::string& file = loaded.config->audit->file;
+        files = audit::rotated_files(file);
+        files.push_back(file);
+    }
+    std::error_code unknown;
+    for (const std::string& file : files) {
+        if (!std::filesystem::is_directory(file, unknown)) continue;
+        code = cannot_read(file, "it is a folder; name the files in it");
+        return std::nullopt;
+    }
+    return audit::in_order(std::move(files), head_of);
+}
+
+std::optional<audit::Anchors> anchors_of(const Files& logs, ExitCode& code) {
+    audit::Anchors anchors;
+    for (const std::string& log : logs) {
+        const auto take = [&](std::string_view line, bool) {
+            audit::collect_anchor(line, anchors);
+            return true;
+        };
+        const std::string why = audit::read_lines(log == "-" ? "/dev/stdin" : log, take);
+        if (why.empty()) continue;
+        code = cannot_read(log, why);
+        return std::nullopt;
+    }
+    return anchors;
+}
+
+void print_good(const audit::Report& report, std::size_t files, bool has_log) {
+    std::cout << "whole: " << report.records << (report.records == 1 ? " record" : " records")
+              << " (" << report.first << " to " << report.last.number << ") in " << files
+              << (files == 1 ? " file" : " files") << '\n'
+              << "last hash " << text_of(report.last.hash) << '\n';
+    if (has_log) {
+        std::cout << report.anchored << " of them named by the log\n";
+    } else {
+        std::cout << "not compared with the log (--log FILE): a chain that was made anew, or cut "
+                     "off at its end, is found only there\n";
+    }
+}
+
+ExitCode print_report(const audit::Report& report, std::size_t files, bool has_log) {
+    for (const std::string& remark : report.remarks) std::cout << "note: " << remark << '\n';
+    if (report.fault) {
+        const audit::Fault& fault = *report.fault;
+        std::cout << fault.file;
+        if (fault.line > 0) std::cout << ':' << fault.line;
+        std::cout << ": " << label(fault.kind) << ": " << fault.text << '\n';
+        if (report.records > 0)
+            std::cout << report.records << " records before it are right (" << report.first
+                      << " to " << report.last.number << ")\n";
+        return kNo;
+    }
+    if (report.records == 0) {
+        std::cout << "there is no record\n";
+        return kNo;
+    }
+    print_good(report, files, has_log);
+    return kFine;
+}
+
+}  // namespace
+
+ExitCode audit_verify(const AuditOptions& options) {
+    ExitCode code = kFine;
+    const auto anchors = anchors_of(options.logs, code);
+    if (!anchors) return code;
+    const auto files = files_of(options, code);
+    if (!files) return code;
+    audit::Verifier verifier(*anchors);
+    for (const std::string& file : *files) {
+        verifier.begin_file(file);
+        bool wanted = true;
+        const std::string why = audit::read_lines(file, [&](std::string_view line, bool whole) {
+            wanted = verifier.take(line, whole);
+            return wanted;
+        });
+        if (!why.empty()) return cannot_read(file, why);
+        if (!wanted) break;
+    }
+    return print_report(verifier.finish(), files->size(), !options.logs.empty());
+}
+
+namespace {
+
+std::optional<cli::AuditFilter> filter_of(const AuditOptions& options) {
+    cli::AuditFilter filter{options.station, options.kind, options.client, {}, {}};
+    for (const auto& [typed, option, into] :
+         {std::tuple{&options.since, "--since", &filter.since},
+          std::tuple{&options.until, "--until", &filter.until}}) {
+        if (typed->empty()) continue;
+        const auto time = cli::audit_time(*typed, rt::wall_now());
+        if (!time) {
+            std::cerr << "panelgate: audit: " << option << " is a span such as 30min, 1h or 7d, or "
+                      << "a time such as 2026-11-26T08:00:00Z, not '" << *typed << "'\n";
+            return std::nullopt;
+        }
+        *into = *time;
+    }
+    return filter;
+}
+
+bool print_record(std::string_view line, const cli::AuditFilter& filter, bool as_json) {
+    boost::system::error_code wrong;
+    const boost::json::value value = boost::json::parse(line, wrong);
+    const auto* record = wrong ? nullptr : value.if_object();
+    if (record == nullptr || !cli::is_shown(*record, filter)) return false;
+    std::cout << (as_json ? std::string(line) : cli::audit_line(*record)) << '\n';
+    return true;
+}
+
+}  // namespace
+
+ExitCode audit_show(const AuditOptions& options) {
+    ExitCode code = kFine;
+    const auto filter = filter_of(options);
+    if (!filter) return kUsage;
+    const auto files = files_of(options, code);
+    if (!files) return code;
+    bool any = false;
+    for (const std::string& file : *files) {
+        const std::string why = audit::read_lines(file, [&](std::string_view line, bool) {
+            any = print_record(line, *filter, options.json) || any;
+            return static_cast<bool>(std::cout);
+        });
+        if (!why.empty()) return cannot_read(file, why);
+    }
+    return any ? kFine : kNo;
+}
+
+}  // namespace panelgate::app

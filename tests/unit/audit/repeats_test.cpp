@@ -1,0 +1,64 @@
+#include "panelgate/audit/repeats.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace panelgate::audit {
+namespace {
+
+const TimePoint kStart{};
+
+bool note(Repeats& repeats, Duration after, const std::string& key, unsigned in_full = 1) {
+    const auto wall = WallTime(std::chrono::duration_cast<std::chrono::microseconds>(after));
+    return repeats.is_new(kStart + after, wall, key, in_full,
+                          [&] { return ",\"client\":\"" + key + '"'; });
+}
+
+TEST(AuditRepeats, TheFirstIsRecordedAndTheRestIsCountedOncePerInterval) {
+    Repeats repeats;
+    EXPECT_TRUE(note(repeats, 0s, "a"));
+    for (int i = 1; i <= 50; ++i) EXPECT_FALSE(note(repeats, i * 1s, "a"));
+    EXPECT_TRUE(note(repeats, 5s, "b"));
+    EXPECT_TRUE(repeats.due(kStart + 59s).empty());
+    const auto due = repeats.due(kStart + 61s);
+    ASSERT_EQ(due.size(), 1U);
+    EXPECT_EQ(due[0].count, 50U);
+    EXPECT_EQ(due[0].members, R"(,"client":"a")");
+    EXPECT_EQ(due[0].first, WallTime(1s));
+    EXPECT_EQ(due[0].last, WallTime(50s));
+}
+
+TEST(AuditRepeats, OneThatGoesOnIsCountedOnAndOneThatHasEndedBeginsAnew) {
+    Repeats repeats;
+    note(repeats, 0s, "a");
+    note(repeats, 1s, "a");
+    EXPECT_EQ(repeats.due(kStart + 60s).size(), 1U);
+    EXPECT_FALSE(note(repeats, 61s, "a"));
+    EXPECT_EQ(repeats.due(kStart + 120s).size(), 1U);
+    EXPECT_TRUE(repeats.due(kStart + 180s).empty());
+    EXPECT_TRUE(repeats.empty());
+    EXPECT_TRUE(note(repeats, 181s, "a"));
+}
+
+TEST(AuditRepeats, SomeMayBeRecordedInFull) {
+    Repeats repeats;
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(note(repeats, 0s, "a", 3));
+    EXPECT_FALSE(note(repeats, 0s, "a", 3));
+    ASSERT_EQ(repeats.due(kStart + 1s, true).size(), 1U);
+}
+
+TEST(AuditRepeats, ManyClientsShareAPlaceAtLast) {
+    Repeats repeats;
+    for (std::size_t i = 0; i < Repeats::kMost; ++i)
+        EXPECT_TRUE(note(repeats, 0s, std::to_string(i)));
+    EXPECT_TRUE(note(repeats, 0s, "x"));
+    for (int i = 0; i < 100; ++i) EXPECT_FALSE(note(repeats, 0s, "y" + std::to_string(i)));
+    const auto due = repeats.due(kStart, true);
+    ASSERT_EQ(due.size(), 1U);
+    EXPECT_EQ(due[0].count, 100U);
+    EXPECT_EQ(due[0].members, R"(,"client":"others")");
+}
+
+}  // namespace
+}  // namespace panelgate::audit
