@@ -15,6 +15,7 @@ FULL = """lines:
 serial_masters: [{name: plc, device: /dev/panelgate-none, serial: {baud: 9600}, lines: [floor1]}]
 mqtt: {broker: "mqtt://127.0.0.1:1"}
 http: {listen: "127.0.0.1:0"}
+access: {rules: [{name: no-writes, deny: [write]}]}
 """
 # What neither has: its labels, and what it takes.
 OTHERS = {"panelgate_findings": "line, station, cause", "panelgate_framing_errors_total": "line",
@@ -33,6 +34,7 @@ GROUPS = [("Requests", ("requests", "translated", "request_duration", "queue"),
           ("Serial drivers", ("framing", "parity", "overruns", "breaks"),
            "Only of lines whose driver counts: a serial port of the machine, and some USB adapters."),
           ("Points", ("point",), "With `points`."), ("Relays", ("relay",), "With `relays`."),
+          ("Rights", ("access",), "With rules of `access`."),
           ("Modbus/TCP", ("tcp",), "For each listener."), ("HTTP", ("http", "login"), ""),
           ("TLS", ("tls", "certificate"), "For each listener with `tls`."),
           ("MQTT", ("mqtt",), "With `mqtt`."),

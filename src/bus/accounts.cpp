@@ -95,14 +95,15 @@ std::string place_of(const modbus::Request& request) {
 
 std::optional<WriteRecord> write_record_of(const Request& request) {
     if (request.poll || !may_write(request.request.pdu())) return std::nullopt;
-    return WriteRecord{request.who, place_of(request.request), hex_of(request.request.pdu()), 0};
+    return WriteRecord{
+        request.who, place_of(request.request), hex_of(request.request.pdu()), 0, {}};
 }
 
 std::optional<WriteRecord> write_record_of(ByteView pdu, const WhoRef& who) {
     if (!may_write(pdu)) return std::nullopt;
     const auto request =
         modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
-    return WriteRecord{who, request ? place_of(*request) : std::string(), hex_of(pdu), 0};
+    return WriteRecord{who, request ? place_of(*request) : std::string(), hex_of(pdu), 0, {}};
 }
 
 void log_write(const Settings& settings, std::uint8_t station, const WriteRecord& write,
@@ -121,6 +122,7 @@ void log_write(const Settings& settings, std::uint8_t station, const WriteRecord
     fields.push_back({"outcome", ended});
     const std::string transaction = std::to_string(write.transaction);
     if (write.transaction != 0) fields.push_back({"transaction", transaction});
+    if (!write.rule.empty()) fields.push_back({"rule", write.rule});
     if (!accepted) return rt::log_collapsed("write", place + ' ' + client, fields);
     rt::log_each("write", place, client + ' ' + write.pdu + ' ' + ended, fields);
 }
@@ -379,9 +381,11 @@ void Account::add(std::uint8_t station, std::uint8_t function,
     observe(settings_, TransactionEvent{station, function, outcome, took});
 }
 
-void Account::add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) {
+void Account::add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who, std::string rule) {
     if (pdu.empty()) return;
-    add(station, pdu[0], write_record_of(pdu, who), Outcome::refused, Duration::zero());
+    auto write = write_record_of(pdu, who);
+    if (write) write->rule = std::move(rule);
+    add(station, pdu[0], write, Outcome::refused, Duration::zero());
 }
 
 }  // namespace panelgate::bus

@@ -33,6 +33,7 @@ struct WriteRecord {
     std::string pdu;    ///< hex
     /// The last transaction made for it, as in the trace; 0: none.
     arbiter::Transaction transaction = 0;
+    std::string rule{};  ///< the rule of `access` that denied it; empty: none
 };
 
 /// Returns nullopt for reads and for the gateway's own requests (polls, relays).
@@ -181,8 +182,10 @@ class Account {
 
     void add(std::uint8_t station, std::uint8_t function, const std::optional<WriteRecord>& write,
              Outcome outcome, Duration took);
-    /// Counts a request that a server refused before submitting it. An empty PDU is ignored.
-    void add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who);
+    /// Counts a request that a server refused before submitting it, by a rule of `access` if it is
+    /// named. An empty PDU is ignored.
+    void add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who,
+                     std::string rule = {});
 
     RequestCounters& counters() { return counters_; }
     const RequestCounters& counters() const { return counters_; }

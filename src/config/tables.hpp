@@ -73,4 +73,8 @@ const Keys<web::Token>& token_keys();
 const Keys<points::Relay>& relay_keys();
 const Keys<mqtt::Settings>& mqtt_keys();
 
+/// Of the top-level `access`.
+const Keys<access::Settings>& rules_keys();
+const Keys<access::Rule>& rule_keys();
+
 }  // namespace panelgate::config

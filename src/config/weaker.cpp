@@ -269,6 +269,38 @@ void compare_mqtt(Lines& all, const Config& running, const Config& next) {
     if (!running.mqtt || !running.mqtt->write) all.emplace_back("mqtt: write false -> true");
 }
 
+/// The same for its rule, wherever it stands in its file.
+bool is_same(access::Rule one, access::Rule other) {
+    one.line = other.line = one.column = other.column = 0;
+    return one == other;
+}
+
+/// Rules cannot be compared by what they let through: whatever allows more, denies less or is asked
+/// in another order counts.
+void compare_rules(Lines& all, const access::Settings& running, const access::Settings& next) {
+    if (!running.allow_by_default && next.allow_by_default)
+        all.emplace_back("access: default deny -> allow");
+    const auto find = [](const access::Settings& in, const std::string& name) {
+        return std::ranges::find(in.rules, name, &access::Rule::name);
+    };
+    std::vector<std::string> kept;
+    for (const access::Rule& rule : running.rules) {
+        const auto now = find(next, rule.name);
+        if (now != next.rules.end()) kept.push_back(rule.name);
+        if (now == next.rules.end() && !rule.allow)
+            all.push_back("access: rule " + rule.name + " denies no more");
+        if (now != next.rules.end() && !is_same(rule, *now))
+            all.push_back("access: rule " + rule.name + " is another");
+    }
+    std::vector<std::string> order;
+    for (const access::Rule& rule : next.rules) {
+        const bool known = find(running, rule.name) != running.rules.end();
+        if (known) order.push_back(rule.name);
+        if (!known && rule.allow) all.push_back("access: rule " + rule.name + " allows");
+    }
+    if (order != kept) all.emplace_back("access: the rules have another order");
+}
+
 }  // namespace
 
 std::vector<std::string> weaker(const Config& running, const Config& next) {
@@ -279,6 +311,7 @@ std::vector<std::string> weaker(const Config& running, const Config& next) {
     compare_serial_masters(all, running, next);
     compare_http(all, running, next);
     compare_mqtt(all, running, next);
+    compare_rules(all, running.access, next.access);
     return all;
 }
 

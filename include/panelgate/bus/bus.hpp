@@ -46,6 +46,7 @@ struct Settings {
     IncidentSettings incidents;
     doctor::Settings doctor;
     ClientSettings clients{};
+    std::shared_ptr<const access::LineRules> access{};  ///< null: everybody may do everything
 };
 
 /// Drives one line with one arbiter. Not thread-safe: use it only on the executor's thread.
@@ -71,6 +72,7 @@ class Bus final : public LineBus {
     StationStatus station_status(std::uint8_t station) const override;
     OutcomeCounts outcomes(std::uint8_t station) const override;
     std::optional<Refusal> write_refusal(std::uint8_t station) const override;
+    std::optional<Refusal> refusal_of(const Request& request) const override;
     TracePart trace(std::size_t last) const override;
     TracePart trace_since(std::uint64_t sequence, std::size_t most) const override;
     std::vector<IncidentHead> incidents() const override;

@@ -152,6 +152,11 @@ std::string detail_of(const bus::Refusal& refusal) {
             return "line '" + refusal.why +
                    "' has another master: it is only listened to (mode: listen); its points show "
                    "what passed by";
+        case bus::Rule::denied:
+            return (refusal.why == access::kDefaultRule
+                        ? "no rule of access allows it, and the default is deny"
+                        : "the rule '" + refusal.why + "' of access denies it") +
+                   std::string(refusal.station.empty() ? "" : " at " + station);
         case bus::Rule::function:
         case bus::Rule::quantity:
         case bus::Rule::range:
@@ -180,6 +185,7 @@ Problem problem_of(const bus::Refusal& refusal) {
     Problem made = refused(status_of(refusal.rule), refusal.rule,
                            "refused here, nothing was sent: " + detail_of(refusal));
     made.extensions["modbus_exception"] = static_cast<std::uint8_t>(refusal.code);
+    if (refusal.rule == bus::Rule::denied) made.extensions["rule"] = refusal.why;
     return made;
 }
 

@@ -92,7 +92,8 @@ std::optional<Problem> check_access(const HttpRequest& request, Role needed,
         return unauthorized("this gateway knows tokens only; send 'Authorization: Bearer TOKEN'");
     const Token* token = token_of(request, settings);
     if (token == nullptr) return unauthorized("this token is not known");
-    if (token->role < needed) return problem(403, "this needs the role operator");
+    if (token->role < needed)
+        return problem(403, "this needs the role " + std::string(label(needed)));
     return std::nullopt;
 }
 
