@@ -184,8 +184,7 @@ class Account {
              Outcome outcome, Duration took);
     /// Counts a request that a server refused before submitting it, by a rule of `access` if it is
     /// named. An empty PDU is ignored.
-    void add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who,
-                     std::string rule = {});
+    void add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who, std::string rule = {});
 
     RequestCounters& counters() { return counters_; }
     const RequestCounters& counters() const { return counters_; }
