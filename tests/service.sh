@@ -103,7 +103,7 @@ say "port 502 and a token, without a user's rights"
 inside mkdir -p /etc/credstore
 echo a-token-of-the-service | inside sh -c 'umask 077; cat >/etc/credstore/panelgate-operator'
 sed -e 's/127\.0\.0\.1:1502/127.0.0.1:502/' \
-    -e 's|anonymous: operator.*|anonymous: none\n  tokens: [{name: ops, role: operator, file: "${CREDENTIALS_DIRECTORY:-/etc/credstore}/panelgate-operator"}]|' \
+    -e 's|anonymous: admin.*|anonymous: none\n  tokens: [{name: ops, role: admin, file: "${CREDENTIALS_DIRECTORY:-/etc/credstore}/panelgate-operator"}]|' \
     "$work/good" >"$file"
 must inside panelgate check -c /etc/panelgate/panelgate.yaml >"$work/console"
 must inside systemctl restart panelgate

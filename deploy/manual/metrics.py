@@ -16,6 +16,7 @@ serial_masters: [{name: plc, device: /dev/panelgate-none, serial: {baud: 9600}, 
 mqtt: {broker: "mqtt://127.0.0.1:1"}
 http: {listen: "127.0.0.1:0"}
 audit: {file: /dev/shm/panelgate-manual-none/audit.jsonl}
+access: {rules: [{name: no-writes, deny: [write]}]}
 """
 # What neither has: its labels, and what it takes.
 OTHERS = {"panelgate_findings": "line, station, cause", "panelgate_framing_errors_total": "line",
@@ -35,6 +36,7 @@ GROUPS = [("Requests", ("requests", "translated", "request_duration", "queue"),
           ("Serial drivers", ("framing", "parity", "overruns", "breaks"),
            "Only of lines whose driver counts: a serial port of the machine, and some USB adapters."),
           ("Points", ("point",), "With `points`."), ("Relays", ("relay",), "With `relays`."),
+          ("Rights", ("access",), "With rules of `access`."),
           ("Modbus/TCP", ("tcp",), "For each listener."), ("HTTP", ("http", "login", "token"), ""),
           ("TLS", ("tls", "certificate"), "For each listener with `tls`."),
           ("MQTT", ("mqtt",), "With `mqtt`."), ("Audit", ("audit",), "With `audit`."),

@@ -22,6 +22,7 @@
 #include "panelgate/config/mbusd_conf.hpp"
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/web/http/json_text.hpp"
+#include "rights_text.hpp"
 
 namespace panelgate::app {
 
@@ -136,8 +137,25 @@ void print_json(const std::string& file, const Loaded& loaded, const Judged& jud
 
 }  // namespace
 
+namespace {
+
+ExitCode print_explanation(const std::string& file, const Loaded& loaded,
+                           const std::string& question) {
+    if (!loaded.config) return loaded.code;
+    const Explanation made = explain(*loaded.config, path_of(file), question);
+    if (!made.wrong.empty()) {
+        std::cerr << "panelgate: --explain: " << made.wrong << '\n';
+        return kUsage;
+    }
+    std::cout << made.text << '\n';
+    return made.allowed ? kFine : kDenied;
+}
+
+}  // namespace
+
 ExitCode check(const std::string& file, const CheckOptions& options) {
     const Loaded loaded = load_file(file);
+    if (!options.explain.empty()) return print_explanation(file, loaded, options.explain);
     Compared compared{options.before, {}};
     if (!compared.file.empty()) compared.loaded = load_file(compared.file, "--diff");
     Judged judged;
@@ -146,6 +164,7 @@ ExitCode check(const std::string& file, const CheckOptions& options) {
         if (compared.loaded.config)
             std::ranges::copy(moved_units(*compared.loaded.config, *loaded.config),
                               std::back_inserter(judged.warnings));
+        std::ranges::copy(open_doors(*loaded.config), std::back_inserter(judged.warnings));
         std::ranges::copy(certificate_doubts(*loaded.config, seconds_since_1970()),
                           std::back_inserter(judged.warnings));
         print_warnings(*loaded.config);

@@ -12,6 +12,7 @@ enum ExitCode : int {
     kNotReady = 1,  ///< health: /readyz is not 200
     kNotSet = 1,    ///< config get: the key is not set
     kNo = 1,        ///< audit: the chain is not whole; no such record
+    kDenied = 1,    ///< check --explain: the request is denied
     kUsage = 64,
     kNoInput = 66,
     kUnavailable = 69,
@@ -32,6 +33,7 @@ struct CheckOptions {
     bool json = false;
     /// Report a planned overload as a warning, not as kBadConfig.
     bool allow_overload = false;
+    std::string explain{};  ///< a request in words: say which rule decides on it, and nothing else
 };
 ExitCode check(const std::string& file, const CheckOptions& options);
 /// Prints the setting at a path ("lines.floor1.stations.press.retries"), or all below it; "": all.

@@ -204,6 +204,21 @@ std::string_view label(Kind kind) {
     return kWords[static_cast<std::size_t>(kind)];
 }
 
+namespace {
+
+/// The names of the rules of `access` that both have, in the order in which they are asked.
+std::string order_of_rules(const config::Config& config, const config::Config& other) {
+    std::string order;
+    for (const access::Rule& rule : config.access.rules) {
+        if (std::ranges::find(other.access.rules, rule.name, &access::Rule::name) !=
+            other.access.rules.end())
+            order += (order.empty() ? "" : ", ") + rule.name;
+    }
+    return order;
+}
+
+}  // namespace
+
 std::vector<Change> differences(const config::Config& before, const config::Config& after) {
     const Settings old_settings = by_path(before);
     const Settings new_settings = by_path(after);
@@ -218,6 +233,10 @@ std::vector<Change> differences(const config::Config& before, const config::Conf
         if (!needs.empty() && !is_taken_over(before, after, path)) changes.back().needs = needs;
     }
     add_profiles(before, after, changes);
+    // Settings have names, not places.
+    if (order_of_rules(before, after) != order_of_rules(after, before))
+        changes.push_back({"access/rules", Kind::changed, order_of_rules(before, after),
+                           order_of_rules(after, before)});
     std::ranges::sort(changes, {}, &Change::path);
     return changes;
 }

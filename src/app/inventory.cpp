@@ -16,6 +16,7 @@
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/profile/judge.hpp"
 #include "panelgate/yaml/map_reader.hpp"
+#include "rights_text.hpp"
 
 namespace panelgate::app {
 
@@ -209,6 +210,7 @@ json::object inventory_json(const config::Config& config) {
         made["serial_masters"] = each(config.serial_masters, master_json);
     if (config.http) made["http"] = http_json(*config.http);
     if (config.mqtt) made["mqtt"] = mqtt_json(*config.mqtt);
+    if (!config.access.is_open()) made["access"] = access_json(config);
     return made;
 }
 
@@ -403,7 +405,7 @@ std::string inventory_text(const config::Config& config) {
     for (const serial_server::Settings& master : config.serial_masters) text += text_of(master);
     if (config.http) text += text_of(*config.http);
     if (config.mqtt) text += text_of(*config.mqtt);
-    return text;
+    return text + rights_matrix(config);
 }
 
 }  // namespace panelgate::app

@@ -262,6 +262,10 @@ class CommandLine {
         command->add_flag("--allow-overload", check_.allow_overload,
                           "a line that is planned to be busy for more than 100 % of its time is a "
                           "warning, not an error");
+        command->add_option("--explain", check_.explain,
+                            "say which rule of access decides, of a request such as "
+                            "'from=10.0.0.7 role=operator write press/UW102'; the exit code is 0 "
+                            "if it is allowed, else 1");
         command->callback([this] {
             check_.json = format_ == "json";
             code_ = check(file_, check_);
@@ -401,7 +405,7 @@ class CommandLine {
             ->capture_default_str();
         command->add_option("--http", reload_.http, "ADDR:PORT of its REST API");
         command->add_option("--token-file", reload_.token_file,
-                            "a file whose first line is a token of the role operator");
+                            "a file whose first line is a token of the role admin");
         command->add_flag("--rollback", reload_.rollback,
                           "serve what ran before the last reload, whatever the file says");
         command

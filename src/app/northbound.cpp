@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <boost/asio/ip/host_name.hpp>
+#include <map>
 #include <utility>
 #include <variant>
 
@@ -45,19 +46,58 @@ auto by_name(const List& list) {
     return sorted;
 }
 
+/// Whoever may publish or subscribe at the broker: the gateway knows no more of them.
+WhoRef client_of(const mqtt::Settings& settings) {
+    return make_who({.face = Face::mqtt,
+                     .name = kMqttName,
+                     .listener = settings.broker(),
+                     .role = Role::operator_,
+                     .user = settings.username});
+}
+
+/// What the rules of `access` let the broker's clients read is published.
+class BrokerSight {
+  public:
+    explicit BrokerSight(const config::Config& config) : who_(client_of(*config.mqtt)) {
+        for (const config::Line& line : config.lines) {
+            for (const config::Station& station : line.stations)
+                rules_[&station] = line.access.rules.get();
+        }
+    }
+    bool station(const config::Station& one) const {
+        const access::LineRules* rules = rules_.at(&one);
+        return rules == nullptr || rules->may_some(who_, one.id, access::Act::read);
+    }
+    bool point(const config::Station& one, const points::Point& point) const {
+        const access::LineRules* rules = rules_.at(&one);
+        if (rules == nullptr) return true;
+        const modbus::Span items{point.table, point.address, point.count()};
+        return rules
+            ->judge(who_, one.id, access::Act::read, modbus::read_function(point.table), items)
+            .allowed;
+    }
+
+  private:
+    WhoRef who_;
+    std::map<const config::Station*, const access::LineRules*> rules_;
+};
+
 }  // namespace
 
 mqtt::Subjects subjects_of(const config::Config& config) {
     mqtt::Subjects subjects;
+    const BrokerSight sight(config);
     std::vector<const config::Station*> stations;
     for (const config::Line* line : by_name(config.lines)) {
         subjects.add_line(line->name);
-        for (const config::Station& station : line->stations) stations.push_back(&station);
+        for (const config::Station& station : line->stations)
+            if (sight.station(station)) stations.push_back(&station);
     }
     sort_by_name(stations);
     for (const config::Station* station : stations) {
         subjects.add_station(station->name);
-        for (const points::Point* point : by_name(station->points)) subjects.add_point(*point);
+        for (const points::Point* point : by_name(station->points))
+            if (sight.point(*station, *point)) subjects.add_point(*point);
     }
     return subjects;
 }
@@ -83,11 +123,7 @@ BrokerSession::BrokerSession(boost::asio::any_io_executor executor, rt::Clock& c
       publisher_(settings_, subjects_of(*snapshot->config)),
       alarm_(clock.make_alarm()),
       rebirth_alarm_(clock.make_alarm()),
-      who_(make_who({.face = Face::mqtt,
-                     .name = kMqttName,
-                     .listener = settings_.broker(),
-                     .role = Role::operator_,
-                     .user = settings_.username})),
+      who_(client_of(settings_)),
       writes_(std::make_shared<Writes>(Writes{this, bus::next_client_id()})),
       client_(std::move(executor), clock, settings_, publisher_,
               [this](const mqtt::Command& command) { on_command(command); }) {
@@ -104,14 +140,17 @@ void BrokerSession::show(std::shared_ptr<const Snapshot> snapshot) {
     snapshot_ = std::move(snapshot);
     numbers_.clear();
     places_.assign(snapshot_->plant.lines().size(), {});
+    const BrokerSight sight(*snapshot_->config);
     for (const Station* station : by_name(snapshot_->plant.stations())) {
+        if (!sight.station(*station->configured)) continue;
         Numbers& numbers = numbers_[station];
         numbers.station = places_.size();
         places_.push_back({station, nullptr});
         if (!station->points) continue;
         const std::vector<points::Point>& points = station->points->points();
-        numbers.points.resize(points.size());
+        numbers.points.assign(points.size(), numbers.station);
         for (const points::Point* point : by_name(points)) {
+            if (!sight.point(*station->configured, *point)) continue;
             numbers.points[static_cast<std::size_t>(point - points.data())] = places_.size();
             places_.push_back({station, point});
         }

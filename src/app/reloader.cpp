@@ -111,6 +111,7 @@ config::Config but_equal_lines(const config::Config& config, const config::Confi
     made.log = config.log;
     made.realtime = config.realtime;
     made.audit = config.audit;
+    made.access = config.access;
     for (const config::Line& line : config.lines) {
         if (std::ranges::find(other.lines, line) == other.lines.end()) made.lines.push_back(line);
     }

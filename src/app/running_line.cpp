@@ -83,6 +83,7 @@ bus::Settings bus_settings(const config::Line& line) {
     settings.name = line.name;
     settings.device = line.device.device;
     settings.arbiter = line.arbiter;
+    settings.access = line.access.rules;
     for (const config::Station& station : line.stations) {
         bus::StationSettings& made = settings.stations[station.id];
         made.name = station.name;

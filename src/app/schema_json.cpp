@@ -257,6 +257,8 @@ class Schema {
         json::object made = shape.kind == Kind::map    ? map_of(shape)
                             : shape.kind == Kind::list ? list_of(shape)
                                                        : any_of(shape);
+        if (shape.may_be_text)
+            made = {{"anyOf", json::array{std::move(made), text_of(shape), reference("variable")}}};
         const std::string text = description_of(shape);
         if (!text.empty()) made["description"] = text;
         if (!shape.initial.empty()) made["default"] = as_json(shape, shape.initial);

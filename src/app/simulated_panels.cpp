@@ -160,7 +160,7 @@ void SimulatedPanels::serve_faults(const config::Endpoint& endpoint) {
     web::Settings settings;
     settings.address = endpoint.address;
     settings.port = endpoint.port;
-    settings.anonymous = Role::operator_;
+    settings.anonymous = Role::admin;
     web::Providers providers;
     providers.ready = [] { return true; };
     providers.missing = [] { return std::string(); };

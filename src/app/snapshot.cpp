@@ -123,7 +123,8 @@ web::Directory directory_of(const Plant& plant, const profile::PanelProfile& gen
     for (const Line& line : plant.lines()) {
         directory.lines.push_back(
             {line.configured->name, line.device, line.bus, !line.configured->refuse_unlisted,
-             line.configured->arbiter.queue.deadline, line.configured->device.serial});
+             line.configured->arbiter.queue.deadline, line.configured->device.serial, nullptr,
+             line.configured->access.rules});
     }
     for (const Station& station : plant.stations()) directory.stations.push_back(entry_of(station));
     return directory;

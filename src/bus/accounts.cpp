@@ -115,7 +115,9 @@ void complete(WriteRecord& write, const Answer& answer) {
     write.transmitted = answer.transmitted;
     write.transaction = answer.transactions.last();
     if (answer.pdu && !answer.refusal) write.exception = modbus::exception_of(*answer.pdu);
-    if (answer.refusal) write.rule = label(answer.refusal->rule);
+    if (!answer.refusal) return;
+    write.denied = answer.refusal->rule == Rule::denied;
+    write.rule = write.denied ? answer.refusal->why : std::string(label(answer.refusal->rule));
 }
 
 void log_write(const Settings& settings, std::uint8_t station, const WriteRecord& write,
@@ -136,6 +138,7 @@ void log_write(const Settings& settings, std::uint8_t station, const WriteRecord
     fields.push_back({"outcome", ended});
     const std::string transaction = std::to_string(write.transaction);
     if (write.transaction != 0) fields.push_back({"transaction", transaction});
+    if (write.denied) fields.push_back({"rule", write.rule});
     if (!accepted) return rt::log_collapsed("write", place + ' ' + client, fields);
     rt::log_each("write", place, client + ' ' + pdu + ' ' + ended, fields);
 }
@@ -415,9 +418,11 @@ void Account::add(std::uint8_t station, std::uint8_t function,
     observe(settings_, TransactionEvent{station, function, outcome, took});
 }
 
-void Account::add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) {
+void Account::add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who, std::string rule) {
     if (pdu.empty()) return;
-    add(station, pdu[0], write_record_of(pdu, who), Outcome::refused, Duration::zero());
+    auto write = write_record_of(pdu, who);
+    if (write) write->rule = std::move(rule);
+    add(station, pdu[0], write, Outcome::refused, Duration::zero());
 }
 
 }  // namespace panelgate::bus

@@ -36,7 +36,9 @@ struct WriteRecord {
     /// The last transaction made for it, as in the trace; 0: none.
     arbiter::Transaction transaction = 0;
     std::optional<std::uint8_t> exception{};  ///< the panel's
-    std::string_view rule{};                  ///< what refused it
+    /// What refused it: a rule of `access` by its name, or the label of another Rule.
+    std::string rule{};
+    bool denied = false;  ///< by a rule of `access`
 };
 
 /// Returns nullopt for reads.
@@ -189,8 +191,9 @@ class Account {
 
     void add(std::uint8_t station, std::uint8_t function, const std::optional<WriteRecord>& write,
              Outcome outcome, Duration took);
-    /// Counts a request that a server refused before submitting it. An empty PDU is ignored.
-    void add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who);
+    /// Counts a request that a server refused before submitting it, by a rule of `access` if it is
+    /// named. An empty PDU is ignored.
+    void add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who, std::string rule = {});
 
     RequestCounters& counters() { return counters_; }
     const RequestCounters& counters() const { return counters_; }

@@ -9,138 +9,14 @@
 #include <utility>
 #include <vector>
 
-#include "accounts.hpp"
-#include "answers.hpp"
-#include "health_events.hpp"
-#include "line_doctor.hpp"
-#include "panelgate/arbiter/arbiter.hpp"
-#include "panelgate/base/pool.hpp"
+#include "bus_state.hpp"
 #include "panelgate/bus/line_history.hpp"
 #include "panelgate/line/line.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/rt/log.hpp"
-#include "trace_book.hpp"
 
 namespace panelgate::bus {
-
-/// Also the host of the arbiter's drive.
-struct Bus::State final : public line::Line::Events {
-    struct Pending {
-        AnswerHandler handler;
-        std::uint8_t station = 0;
-        std::uint8_t function = 0;
-        TimePoint arrived;
-        std::optional<WriteRecord> write{};
-        Bytes original_pdu{};      ///< if translated: the client's PDU
-        std::uint8_t sent_as = 0;  ///< ... and the function sent; 0: not translated
-        ClientId client = 0;
-    };
-
-    State(boost::asio::any_io_executor e, rt::Clock& c, Settings s, std::unique_ptr<line::Line> l)
-        : executor(std::move(e)),
-          clock(c),
-          settings(std::move(s)),
-          line(std::move(l)),
-          arbiter(settings.arbiter),
-          rights(settings.stations),
-          account(settings),
-          departed(settings.clients),
-          doctor(settings),
-          health_events(settings),
-          load(c.now()),
-          refusals(executor, clock),
-          wall(clock),
-          book(settings, wall),
-          answers(executor),
-          drive(clock, *line, arbiter, *this) {}
-
-    void on_up() override;
-    void on_down(const std::string& why) override;
-    void on_bytes(ByteView bytes) override;
-
-    void apply(Settings next, std::unique_ptr<line::Line> other, std::shared_ptr<void> far_end);
-    void adopt(Settings next);
-    /// Refuses waiting writes that the changed settings forbid (P2).
-    void deny_forbidden_writes(TimePoint now);
-    void schedule_line_change();
-    void change_line();
-    void transact(Request request, AnswerHandler handler);
-    void record_departure(ClientId client);
-    void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
-    void act(arbiter::Transmit& transmit) {
-        line->write(transmit.adu);
-        arbiter.set_latency(line->latency());
-    }
-    void act(arbiter::Finish& finish);
-    void act(arbiter::Note& note) { book.note(std::move(note)); }
-    void act(const arbiter::Exchange& exchange) {
-        book.end(exchange);
-        tell_health(exchange.station);
-    }
-    void act(arbiter::Decision& decision) { book.decide(decision.at, std::move(decision.text)); }
-    void act(arbiter::StationEvent& event);
-    void tell_health(std::uint8_t station);
-    void act(const arbiter::Written& written) {
-        observe(settings,
-                WriteEvent{written.station, written.items, written.ended, written.client});
-    }
-    void act(arbiter::Reset& reset) { line->reset(std::string(reset.why)); }
-    void confirm_end(TimePoint now) {
-        if (arbiter.wants_end(now)) arbiter.on_end(now, line->unsent().value_or(Duration::zero()));
-    }
-    void check_delivery(TimePoint now);
-    void on_deadline(TimePoint now);
-    void settled(TimePoint now) {
-        load.record(now, arbiter.counters().busy);
-        if (up) doctor.look(now, counts());
-        if (calls == 0) answers.deliver();
-        schedule_line_change();
-    }
-    /// Runs a client's call: no answer is delivered before it returns.
-    template <class Verb>
-    void call(Verb verb) {
-        ++calls;
-        verb();
-        --calls;
-    }
-    void answer(Pending pending, Answer answer);
-    LineCounts counts() const {
-        return {arbiter.station_counters(), arbiter.counters().broadcasts, *line};
-    }
-
-    boost::asio::any_io_executor executor;
-    rt::Clock& clock;
-    Settings settings;
-    std::unique_ptr<line::Line> line;
-    arbiter::Arbiter arbiter;
-    Rights rights;
-    Account account;
-    ClientAccounts clients;
-    DepartedClients departed;
-    LineDoctor doctor;
-    HealthEvents health_events;
-    LoadMeter load;
-    Refusals refusals;
-    Wall wall;
-    TraceBook book;
-    Answers answers;
-    line::Drive<arbiter::Arbiter, State> drive;
-    PoolMap<arbiter::Ticket, Pending> pending;
-    /// A new line that replaces this one as soon as no reply is outstanding.
-    struct Change {
-        Settings settings;
-        std::unique_ptr<line::Line> line;
-        std::vector<std::shared_ptr<void>> far_ends;  ///< of the lines replaced so far
-        bool posted = false;                          ///< change_line() is posted
-    };
-    std::optional<Change> change;
-    std::shared_ptr<bool> alive = std::make_shared<bool>(true);
-    int calls = 0;  ///< clients' calls in progress
-    bool up = false;
-    std::uint64_t up_count = 0;  ///< how often the line came up
-    std::string why_down = "not opened yet";
-};
 
 namespace asio = boost::asio;
 
@@ -149,6 +25,14 @@ namespace {
 Settings with_explanations(Settings settings) {
     settings.arbiter.explain = true;
     return settings;
+}
+
+access::LineRules::Question question_of(const Request& request,
+                                        const std::optional<modbus::Request>& sent) {
+    return {.station = request.station,
+            .asked = &request.request,
+            .sent = sent ? &*sent : nullptr,
+            .raw = request.raw};
 }
 
 PriorityClass priority_of(const Request& request) {
@@ -190,6 +74,9 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     clients.count_request(request.client);
     if (request.station == 0 ? !what.is_broadcastable() : what.is_never_answered())
         return refuse(std::move(entry), Fault::denied);
+    auto other = translated(settings.stations, request.station, what);
+    if (auto refusal = rights.judge(request.who, question_of(request, other)))
+        return refuse(std::move(entry), Fault::denied, std::move(refusal));
     auto refusal = rights.judge(request.station, what);
     if (!refusal && entry.write) refusal = unrecordable(settings, request.station);
     if (refusal) {
@@ -197,7 +84,7 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
         return refuse(std::move(entry), std::move(reply), std::move(refusal));
     }
     const PriorityClass priority = priority_of(request);
-    if (auto other = translated(settings.stations, request.station, what)) {
+    if (other) {
         entry.original_pdu = what.pdu();
         entry.sent_as = other->function();
         request.request = std::move(*other);
@@ -210,7 +97,9 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
                      .asked_function = entry.sent_as == 0 ? std::uint8_t{0} : entry.function,
                      .within = request.within,
                      .patience = request.patience,
-                     .search = request.search};
+                     .search = request.search,
+                     .who = std::move(request.who),
+                     .raw = request.raw};
     drive.tell([&](TimePoint now) {
         const Result<arbiter::Ticket> ticket = arbiter.submit(now, std::move(job));
         if (!ticket) return refuse(std::move(entry), ticket.error());
@@ -233,8 +122,7 @@ void Bus::State::act(arbiter::Finish& finish) {
     Answer result;
     result.pdu = std::move(finish.pdu);
     if (!result.pdu) tell_health(entry.station);  // a retry that expires has no Exchange
-    if (!result.pdu && result.pdu.error() == Fault::denied)
-        result.refusal = rights.judge_write(entry.station);
+    if (entry.denial) result.refusal = std::move(*entry.denial);
     if (entry.sent_as != 0) {
         if (finish.transmitted)
             account.counters().translated(entry.station, entry.function, entry.sent_as);
@@ -279,11 +167,17 @@ void Bus::State::check_delivery(TimePoint now) {
         line->reset("what was sent is not taken: the way to the wire is blocked");
 }
 
+void Bus::State::deny(Pending& entry, const Refusal& by) {
+    ++denials[by.why];
+    if (entry.write) entry.write->rule = by.why;
+}
+
 /// Counts every answer, then delivers it from the loop, never from inside a client's call.
 void Bus::State::answer(Pending entry, Answer result) {
     const TimePoint now = clock.now();
     const Duration took = now - entry.arrived;
     const Outcome outcome = outcome_of(result);
+    if (result.refusal && result.refusal->rule == Rule::denied) deny(entry, *result.refusal);
     if (entry.write) complete(*entry.write, result);
     account.add(entry.station, entry.function, entry.write, outcome, took);
     clients.count_outcome(entry.client, outcome, now);
@@ -339,7 +233,16 @@ void Bus::transact(Request request, AnswerHandler handler) {
 }
 
 void Bus::count_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) {
-    state_->account.add_refused(station, pdu, who);
+    // A broadcast over several lines is judged before it is submitted to any of them.
+    std::string rule;
+    const auto request =
+        modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
+    if (request && station == 0) {
+        const auto denial = state_->rights.judge(who, {.station = station, .asked = &*request});
+        if (denial) rule = denial->why;
+    }
+    if (!rule.empty()) ++state_->denials[rule];
+    state_->account.add_refused(station, pdu, who, std::move(rule));
 }
 
 /// Keeps a disconnecting client's use of the line in the list of clients.
@@ -398,6 +301,12 @@ OutcomeCounts Bus::outcomes(std::uint8_t station) const {
     return state_->account.counters().outcomes(station);
 }
 
+std::optional<Refusal> Bus::refusal_of(const Request& request) const {
+    const Rights& rights = state_->rights;
+    if (auto refusal = rights.judge(request.station, request.request)) return refusal;
+    return rights.judge(request.who, question_of(request, std::nullopt));
+}
+
 std::optional<Refusal> Bus::write_refusal(std::uint8_t station) const {
     auto refusal = state_->rights.judge_write(station);
     return refusal ? refusal : unrecordable(state_->settings, station);
@@ -429,72 +338,14 @@ LineReport Bus::report() const {
     report.queue_depth = state_->arbiter.queue_depth();
     report.wire = state_->arbiter.counters();
     report.device = state_->line->counters();
+    if (state_->settings.access) {
+        for (const std::string& rule : state_->settings.access->denying_names()) {
+            const auto count = state_->denials.find(rule);
+            report.denials[rule] = count == state_->denials.end() ? 0 : count->second;
+        }
+    }
     report.stations = state_->account.counters().report(state_->arbiter);
     return report;
-}
-
-void Bus::State::apply(Settings next, std::unique_ptr<line::Line> other,
-                       std::shared_ptr<void> far_end) {
-    health_events.on_change(next.stations);
-    if (other) {
-        if (!change) change.emplace(Change{{}, nullptr, {}, false});
-        change->line = std::move(other);
-        change->far_ends.push_back(std::move(far_end));
-        arbiter.suspend();
-    }
-    if (change) {
-        change->settings = std::move(next);
-        return schedule_line_change();
-    }
-    adopt(std::move(next));
-    drive.tell([this](TimePoint now) {
-        arbiter.apply(settings.arbiter);
-        deny_forbidden_writes(now);
-    });
-}
-
-void Bus::State::deny_forbidden_writes(TimePoint now) {
-    arbiter.deny(now, [this](const arbiter::Job& job) {
-        return !job.request.is_read() && rights.judge_write(job.station);
-    });
-}
-
-void Bus::State::adopt(Settings next) {
-    settings = std::move(next);
-    rights = Rights(settings.stations);
-    account.apply();
-    departed.apply(settings.clients);
-    doctor.apply();
-}
-
-/// Posted: the line may be the caller, and must not be replaced during its own call.
-void Bus::State::schedule_line_change() {
-    if (!change || change->posted || arbiter.is_waiting()) return;
-    change->posted = true;
-    asio::post(executor, [this, life = std::weak_ptr(alive)] {
-        if (!life.expired()) change_line();
-    });
-}
-
-void Bus::State::change_line() {
-    if (!change) return;
-    change->posted = false;
-    if (arbiter.is_waiting()) return;
-    Change made = std::move(*change);
-    change.reset();
-    call([&] {
-        line->stop();
-        take_down(*this, "its settings have changed, and it is being opened",
-                  [this](TimePoint) { arbiter.on_line_left(); });
-        adopt(std::move(made.settings));
-        line = std::move(made.line);
-        drive.use(*line);
-        drive.hear([this](TimePoint now) {
-            arbiter.apply(settings.arbiter);
-            deny_forbidden_writes(now);
-        });
-        line->start(*this);
-    });
 }
 
 }  // namespace panelgate::bus

@@ -21,6 +21,8 @@ std::string_view label(Rule rule) {
             return "read-only";
         case Rule::unrecorded:
             return "audit";
+        case Rule::denied:
+            return "denied";
     }
     std::abort();
 }
@@ -43,6 +45,7 @@ modbus::ExceptionCode code_of(Rule rule) {
     switch (rule) {
         case Rule::read_only:
         case Rule::broadcast_over_read_only:
+        case Rule::denied:
         case Rule::function:
             return modbus::ExceptionCode::illegal_function;
         case Rule::quantity:
@@ -81,6 +84,16 @@ std::optional<Refusal> Rights::judge(std::uint8_t station, const modbus::Request
     auto objection = listed->second.guard(request);
     if (!objection) return std::nullopt;
     return refusal_by(objection->rule, listed->second.name, std::move(objection->why));
+}
+
+std::optional<Refusal> Rights::judge(const WhoRef& who,
+                                     const access::LineRules::Question& question) const {
+    if (!rules_) return std::nullopt;
+    const access::Verdict verdict = rules_->judge(who, question);
+    if (verdict.allowed) return std::nullopt;
+    return refusal_by(Rule::denied,
+                      question.station == 0 ? std::string() : name_of(stations_, question.station),
+                      std::string(verdict.rule_name()));
 }
 
 std::optional<Refusal> Rights::judge_write(std::uint8_t station) const {

@@ -52,6 +52,14 @@ http: {listen: "127.0.0.1:8080", hosts: [gateway.plant.example], allow: [127.0.0
              role_from: certificate}}
 relays: [{from: press/UW100, to: press/UW200, count: 8, every: 1s}]
 mqtt: {broker: "mqtt://broker.plant:1883"}
+access:
+  default: allow
+  rules:
+    - {name: press-setpoints, allow: [read, write], from: [192.168.10.0/24], roles: [operator],
+       tokens: [ops], faces: [http], listeners: ["127.0.0.1:8080"], stations: [press],
+       functions: [16], range: UW100-UW199}
+    - {name: no-other-writes, deny: [write, broadcast, raw],
+       range: {table: holding-registers, address: 0, count: 500}}
 log: {level: info}
 realtime: {priority: 20}
 audit: {file: /var/log/panelgate/audit.jsonl}

@@ -316,6 +316,7 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     load_serial_masters(loading, root);
     load_http(loading, root);
     load_mqtt(loading, root);
+    load_rules(loading, root);
     load_log(loading, root);
     load_realtime(loading, root);
     load_audit(loading, root);
@@ -405,7 +406,9 @@ std::string did_you_mean(std::string_view typed, std::span<const std::string_vie
 std::optional<bool> load_read_only(MapReader& in) {
     const yaml::Node* access = in.child("access");
     if (access != nullptr && access->kind != yaml::Node::Kind::scalar) {
-        in.problem("access", "access rules are not in this version; use read_write or read_only");
+        in.problem("access",
+                   "access here is read_write or read_only; rules by client and item are in the "
+                   "top-level 'access'");
         return std::nullopt;
     }
     constexpr std::array<std::string_view, 2> kAccess{"read_write", "read_only"};
@@ -440,6 +443,7 @@ std::optional<Config> load(std::string_view text, const Files& files, yaml::Prob
     if (yaml::Description* description = problems.description()) description->forget();
     tell(unset, found, problems);
     if (!problems.empty()) return std::nullopt;
+    apply_rules(config);
     return config;
 }
 

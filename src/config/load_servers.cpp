@@ -77,12 +77,16 @@ const std::string& endpoint_pattern() {
     return kPattern;
 }
 
+}  // namespace
+
 const std::string& network_pattern() {
     static const std::string kPattern = "^([0-9.]+(/" + yaml::integer_pattern(0, 32) +
                                         ")?|[0-9A-Fa-f.]*:[0-9A-Fa-f:.]*(/" +
                                         yaml::integer_pattern(0, 128) + ")?)$";
     return kPattern;
 }
+
+namespace {
 
 template <class Settings>
 void load_listen(MapReader& in, Settings& settings) {

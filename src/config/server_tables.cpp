@@ -322,4 +322,73 @@ const Keys<audit::Settings>& audit_keys() {
     return kKeys;
 }
 
+namespace {
+
+template <class List>
+std::string words_text(const List& list) {
+    return listed(list, [](const auto& one) { return std::string(label(one)); });
+}
+
+std::string acts_text(const access::Acts& acts) {
+    std::vector<access::Act> all;
+    for (const auto act :
+         {access::Act::read, access::Act::write, access::Act::broadcast, access::Act::raw})
+        if (acts.has(act)) all.push_back(act);
+    return words_text(all);
+}
+
+std::string place_text(const access::Place& place) {
+    return place.first + '/' + std::to_string(place.second);
+}
+
+}  // namespace
+
+const Keys<access::Settings>& rules_keys() {
+    static constexpr Words<bool, 2> kDefaults{{{"allow", true}, {"deny", false}}};
+    static const auto kKeys = Keys<access::Settings>()
+                                  .word("default", &access::Settings::allow_by_default, kDefaults,
+                                        "What is done where no rule matches: allow or deny.")
+                                  .other("rules", "Rules, in the order in which they are asked.");
+    return kKeys;
+}
+
+const Keys<access::Rule>& rule_keys() {
+    using access::Rule;
+    static const auto kKeys =
+        Keys<Rule>()
+            .other("name", "Name of the rule, for refusals, metrics and the audit; unique.",
+                   [](const Rule& rule) { return rule.name; })
+            .other("allow",
+                   "What the rule allows: read, write, broadcast (also a write), raw (also a read "
+                   "or a write).",
+                   [](const Rule& rule) { return rule.allow ? acts_text(rule.acts) : ""; })
+            .other("deny", "What it denies; a rule has allow or deny.",
+                   [](const Rule& rule) { return rule.allow ? "" : acts_text(rule.acts); })
+            .other("from", "Networks of the clients that it is about. Without it any.",
+                   [](const Rule& rule) { return networks_text(rule.from); })
+            .other("roles",
+                   "Roles that it is about: viewer, operator, engineer, admin, or a role of a "
+                   "client's certificate. Modbus clients without one are operators.",
+                   [](const Rule& rule) { return names_text(rule.roles); })
+            .other("tokens", "Tokens that it is about, by name.",
+                   [](const Rule& rule) { return names_text(rule.tokens); })
+            .other("faces", "Ways in: modbus_tcp (UDP, too), http, mqtt, serial_master.",
+                   [](const Rule& rule) { return words_text(rule.faces); })
+            .other("listeners", "Listeners by their address, or serial masters by name.",
+                   [](const Rule& rule) { return names_text(rule.listeners); })
+            .other("stations", "Stations by name, or LINE/ID. Without it all.",
+                   [](const Rule& rule) { return listed(rule.stations, place_text); })
+            .other("functions", "Function codes. Without it all.",
+                   [](const Rule& rule) {
+                       return listed(rule.functions,
+                                     [](std::uint8_t code) { return std::to_string(code); });
+                   })
+            .other("range",
+                   "Items: FIRST-LAST in the panel's notation, such as UW100-UW199, "
+                   "TABLE/FIRST-LAST, or a map. Functions without items are among them only where "
+                   "`functions` names them.",
+                   [](const Rule& rule) { return rule.range; });
+    return kKeys;
+}
+
 }  // namespace panelgate::config

@@ -104,6 +104,10 @@ void show_servers(const SettingWriter& top, const Config& config) {
         master_keys().show(section, settings);
     }
     if (config.http) show_http(top, *config.http);
+    const SettingWriter access = top.below("access");
+    rules_keys().show(access, config.access);
+    for (const access::Rule& rule : config.access.rules)
+        rule_keys().show(access.item("rules", rule.name), rule);
     if (config.mqtt) {
         mqtt_keys().show(top.item("mqtt"), *config.mqtt);
         if (!config.mqtt->password.empty())

@@ -33,6 +33,7 @@ const Keys<Config>& root_keys() {
             .other("serial_masters",
                    "Masters that ask on serial ports of their own, such as a PLC.")
             .other("http", "REST API, dashboard and metrics.")
+            .other("access", "Who may do what: the first rule that matches decides.")
             .other("relays", "Values that are copied from panel to panel.")
             .other("mqtt", "Values published at an MQTT broker.")
             .change_needs(kConnectsAnew)

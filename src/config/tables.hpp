@@ -76,4 +76,8 @@ const Keys<audit::Settings>& audit_keys();
 /// "50MiB", as in the file.
 std::string size_text(std::size_t bytes);
 
+/// Of the top-level `access`.
+const Keys<access::Settings>& rules_keys();
+const Keys<access::Rule>& rule_keys();
+
 }  // namespace panelgate::config

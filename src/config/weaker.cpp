@@ -79,7 +79,8 @@ void compare_tls(Lines& all, const std::string& endpoint,
         all.push_back(endpoint + ": roles of certificates no longer count");
     if (!running->crl.empty() && next->crl.empty())
         all.push_back(endpoint + ": revoked certificates are accepted");
-    if (next->lowest < running->lowest) all.push_back(endpoint + ": tls min_version TLSv1.3 -> TLSv1.2");
+    if (next->lowest < running->lowest)
+        all.push_back(endpoint + ": tls min_version TLSv1.3 -> TLSv1.2");
     if (next->material.ca != running->material.ca)
         all.push_back(endpoint + ": certificates of another CA are accepted");
 }
@@ -283,6 +284,38 @@ void compare_audit(Lines& all, const Config& running, const Config& next) {
         all.emplace_back("audit: keeps less");
 }
 
+/// The same for its rule, wherever it stands in its file.
+bool is_same(access::Rule one, access::Rule other) {
+    one.line = other.line = one.column = other.column = 0;
+    return one == other;
+}
+
+/// Rules cannot be compared by what they let through: whatever allows more, denies less or is asked
+/// in another order counts.
+void compare_rules(Lines& all, const access::Settings& running, const access::Settings& next) {
+    if (!running.allow_by_default && next.allow_by_default)
+        all.emplace_back("access: default deny -> allow");
+    const auto find = [](const access::Settings& in, const std::string& name) {
+        return std::ranges::find(in.rules, name, &access::Rule::name);
+    };
+    std::vector<std::string> kept;
+    for (const access::Rule& rule : running.rules) {
+        const auto now = find(next, rule.name);
+        if (now != next.rules.end()) kept.push_back(rule.name);
+        if (now == next.rules.end() && !rule.allow)
+            all.push_back("access: rule " + rule.name + " denies no more");
+        if (now != next.rules.end() && !is_same(rule, *now))
+            all.push_back("access: rule " + rule.name + " is another");
+    }
+    std::vector<std::string> order;
+    for (const access::Rule& rule : next.rules) {
+        const bool known = find(running, rule.name) != running.rules.end();
+        if (known) order.push_back(rule.name);
+        if (!known && rule.allow) all.push_back("access: rule " + rule.name + " allows");
+    }
+    if (order != kept) all.emplace_back("access: the rules have another order");
+}
+
 }  // namespace
 
 std::vector<std::string> weaker(const Config& running, const Config& next) {
@@ -294,6 +327,7 @@ std::vector<std::string> weaker(const Config& running, const Config& next) {
     compare_http(all, running, next);
     compare_mqtt(all, running, next);
     compare_audit(all, running, next);
+    compare_rules(all, running.access, next.access);
     return all;
 }
 

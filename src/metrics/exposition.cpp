@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <map>
+#include <string>
 #include <utility>
 
 #include "families.hpp"
@@ -237,6 +240,18 @@ void add_findings(Families& out, const Snapshot& snapshot) {
     out.push_back(found.take());
 }
 
+void add_denials(Families& out, const Snapshot& snapshot) {
+    Family denied = make_counter("panelgate_access_denied_total",
+                                 "Requests that a rule of access denied, never sent; rule default: "
+                                 "that no rule allowed.");
+    std::map<std::string, std::uint64_t> sums;
+    for (const LineReport& line : snapshot.lines) {
+        for (const auto& [rule, count] : line.denials) sums[rule] += count;
+    }
+    for (const auto& [rule, count] : sums) denied.counter({{"rule", rule}}, count);
+    out.push_back(denied.take());
+}
+
 void add_station_state(Families& out, const Snapshot& snapshot) {
     Family up = make_gauge(
         "panelgate_station_up",
@@ -355,11 +370,11 @@ void add_process(Families& out, const Snapshot& snapshot) {
 
 using Part = void (*)(Families&, const Snapshot&);
 constexpr Part kParts[] = {
-    add_requests,      add_translated,    add_station_times, add_wire_counters,  add_exceptions,
-    add_line_counters, add_uart_counters, add_line_state,    add_findings,       add_station_state,
-    add_points,        add_relays,        add_listeners,     add_serial_masters, add_tls,
-    add_http,          add_mqtt,          add_audit,         add_loop,           add_reloads,
-    add_process,
+    add_requests,      add_translated,    add_station_times, add_wire_counters, add_exceptions,
+    add_line_counters, add_uart_counters, add_line_state,    add_findings,      add_denials,
+    add_station_state, add_points,        add_relays,        add_listeners,     add_serial_masters,
+    add_tls,           add_http,          add_mqtt,          add_audit,         add_loop,
+    add_reloads,       add_process,
 };
 
 }  // namespace

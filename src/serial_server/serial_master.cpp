@@ -129,7 +129,8 @@ void SerialMaster::Core::on_down(const std::string& why) {
 }
 
 void SerialMaster::Core::act(const Ask& ask) {
-    auto decision = tcp_server::decide(ask.adu.station, ask.adu.pdu, settings_.access, map_);
+    auto decision = tcp_server::decide(ask.adu.station, ask.adu.pdu, settings_.access, map_, false,
+                                       request_caller_.who());
     if (auto* forwarding = std::get_if<tcp_server::Forward>(&decision))
         return forward(ask, std::move(*forwarding));
     if (const auto* refusal = std::get_if<tcp_server::Refuse>(&decision))
@@ -140,8 +141,8 @@ void SerialMaster::Core::act(const Ask& ask) {
 }
 
 void SerialMaster::Core::act(const ForwardBroadcast& spread) {
-    const auto decision =
-        tcp_server::decide(spread.adu.station, spread.adu.pdu, settings_.access, map_);
+    const auto decision = tcp_server::decide(spread.adu.station, spread.adu.pdu, settings_.access,
+                                             map_, false, broadcast_caller_.who());
     if (const auto* all = std::get_if<tcp_server::Broadcast>(&decision)) return broadcast(*all);
     const auto* refusal = std::get_if<tcp_server::Refuse>(&decision);
     if (refusal == nullptr) return;

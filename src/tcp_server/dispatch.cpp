@@ -128,14 +128,24 @@ std::vector<Target> refusing(std::vector<Target> targets) {
     return targets;
 }
 
+/// Returns the lines that would refuse this broadcast.
+std::vector<Target> denying(std::vector<Target> lines, const modbus::Request& request,
+                            const WhoRef& who) {
+    const bus::Request broadcast{.station = 0, .request = request, .who = who};
+    std::erase_if(lines, [&](const Target& line) { return !line.bus->refusal_of(broadcast); });
+    return lines;
+}
+
 Decision decide_broadcast(std::uint8_t function, Result<modbus::Request> request,
-                          const Settings& settings, std::vector<Target> lines) {
+                          const Settings& settings, std::vector<Target> lines, const WhoRef& who) {
     if (settings.broadcast == BroadcastMode::deny) return refuse(Fault::denied, std::move(lines));
     // Check all lines before sending to any.
     if (auto unwilling = refusing(lines); !unwilling.empty())
         return refuse(Fault::denied, std::move(unwilling));
     if (!modbus::is_broadcastable(function)) return refuse(Fault::denied, std::move(lines));
     if (!request) return refuse(request.error(), std::move(lines));
+    if (auto unwilling = denying(lines, *request, who); !unwilling.empty())
+        return refuse(Fault::denied, std::move(unwilling));
     Broadcast all{{}, std::move(*request)};
     for (const Target& line : lines) all.lines.push_back(line.bus);
     return all;
@@ -144,7 +154,7 @@ Decision decide_broadcast(std::uint8_t function, Result<modbus::Request> request
 }  // namespace
 
 Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const UnitMap& units,
-                bool reads_only) {
+                bool reads_only, const WhoRef& who) {
     if (pdu.empty()) return refuse(Fault::malformed);
     auto request = modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::fit);
     if (!request && request.error() == Fault::denied) return refuse(Fault::denied);
@@ -160,7 +170,7 @@ Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const
     std::vector<Target> targets = targets_of(unit, units);
     if (targets.empty()) return refuse(Fault::not_routed);
     if (broadcast)
-        return decide_broadcast(pdu[0], std::move(request), settings, std::move(targets));
+        return decide_broadcast(pdu[0], std::move(request), settings, std::move(targets), who);
     // A valid request is refused by the bus itself.
     const bool denied = writes && !refusing(targets).empty();
     return refuse(denied ? Fault::denied : request.error(), std::move(targets));

@@ -219,7 +219,8 @@ void Pipeline::serve(const modbus::Adu& adu) {
                    [&](Forward forwarding) { forward(adu, std::move(forwarding)); },
                    [&](const Broadcast& broadcasting) { broadcast(adu, broadcasting); },
                },
-               decide(adu.unit, adu.pdu, shared_->settings, shared_->units, caller_.reads_only()));
+               decide(adu.unit, adu.pdu, shared_->settings, shared_->units, caller_.reads_only(),
+                      caller_.who()));
 }
 
 void Pipeline::answer(const modbus::Adu& adu, OwnPdu pdu) {

@@ -75,7 +75,7 @@ class Session : public std::enable_shared_from_this<Session> {
     std::shared_ptr<Shared> shared_;
     ClosedHandler on_closed_;
     std::shared_ptr<Pipeline> pipeline_;
-    std::uint64_t host_{};  ///< bus::host_of() its address
+    std::uint64_t host_{};  ///< of its address
     TimePoint active_;      ///< its last input
 
     Input input_state_ = Input::served;

@@ -210,7 +210,7 @@ def try_client(client, seed):
     with contextlib.ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory())
         program = stack.enter_context(harness.configured(
-            config.gateway(config.line(LINE, stations=stations), http=config.OPERATOR)))
+            config.gateway(config.line(LINE, stations=stations), http=config.ADMIN)))
         for panel in PANELS:
             prepare(program, panel, seed)
         port = program.modbus_port()

@@ -4,7 +4,7 @@ here. Values are YAML, as in a file: line(retries=1, timing="{response_timeout: 
 PRESS = "{id: 31, name: press, profile: autonics-gplp-s}"
 FREE_PORT = 'listen: "127.0.0.1:0"'  # harness.Program tells which one it got
 MANY = FREE_PORT + ", max_connections_per_address: 1024"  # a crowd of one address
-OPERATOR = FREE_PORT + ", anonymous: operator"
+ADMIN = FREE_PORT + ", anonymous: admin"
 
 
 def line(name="floor1", device="sim", stations=PRESS, *, baud=38400, parity="none", stop_bits=1,

@@ -214,7 +214,7 @@ def plant(broker, *stations, more="", line=None):
     """A gateway with these stations that knows this broker."""
     mqtt = f"{{broker: 'mqtt://127.0.0.1:{broker.port}', topic: {TOPIC}, client_id: gateway{more}}}"
     return config.gateway(config.line(stations=", ".join(stations or [PRESS]), **(line or FAST)),
-                          http=config.OPERATOR, modbus=None, mqtt=mqtt)
+                          http=config.ADMIN, modbus=None, mqtt=mqtt)
 
 
 def metric(program, name):

@@ -30,7 +30,7 @@ def running():
             file.write_text(f"token-of-{name}")
             file.chmod(0o600)
             tokens.append(f"{{name: {name}, role: {role}, file: {file}}}")
-        http = config.OPERATOR + f", tokens: [{', '.join(tokens)}]"
+        http = config.ADMIN + f", tokens: [{', '.join(tokens)}]"
         text = config.gateway(FLOOR1, FLOOR2, FLOOR3, FLOOR4, http=http,
                               modbus=config.FREE_PORT + ", lines: [floor1]",
                               relays="[{from: press/UW160, to: press/UW170, every: 1s}]")

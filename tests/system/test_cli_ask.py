@@ -148,7 +148,7 @@ class NoGateway(unittest.TestCase):
             token = pathlib.Path(folder) / "token"
             token.write_text("0123456789abcdef\r\n")
             token.chmod(0o600)
-            http = f"{config.FREE_PORT}, anonymous: none, tokens: [{{name: ops, role: operator, file: {token}}}]"
+            http = f"{config.FREE_PORT}, anonymous: none, tokens: [{{name: ops, role: admin, file: {token}}}]"
             with harness.configured(config.gateway(config.line(), http=http)) as gateway:
                 at = ("--http", f"127.0.0.1:{gateway.http_port()}")
                 told = harness.run("read", "31", "UW0", *at)

@@ -16,7 +16,7 @@ UNITS = range(1, 4)
 STATIONS = "{id: 1}, {id: 2, crc_order: high_first}, {id: 3}"
 SIMULATED = config.gateway(config.line(stations="""
       {id: 5, name: mixer, profile: autonics-gp-2005-old}, {id: 31, name: press,
-       profile: autonics-gplp-s}"""), http=config.OPERATOR)
+       profile: autonics-gplp-s}"""), http=config.ADMIN)
 
 
 class BothOnOneLine(unittest.TestCase):

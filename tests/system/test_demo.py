@@ -31,7 +31,7 @@ NOTATIONS = [
 OTHER_STATIONS = config.gateway(
     config.line(stations="{id: 5, name: lp, profile: autonics-gplp-s}, "
                          "{id: 31, name: gp, profile: autonics-gp-2005}"),
-    http=config.OPERATOR)
+    http=config.ADMIN)
 # Replies that no Modbus/TCP reply can hold; REST may ask for them.
 TOO_LARGE_FOR_TCP = {"gt_fc01_gr20_2040bits", "gt_fc03_gdt108_127words"}
 # 2047 coils need 256 data bytes, which a byte count cannot say: refused, never on the wire.

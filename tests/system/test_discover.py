@@ -37,7 +37,7 @@ class Rest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.program = cls.enterClassContext(
-            harness.configured(config.gateway(SIMULATED, HEARD, DOWN, http=config.OPERATOR)))
+            harness.configured(config.gateway(SIMULATED, HEARD, DOWN, http=config.ADMIN)))
 
     def tearDown(self):
         self.program.rest("DELETE", PATH.format("floor1"))
@@ -69,7 +69,7 @@ class Rest(unittest.TestCase):
         self.assertEqual(state(self.program, "down")["state"], "never")
 
     def test_the_gateway_ends_while_it_looks(self):
-        with harness.configured(config.gateway(SIMULATED, http=config.OPERATOR)) as program:
+        with harness.configured(config.gateway(SIMULATED, http=config.ADMIN)) as program:
             self.assertEqual(program.rest("POST", PATH.format("floor1"), {"share_percent": 1})[0], 202)
             until(lambda: state(program)["asked"] > 0)
             self.assertEqual(program.stop(), 0)
@@ -85,7 +85,7 @@ class Foreign(unittest.TestCase):
             with harness.Helper([BUILT / "serial_pair", str(BAUD), far, near]) as pair:
                 pair.out.wait_for("ready")
                 with ForeignSlave(near, ModbusRtuFramer), \
-                        harness.configured(config.gateway(listed, http=config.OPERATOR)) as program:
+                        harness.configured(config.gateway(listed, http=config.ADMIN)) as program:
                     program.log.wait_for("line up")
                     report = discover(program, stations="10-20", share_percent=50)
             self.assertEqual([one["id"] for one in report["stations"]], [UNIT])
@@ -113,7 +113,7 @@ class Again(unittest.TestCase):
             listed = config.line(device=link, stations="{id: 1, name: press}", baud=115200,
                                  timing="{response_timeout: 60ms}")
             with RtuBus(link, {1: echo_address} | dict.fromkeys(addresses, panel)), \
-                    harness.configured(config.gateway(listed, http=config.OPERATOR)) as program:
+                    harness.configured(config.gateway(listed, http=config.ADMIN)) as program:
                 program.log.wait_for("line up")
                 with program.client() as client:
                     client.ask(1, read_registers(7))

@@ -21,7 +21,7 @@ class Beside(unittest.TestCase):
                    "--set", "11=crcbad", "--set", "12=think-80ms"]
             with Zoo(*zoo) as panels:
                 line = config.line("zoo", panels.names[0], baud=BAUD, stations=config.station_ids([1, 2]))
-                with harness.configured(config.gateway(line, http=config.OPERATOR)) as program:
+                with harness.configured(config.gateway(line, http=config.ADMIN)) as program:
                     program.log.wait_for("line up")
                     self.look_beside(program)
 

@@ -27,7 +27,7 @@ def holding(*values):
 def configuration(link, mode):
     return config.gateway(config.line(
         device=link, stations="{id: 1, name: good}, {id: 2, name: absent}", baud=115200,
-        timing="{response_timeout: 60ms}", retries=1, echo=mode), http=config.OPERATOR)
+        timing="{response_timeout: 60ms}", retries=1, echo=mode), http=config.ADMIN)
 
 
 @contextlib.contextmanager

@@ -21,10 +21,10 @@ TWO = config.gateway(
     config.line(stations="""{id: 31, name: press, profile: autonics-gplp-s, points: [
       {name: mode, at: UW105, writable: true, every: 20ms}]}"""),
     config.line("floor2", stations="{id: 20, name: oven, profile: panasonic-gt}"),
-    http=config.OPERATOR, modbus=config.FREE_PORT)
+    http=config.ADMIN, modbus=config.FREE_PORT)
 # Cached answers are the quickest events.
 FLOOD = config.gateway(config.line(stations="""{id: 31, name: press, profile: autonics-gplp-s,
-      max_age: 60s, poll: [{read: UW0, count: 8, every: 10s}]}"""), http=config.OPERATOR)
+      max_age: 60s, poll: [{read: UW0, count: 8, every: 10s}]}"""), http=config.ADMIN)
 
 
 class Cutter:

@@ -22,7 +22,7 @@ LISTENERS = "}, {".join([NEAR + ", udp: true", NEAR + ", framing: rtu", NEAR + "
                          NEAR + ", framing: ascii, ascii_lower_case: take"])
 GATEWAY = config.gateway(
     config.line(stations=f"{config.PRESS}, {FILLER}", unlisted_stations="refuse"),
-    modbus=LISTENERS, http=config.OPERATOR)
+    modbus=LISTENERS, http=config.ADMIN)
 READ_ONE = harness.read_registers(0)
 
 

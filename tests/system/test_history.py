@@ -16,7 +16,7 @@ LINE = config.line(timing="{response_timeout: 60ms}", retries=0, stations="""
         {name: running, at: UB1632, writable: true, every: 200ms},
         {name: title, at: UW200, type: string, length: 4}]}""")
 GATEWAY = config.gateway(LINE, config.line("floor3", device="/dev/null", stations="{id: 8, name: scale}"),
-                         http=config.OPERATOR, modbus=None)
+                         http=config.ADMIN, modbus=None)
 POINT = "/api/v1/stations/press/points/"
 
 

@@ -9,7 +9,7 @@ import time
 import unittest
 
 import harness
-from config import OPERATOR, gateway, line
+from config import ADMIN, gateway, line
 
 PRESS = "/api/v1/stations/press/devices/"
 
@@ -71,7 +71,7 @@ class Answer:
 
 
 class Doors(unittest.TestCase):
-    CONFIG = gateway(line(), http=OPERATOR)
+    CONFIG = gateway(line(), http=ADMIN)
 
     @classmethod
     def setUpClass(cls):
@@ -238,7 +238,7 @@ class Names(Doors):
 
 
 class GivenNames(Doors):
-    CONFIG = gateway(line(), http=OPERATOR + ", hosts: [Gateway.plant.example, 192.0.2.7]")
+    CONFIG = gateway(line(), http=ADMIN + ", hosts: [Gateway.plant.example, 192.0.2.7]")
 
     def test_hosts_take_the_place_of_the_machines_names(self):
         for host, status in (("gateway.plant.example:8080", 200), ("192.0.2.7", 200),
@@ -249,7 +249,7 @@ class GivenNames(Doors):
 
 class Allowed(unittest.TestCase):
     def test_who_is_not_in_the_list_is_closed_without_a_byte(self):
-        with harness.configured(gateway(line(), http=OPERATOR + ", allow: [127.0.0.2/31]")) as program:
+        with harness.configured(gateway(line(), http=ADMIN + ", allow: [127.0.0.2/31]")) as program:
             port = program.http_port()
             with Connection(port, "127.0.0.3") as friend, Connection(port) as stranger:
                 self.assertEqual(friend.ask("GET", "/healthz").status, 200)
@@ -266,7 +266,7 @@ class Logins(unittest.TestCase):
         file.flush()
         tokens = f"[{{name: ops, role: operator, file: {file.name}}}]"
         self.program = self.enterContext(harness.configured(
-            gateway(line(), http=f"{OPERATOR}, tokens: {tokens}")))
+            gateway(line(), http=f"{ADMIN}, tokens: {tokens}")))
         self.port = self.program.http_port()
 
     def seconds(self, token, status, address="127.0.0.1"):

@@ -42,7 +42,7 @@ class Log(unittest.TestCase):
             self.assertLess(program.log.text().count("connection closed"), 10)
 
     def test_each_write_of_a_client_leaves_a_line_with_who_and_what(self):
-        with harness.configured(config.gateway(FAST, http=config.OPERATOR)) as program:
+        with harness.configured(config.gateway(FAST, http=config.ADMIN)) as program:
             with program.client() as client:
                 client.ask(31, write_register(1000, 7))
                 port = client.socket.getsockname()[1]
@@ -60,7 +60,7 @@ class Log(unittest.TestCase):
 
     def test_a_write_that_is_refused_here_leaves_a_line_and_a_count_too(self):
         stations = "{id: 31, name: press, access: read_only}"
-        text = config.gateway(config.line(stations=stations), http=config.OPERATOR)
+        text = config.gateway(config.line(stations=stations), http=config.ADMIN)
         with harness.configured(text) as program:
             with program.client() as client:
                 self.assertEqual(client.ask(31, write_register(1000, 7)), b"\x86\x01")
@@ -94,7 +94,7 @@ class Log(unittest.TestCase):
     def test_a_broadcast_that_is_refused_on_one_of_several_lines_leaves_a_line_there(self):
         lines = (config.line("a", stations="{id: 1, name: one}"),
                  config.line("b", stations="{id: 2, name: two, access: read_only}"))
-        with harness.configured(config.gateway(*lines, http=config.OPERATOR)) as program:
+        with harness.configured(config.gateway(*lines, http=config.ADMIN)) as program:
             with program.client() as client:
                 self.assertEqual(client.ask(0, write_register(1000, 7)), b"\x86\x01")
                 self.assertEqual(client.ask(2, b"\x06\x00"), b"\x86\x01")
@@ -117,7 +117,7 @@ class Log(unittest.TestCase):
         text = config.gateway(
             config.line(baud=1000000, stations=stations, retries=0,
                         timing="{response_timeout: 5ms}", offline="{after: 100}"),
-            relays="[{from: press/400001, to: oven/400001, every: 20ms}]", http=config.OPERATOR)
+            relays="[{from: press/400001, to: oven/400001, every: 20ms}]", http=config.ADMIN)
         with harness.configured(text) as program:
             def changes():
                 [relay] = program.get("/api/v1/relays")[1]["relays"]
@@ -162,7 +162,7 @@ class Log(unittest.TestCase):
                 file.write("0123456789abcdef")
             text = config.gateway(
                 config.line(stations=point),
-                http=f"{config.OPERATOR}, tokens: [{{name: eye, role: viewer, file: {path}}}]")
+                http=f"{config.ADMIN}, tokens: [{{name: eye, role: viewer, file: {path}}}]")
             with harness.configured(text) as program:
                 place = "/api/v1/stations/press/points/setpoint"
                 self.assertEqual(program.rest("PUT", place, {"value": 11})[0], 422)

@@ -202,7 +202,7 @@ class Configuration(unittest.TestCase):
                 broker.start()
                 with Listener(broker) as later:
                     later.wait_for(f"{TOPIC}/press/mode")
-                file.write_text(config.gateway(config.line(), http=config.OPERATOR, modbus=None))
+                file.write_text(config.gateway(config.line(), http=config.ADMIN, modbus=None))
                 self.assertEqual(program.rest("POST", "/api/v1/reload")[0], 200)
                 with Listener(broker) as later:
                     later.wait_for(f"{TOPIC}/status", lambda body: body["state"] == "offline")

@@ -22,7 +22,7 @@ PRESS_LINE = config.line(
          {name: running, at: UB1632, writable: true, every: 20ms},
          {name: mode, at: UW105, labels: {0: stopped, 1: running}, writable: true, every: 20ms}],
        poll: [{read: UW0, count: 5, every: 20ms}]}""")
-PRESS = config.gateway(PRESS_LINE, http=config.OPERATOR)
+PRESS = config.gateway(PRESS_LINE, http=config.ADMIN)
 POINT = "/api/v1/stations/press/points/"
 
 
@@ -132,7 +132,7 @@ SELDOM = config.gateway(config.line(stations="""
       {id: 31, name: press, profile: autonics-gplp-s, points: [
          {name: level, at: UW100, writable: true, every: 1min},
          {name: other, at: UW300, every: 1min},
-         {name: running, at: UB1632, every: 1min}]}"""), http=config.OPERATOR)
+         {name: running, at: UB1632, every: 1min}]}"""), http=config.ADMIN)
 
 
 class Written(unittest.TestCase):
@@ -202,7 +202,7 @@ class Relay(unittest.TestCase):
             link = pathlib.Path(folder) / "tty"
             oven_line = config.line("floor2", link, "{id: 20, name: oven, profile: panasonic-gt}",
                                     timing="{response_timeout: 100ms}")
-            text = config.gateway(PRESS_LINE, oven_line, relays=f"[{RELAY}]", http=config.OPERATOR)
+            text = config.gateway(PRESS_LINE, oven_line, relays=f"[{RELAY}]", http=config.ADMIN)
             with contextlib.ExitStack() as stack:
                 oven = RtuBus(link, {20: echo_address})
                 program = stack.enter_context(harness.configured(text))
@@ -237,7 +237,7 @@ class Relay(unittest.TestCase):
                 "floor2", link, """{id: 20, name: oven, profile: panasonic-gt,
                                     poll: [{read: GDT300, every: 20ms}]}""",
                 timing="{response_timeout: 100ms}")
-            text = config.gateway(PRESS_LINE, oven_line, relays=f"[{RELAY}]", http=config.OPERATOR)
+            text = config.gateway(PRESS_LINE, oven_line, relays=f"[{RELAY}]", http=config.ADMIN)
             panel = Forgetful()
             with RtuBus(link, {20: panel}) as oven, harness.configured(text):
                 def writes():
@@ -253,7 +253,7 @@ class Relay(unittest.TestCase):
                       {id: 20, name: oven, profile: panasonic-gt}"""
         seldom = RELAY.replace("20ms", "10s")
         text = config.gateway(config.line(stations=stations), relays=f"[{seldom}]",
-                              http=config.OPERATOR)
+                              http=config.ADMIN)
         with harness.configured(text) as program, program.client() as client:
             def relay():
                 return program.get("/api/v1/relays")[1]["relays"][0]

@@ -44,7 +44,7 @@ def box(adapter):
         config.line("slow", "sim", polled(3, "sluggish", "10ms"), timing="{response_timeout: 2s}",
                     queue="{deadline: 10s}"),
         config.line("quick", "sim", polled(5, "loud"), baud=1000000),
-        http=config.OPERATOR, log="{level: trace}",
+        http=config.ADMIN, log="{level: trace}",
         mqtt="{broker: 'mqtt://127.0.0.1:1', topic: box}")  # BrokerAway
 
 

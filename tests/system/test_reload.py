@@ -31,7 +31,7 @@ def other(stations=MIXER, **keys):
 
 
 def plant(*lines, modbus=config.FREE_PORT, **keys):
-    return config.gateway(STEADY, *lines, http=config.OPERATOR, modbus=modbus, **keys)
+    return config.gateway(STEADY, *lines, http=config.ADMIN, modbus=modbus, **keys)
 
 
 class Running:
@@ -239,9 +239,9 @@ class Reload(unittest.TestCase):
 
     def test_points_that_are_the_same_keep_their_values_and_their_past(self):
         slow = METER.replace("every: 50ms", "every: 60min")
-        before = config.gateway(config.line("steady", stations=slow), http=config.OPERATOR)
+        before = config.gateway(config.line("steady", stations=slow), http=config.ADMIN)
         more = slow.replace("}]}", "}, {name: more, at: D200, every: 50ms}]}")
-        after = config.gateway(config.line("steady", stations=more), http=config.OPERATOR)
+        after = config.gateway(config.line("steady", stations=more), http=config.ADMIN)
         path = "/api/v1/stations/meter/points/"
         with Running(before) as running:
             until(lambda: running.program.get(path + "level")[1]["quality"] == "good")
@@ -279,7 +279,7 @@ class Reload(unittest.TestCase):
         token = folder / "ops"
         token.write_text(before)
         token.chmod(0o600)
-        http = f"{config.FREE_PORT}, anonymous: none, tokens: [{{name: ops, role: operator, file: {token}}}]"
+        http = f"{config.FREE_PORT}, anonymous: none, tokens: [{{name: ops, role: admin, file: {token}}}]"
         running = self.enterContext(Running(config.gateway(STEADY, http=http)))
         token.write_text(after)
         place = f"127.0.0.1:{running.program.http_port()}"
@@ -324,7 +324,7 @@ class Reload(unittest.TestCase):
             return config.gateway(
                 config.line(name, link, "{id: 1}", retries=0, echo="off",
                             timing="{response_timeout: 200ms, late_window: 5s}"),
-                http=config.OPERATOR)
+                http=config.ADMIN)
         with tempfile.TemporaryDirectory() as folder:
             link = pathlib.Path(folder) / "tty"
             with RtuBus(link, {1: panel}), Running(line("one", link)) as running:
@@ -341,7 +341,7 @@ class Reload(unittest.TestCase):
         slow = METER.replace("every: 50ms", "every: 60min")
 
         def text(device):
-            return config.gateway(config.line("steady", device, slow), http=config.OPERATOR)
+            return config.gateway(config.line("steady", device, slow), http=config.ADMIN)
         path = "/api/v1/stations/meter/points/level"
         with Running(text("sim")) as running:
             until(lambda: running.program.get(path)[1]["quality"] == "good")

@@ -16,7 +16,7 @@ GUARDED = config.line(stations="""
       {id: 5, name: meter, profile: autonics-gplp-s, access: read_only}""")
 FREE_LINE = config.line("floor2", stations="{id: 9, name: oven, profile: panasonic-gt}")
 FORBIDDEN = config.line("floor3", device="/dev/null", stations="{id: 7, name: scale}")
-PLANT = config.gateway(GUARDED, FREE_LINE, FORBIDDEN, http=config.OPERATOR,
+PLANT = config.gateway(GUARDED, FREE_LINE, FORBIDDEN, http=config.ADMIN,
                        modbus=config.FREE_PORT + ", lines: [floor1]")
 PRESS = "/api/v1/stations/press/"
 FLOOR = "/api/v1/lines/floor1/"
@@ -91,7 +91,7 @@ class Rest(unittest.TestCase):
                              [harness.rtu(31, bytes.fromhex("1000C80001020007"))])
 
     def test_P3_a_long_read_ends_within_the_deadline_of_its_line(self):
-        text = config.gateway(config.line(queue="{deadline: 300ms}"), http=config.OPERATOR)
+        text = config.gateway(config.line(queue="{deadline: 300ms}"), http=config.ADMIN)
         with harness.configured(text) as program:
             status, told = program.get(PRESS + "holding-registers/0?count=6000")
             self.assertIn(status, (503, 504))  # it may be on the wire when its time is over
@@ -182,7 +182,7 @@ class Rest(unittest.TestCase):
             self.assertLessEqual(sum(c["busy_seconds"] for c in clients.values()), float(told.group(1)) + 0.001)
 
     def test_a_client_whose_first_request_is_a_broadcast_has_its_name(self):
-        text = config.gateway(FREE_LINE, http=config.OPERATOR)
+        text = config.gateway(FREE_LINE, http=config.ADMIN)
         with harness.configured(text) as program, program.client() as client:
             self.assertEqual(client.ask(0, harness.write_register(10, 1)),
                              harness.write_register(10, 1))

@@ -54,7 +54,7 @@ class BadClients(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.program = cls.enterClassContext(
-            harness.configured(config.gateway(config.line(), http=config.OPERATOR)))
+            harness.configured(config.gateway(config.line(), http=config.ADMIN)))
         cls.http_port = cls.program.http_port()
         cls.good = cls.program.client()
         cls.addClassCleanup(cls.good.close)

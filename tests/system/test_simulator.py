@@ -11,7 +11,7 @@ PRESS = "/api/v1/simulator/press"
 UW0 = "/api/v1/stations/press/devices/UW0"
 PANELS = config.gateway(  # nobody polls: each request is the test's
     config.line(stations=config.PRESS + ", {id: 20, name: oven, profile: panasonic-gt}"),
-    http=config.OPERATOR)
+    http=config.ADMIN)
 
 
 class Simulator(unittest.TestCase):
@@ -45,7 +45,7 @@ class Simulator(unittest.TestCase):
       {id: 31, name: press, profile: autonics-gplp-s,
        simulate: {slow: 5ms, late: 0.5, late_by: 10ms}},
       {id: 20, name: oven, profile: panasonic-gt, simulate: {dead: true}}"""),
-            modbus=None, http=config.OPERATOR)
+            modbus=None, http=config.ADMIN)
         with harness.configured(text, "--simulate") as program:
             self.assertEqual(program.values(UW0), [10])
             self.assertEqual(program.get("/api/v1/stations/oven/devices/GDT0")[0], 504)

@@ -50,7 +50,7 @@ STATION = """
 
 def configuration(folder):
     return config.gateway(config.line("hall", stations=STATION, baud=19200, parity="even"),
-                          profiles_dir=folder, http=config.OPERATOR)
+                          profiles_dir=folder, http=config.ADMIN)
 
 
 class SixthPanel(unittest.TestCase):

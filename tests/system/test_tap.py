@@ -99,7 +99,7 @@ def tapped(habits, latency=0, points="", baud=115200):
         with Zoo(*options) as zoo:
             stations = ", ".join(f"{{id: {i}, name: s{i}{points if i == 1 else ''}}}" for i in range(1, 6))
             line = config.line("tap", f"{folder}/tap", stations, baud=baud, mode="listen")
-            with harness.configured(config.gateway(line, http=config.OPERATOR)) as program:
+            with harness.configured(config.gateway(line, http=config.ADMIN)) as program:
                 program.log.wait_for("line up")
                 yield zoo, f"{folder}/master", program, log
 

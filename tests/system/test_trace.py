@@ -54,7 +54,7 @@ class Following(unittest.TestCase):
 
     def test_each_answer_names_transactions_that_the_trace_has(self):
         line = config.line(stations="{id: 31, name: press, profile: autonics-gplp-s}")
-        with harness.configured(config.gateway(line, http=config.OPERATOR)) as program:
+        with harness.configured(config.gateway(line, http=config.ADMIN)) as program:
             headers, _ = fetch(program, "/api/v1/stations/press/devices/UW100?count=3")
             (wanted,) = headers["Panelgate-Transactions"].split(", ")
             trace = program.get("/api/v1/lines/floor1/trace")[1]
@@ -72,7 +72,7 @@ class Following(unittest.TestCase):
     def test_pages_give_every_transaction_once(self):
         line = config.line(stations="{id: 31, name: press, profile: autonics-gplp-s, "
                                     "poll: [{read: UW0, count: 4, every: 20ms}]}")
-        with harness.configured(config.gateway(line, http=config.OPERATOR)) as program:
+        with harness.configured(config.gateway(line, http=config.ADMIN)) as program:
             seen, since = [], 0
             while len(seen) < 100:
                 page = program.get(f"/api/v1/lines/floor1/trace?since={since}&last=7")[1]
@@ -84,7 +84,7 @@ class Following(unittest.TestCase):
         line = config.line(retries=0, timing="{response_timeout: 60ms}",
                            stations="{id: 31, name: press, profile: autonics-gplp-s}, "
                                     "{id: 5, name: mixer, profile: autonics-gplp-s, poll: [{read: UW0, every: 50ms}]}")
-        with harness.configured(config.gateway(line, http=config.OPERATOR)) as program:
+        with harness.configured(config.gateway(line, http=config.ADMIN)) as program:
             program.rest("GET", "/api/v1/stations/press/devices/UW100")
             self.assertEqual(program.get("/api/v1/lines/floor1/incidents")[1], {"incidents": []})
             program.rest("PUT", "/api/v1/simulator/press", {"dead": True})
@@ -163,7 +163,7 @@ class Captures(unittest.TestCase):
     def test_damaged_and_late_replies_and_decisions_are_comments(self):
         line = config.line(retries=0, timing="{response_timeout: 60ms}",
                            stations="{id: 31, name: press, profile: autonics-gplp-s}, {id: 5, name: mixer, profile: autonics-gplp-s}")
-        with harness.configured(config.gateway(line, http=config.OPERATOR)) as program:
+        with harness.configured(config.gateway(line, http=config.ADMIN)) as program:
             program.rest("PUT", "/api/v1/simulator/press", {"damage": 1})
             program.rest("GET", "/api/v1/stations/press/devices/UW100")
             program.rest("PUT", "/api/v1/simulator/press", {"damage": 0})

@@ -34,7 +34,7 @@ class Translation(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.program = cls.enterClassContext(harness.configured(
-            config.gateway(config.line(stations=STATIONS), http=config.OPERATOR)))
+            config.gateway(config.line(stations=STATIONS), http=config.ADMIN)))
         cls.client = ModbusTcpClient("127.0.0.1", cls.program.modbus_port())
         cls.client.connect()
         cls.addClassCleanup(cls.client.close)
@@ -113,7 +113,7 @@ class Translation(unittest.TestCase):
         stations = ("{id: 31, name: press, profile: autonics-gplp-s, translate: off}, "
                     "{id: 30, name: lathe, profile: autonics-gplp-s, guard: true}")
         with harness.configured(config.gateway(config.line(stations=stations),
-                                               http=config.OPERATOR)) as program:
+                                               http=config.ADMIN)) as program:
             with program.client() as client:
                 for unit in (31, 30):
                     answer = client.ask(unit, struct.pack(">BHH", 6, 100, 7))

@@ -82,7 +82,7 @@ def plant():
 
 
 @contextlib.contextmanager
-def served(made, modbus="", http="", anonymous="operator", **keys):
+def served(made, modbus="", http="", anonymous="admin", **keys):
     """A gateway with these keys of `tls` at its listeners; "" is a plain one."""
     text = gateway(line(), modbus=FREE_PORT + (", " + modbus if modbus else ""),
                    http=f"{FREE_PORT}, anonymous: {anonymous}" + (", " + http if http else ""), **keys)

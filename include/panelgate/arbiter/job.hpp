@@ -10,6 +10,7 @@
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/pool.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/who.hpp"
 #include "panelgate/base/words.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -68,6 +69,8 @@ struct Job {
     bool alone = false;                 ///< a shared transaction for it was refused: send it alone
     bool gone = false;                  ///< its client has left while it was on the wire: no retry
     TransactionNumbers transactions{};  ///< one for each attempt
+    WhoRef who{};                       ///< who asks, for those who judge it again
+    bool raw = false;                   ///< ... and whether its client has made the PDU
 };
 using Jobs = PoolVector<Job>;
 

@@ -32,7 +32,7 @@ std::string_view label(Role role);
 
 /// Who asks: set once where a request comes in, and carried along with it. Immutable once made.
 struct Who {
-    Face face = Face::gateway;
+    Face face = Face::modbus_tcp;
     /// As in logs and traces: "modbus_tcp 10.0.0.7:51234", "http ::1 token ops", "poll of press".
     std::string name{};
     std::string address{};  ///< without port, IPv4 as such; empty: it has none

@@ -67,6 +67,7 @@ struct Settings {
     std::function<void(const WriteEnd&)> record_write{};  ///< may be empty; must not call the bus
     /// True while no write may be sent, as it could not be recorded. May be empty.
     std::function<bool()> refuses_writes{};
+    std::shared_ptr<const access::LineRules> access{};  ///< null: everybody may do everything
 };
 
 /// Drives one line with one arbiter. Not thread-safe: use it only on the executor's thread.
@@ -92,6 +93,7 @@ class Bus final : public LineBus {
     StationStatus station_status(std::uint8_t station) const override;
     OutcomeCounts outcomes(std::uint8_t station) const override;
     std::optional<Refusal> write_refusal(std::uint8_t station) const override;
+    std::optional<Refusal> refusal_of(const Request& request) const override;
     TracePart trace(std::size_t last) const override;
     TracePart trace_since(std::uint64_t sequence, std::size_t most) const override;
     std::vector<IncidentHead> incidents() const override;

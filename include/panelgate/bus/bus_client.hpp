@@ -65,6 +65,7 @@ struct Request {
     Duration patience{};
     /// A station search with a limited share of the line: may ask silent unlisted stations again.
     bool search = false;
+    bool raw = false;  ///< a PDU that its client has made itself, as REST's `raw`
 };
 
 enum class Source : std::uint8_t { bus, cache };
@@ -173,6 +174,11 @@ class RequestPort {
     virtual std::optional<Refusal> write_refusal(std::uint8_t station) const {
         static_cast<void>(station);
         return std::nullopt;
+    }
+    /// Returns why transact() would refuse this request (0: a broadcast), if so: for callers that
+    /// ask other lines as well.
+    virtual std::optional<Refusal> refusal_of(const Request& request) const {
+        return write_refusal(request.station);
     }
     /// Counts (and logs, if it is a write) a request that the caller refused before submitting it:
     /// a PDU that contradicts its function, or a write on a read-only listener.

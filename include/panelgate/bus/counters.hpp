@@ -47,6 +47,8 @@ struct LineReport {
     line::Counters device;
     std::vector<StationReport> stations;
     std::vector<FindingReport> findings;
+    std::map<std::string, std::uint64_t>
+        denials{};  ///< requests, by the rule of `access` that denies
 };
 
 }  // namespace panelgate::bus

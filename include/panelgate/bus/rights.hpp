@@ -3,14 +3,17 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "panelgate/access/line_rules.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
+#include "panelgate/base/who.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -26,12 +29,14 @@ enum class Rule : std::uint8_t {
     listening,        ///< the line is in listen mode
     write_protected,  ///< the items are read-only in the panel
     unrecorded,       ///< no write is sent while it cannot be recorded (audit.on_failure)
+    denied,           ///< a rule of `access`, or its default
 };
-/// Returns "access", "function", "quantity", "range", "listen", "read-only" or "audit": stable
-/// identifiers.
+/// Returns "access", "function", "quantity", "range", "listen", "read-only", "audit" or "denied":
+/// stable identifiers.
 std::string_view label(Rule rule);
 inline bool is_access(Rule rule) {
-    return rule == Rule::read_only || rule == Rule::broadcast_over_read_only;
+    return rule == Rule::read_only || rule == Rule::broadcast_over_read_only ||
+           rule == Rule::denied;
 }
 
 /// A guard's reason to refuse a request.
@@ -76,7 +81,8 @@ struct Refusal {
     Rule rule = Rule::read_only;
     std::string station;  ///< the station that the rule protects
     modbus::ExceptionCode code = modbus::ExceptionCode::illegal_function;  ///< for Modbus clients
-    std::string why{};  ///< the guard's reason; the line's name in listen mode
+    /// The guard's reason; the line's name in listen mode; the name of the rule that denies.
+    std::string why{};
 
     friend bool operator==(const Refusal&, const Refusal&) = default;
 };
@@ -92,10 +98,15 @@ Result<Bytes> answer_to(const Refusal& refusal, std::uint8_t function);
 class Rights {
   public:
     Rights() = default;
-    explicit Rights(Stations stations) : stations_(std::move(stations)) {}
+    /// `rules`: who may do what; null: everybody may do everything.
+    explicit Rights(Stations stations, std::shared_ptr<const access::LineRules> rules = {})
+        : stations_(std::move(stations)), rules_(std::move(rules)) {}
 
     /// Station 0 is a broadcast.
     std::optional<Refusal> judge(std::uint8_t station, const modbus::Request& request) const;
+    /// Judges by the rules alone.
+    std::optional<Refusal> judge(const WhoRef& who,
+                                 const access::LineRules::Question& question) const;
     /// Returns what judge() returns for any write to this station.
     std::optional<Refusal> judge_write(std::uint8_t station) const;
 
@@ -103,6 +114,7 @@ class Rights {
     std::optional<Refusal> judge_broadcast() const;
 
     Stations stations_;
+    std::shared_ptr<const access::LineRules> rules_;
 };
 
 }  // namespace panelgate::bus

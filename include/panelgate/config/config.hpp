@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/access/line_rules.hpp"
+#include "panelgate/access/settings.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/audit/settings.hpp"
 #include "panelgate/line/settings.hpp"
@@ -48,6 +50,15 @@ struct Station {
     friend bool operator==(const Station&, const Station&) = default;
 };
 
+/// The rules of `access` for one line.
+struct LineAccess {
+    std::shared_ptr<const access::LineRules> rules;  ///< null before loading has ended
+    friend bool operator==(const LineAccess& one, const LineAccess& other) {
+        if (!one.rules || !other.rules) return one.rules == other.rules;
+        return one.rules->says_the_same(*other.rules);
+    }
+};
+
 struct Line {
     enum class Kind : std::uint8_t { serial, tcp, simulated };
     std::string name;
@@ -60,6 +71,7 @@ struct Line {
     bool automatic_gap = true;    ///< `frame_gap` is not set, or auto
     bool simulated_echo = false;  ///< the simulated adapter echoes what is sent
     std::vector<Station> stations;
+    LineAccess access;
     friend bool operator==(const Line&, const Line&) = default;
 };
 
@@ -74,6 +86,7 @@ struct Config {
     std::vector<serial_server::Settings> serial_masters;
     std::optional<web::Settings> http;
     std::optional<mqtt::Settings> mqtt;  ///< empty: values go to no broker
+    access::Settings access;             ///< who may do what
     rt::LogSettings log;
     rt::RealtimeSettings realtime;
     std::optional<audit::Settings> audit{};  ///< empty: nothing is recorded

@@ -44,6 +44,7 @@ struct KeyShape {
     std::string example;           ///< a value in the file's notation; or ""
     std::string change;            ///< what a change of it needs beside a reload; or ""
     int order = 0;                 ///< among the keys of its map
+    bool may_be_text = false;      ///< of Kind::map: a text says the same
 };
 
 /// A dependency between two keys of a map; a merge may supply the other.

@@ -22,6 +22,7 @@
 #include "panelgate/web/http/problem.hpp"
 #include "panelgate/web/http/query.hpp"
 #include "routes.hpp"
+#include "sight.hpp"
 
 namespace panelgate::web {
 
@@ -135,9 +136,16 @@ HttpResponse answer_of(const ReloadVerdict& verdict) {
 
 }  // namespace
 
-Handling get_reload(HttpRequest, const Api* api) {
+Handling get_reload(HttpRequest request, const Api* api) {
     const Verdict last = api->providers.reload ? api->providers.reload->last() : nullptr;
-    co_return json_response(200, last ? describe(*last) : json::object{{"outcome", "none"}});
+    if (!last) co_return json_response(200, json::object{{"outcome", "none"}});
+    json::object body = describe(*last);
+    // What it says names any station.
+    if (!Sight(*api->directory, request.caller->who()).everything()) {
+        for (const char* key : {"weaker", "restart_needed", "errors", "why"}) body.erase(key);
+        body["changes"] = body["warnings"] = json::array();
+    }
+    co_return json_response(200, body);
 }
 
 Handling post_reload(HttpRequest request, const Api* api) {
@@ -153,17 +161,57 @@ Handling post_reload(HttpRequest request, const Api* api) {
     co_return answer_of(*verdict);
 }
 
+namespace {
+
+std::string configuration_text(const Api& api, Role role, const std::string& configuration) {
+    return "{\"version\":" + json_text(boost::json::value(api.providers.version)) +
+           ",\"role\":" + json_text(boost::json::value(label(role))) +
+           ",\"configuration\":" + configuration + ",\"rest\":" + json_text(offered()) + "}\n";
+}
+
+/// The configuration of the stations that may be seen.
+std::string seen_configuration(const std::string& text, const Sight& sight) {
+    json::value whole = json::parse(text);
+    json::object& top = whole.as_object();
+    for (const char* key : {"relays", "modbus_tcp", "serial_masters", "access", "warnings"})
+        top.erase(key);
+    json::array lines;
+    for (json::value& line : top["lines"].as_array()) {
+        json::object& object = line.as_object();
+        const std::string name(object["name"].as_string());
+        json::array stations;
+        for (const json::value& station : object["stations"].as_array()) {
+            const std::string own(station.at("name").as_string());
+            if (sight.named(name, own, "")) stations.push_back(station);
+        }
+        if (stations.empty()) continue;
+        object["stations"] = std::move(stations);
+        lines.push_back(std::move(object));
+    }
+    top["lines"] = std::move(lines);
+    return json_text(whole);
+}
+
+HttpResponse text_answer(std::string body) {
+    HttpResponse response;
+    response.body = std::move(body);
+    return response;
+}
+
+}  // namespace
+
 /// The configuration is the same for all clients of a role, so it is rendered once per role.
 Handling get_configuration(HttpRequest request, const Api* api) {
     if (!api->providers.configuration)
         co_return to_response(problem(404, "this program shows no configuration"));
+    const Sight sight(*api->directory, request.caller->who());
+    if (!sight.everything())
+        co_return text_answer(configuration_text(
+            *api, request.role, seen_configuration(*api->providers.configuration, sight)));
     std::shared_ptr<KeptAnswer>& kept = (*api->configuration)[request.role];
     if (!kept) {
         kept = std::make_shared<KeptAnswer>(
-            "{\"version\":" + json_text(boost::json::value(api->providers.version)) +
-                ",\"role\":" + json_text(boost::json::value(label(request.role))) +
-                ",\"configuration\":" + *api->providers.configuration +
-                ",\"rest\":" + json_text(offered()) + "}\n",
+            configuration_text(*api, request.role, *api->providers.configuration),
             "application/json");
     }
     Handling giving = KeptAnswer::give(kept, std::move(request));
@@ -210,14 +258,20 @@ Handling get_readyz(HttpRequest, const Api* api) {
 }
 
 Handling get_metrics(HttpRequest request, const Api* api) {
-    const bool gzip = accepts_gzip(request.headers["accept-encoding"]);
+    const Sight sight(*api->directory, request.caller->who());
+    const bool all = sight.everything();
+    const bool gzip = all && accepts_gzip(request.headers["accept-encoding"]);
     boost::asio::awaitable<SharedText> making =
         scrape(request.caller, api->providers.metrics, gzip);
     SharedText text = co_await std::move(making);
     if (!text)
         co_return to_response(passing_problem(503, "the metrics cannot be made now; try again", 1));
     HttpResponse response = text_response(200, {}, api->providers.metrics_type);
-    response.shared_body = std::move(text);
+    if (all) {
+        response.shared_body = std::move(text);
+    } else {
+        response.body = seen_metrics(*text, sight);
+    }
     response.headers.emplace_back("Vary", "Accept-Encoding");
     if (gzip) response.headers.emplace_back("Content-Encoding", "gzip");
     co_return response;

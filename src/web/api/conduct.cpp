@@ -19,6 +19,7 @@
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/problem.hpp"
 #include "routes.hpp"
+#include "sight.hpp"
 
 namespace panelgate::web {
 
@@ -270,6 +271,10 @@ Handling conduct(HttpRequest request, const Api* api, Handler handler, RoutePoli
     const bool takes_gzip = accepts_gzip(header(request, "accept-encoding"));
     const std::string if_none_match = header(request, "if-none-match");
     const auto wait = policy.asks ? wait_of(request) : std::nullopt;
+    if (api->directory != nullptr) {
+        if (const auto hidden = check_sight(request, *api->directory))
+            co_return to_response(*hidden);
+    }
     Handling work = handled(std::move(request), api, handler, policy);
     HttpResponse response = co_await std::move(work);
     if (caller->has_left()) co_return response;

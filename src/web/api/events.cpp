@@ -15,6 +15,7 @@
 #include "panelgate/web/http/problem.hpp"
 #include "points.hpp"
 #include "routes.hpp"
+#include "sight.hpp"
 #include "station_path.hpp"
 
 namespace panelgate::web {
@@ -155,6 +156,8 @@ Parsed<EventFilter> event_filter_of(const HttpRequest& request, const Directory&
 Handling get_events(HttpRequest request, const Api* api) {
     auto filter = event_filter_of(request, *api->directory);
     if (!filter) co_return to_response(filter.error());
+    filter->may_see = [current = api->current, who = request.caller->who()](
+                          const EventTopic& topic) { return Sight(**current, who).event(topic); };
     auto listener =
         api->providers.events->listen(std::move(*filter), request.headers["last-event-id"]);
     if (!listener)

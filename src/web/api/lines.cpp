@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "answer.hpp"
 #include "body.hpp"
@@ -17,6 +18,7 @@
 #include "panelgate/web/http/json_text.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "routes.hpp"
+#include "sight.hpp"
 #include "station_path.hpp"
 
 namespace panelgate::web {
@@ -86,14 +88,24 @@ json::array describe(const std::vector<bus::ClientShare>& clients) {
     return list;
 }
 
+/// Findings only of stations that may be seen.
+bus::LineStatus status_of(const LineEntry& line, const Sight& sight) {
+    bus::LineStatus status = line.bus->status();
+    std::erase_if(status.findings, [&](const bus::LineFinding& finding) {
+        return finding.station && !sight.station(line, *finding.station);
+    });
+    return status;
+}
+
 }  // namespace
 
 Handling get_lines(HttpRequest request, const Api* api) {
+    const Sight sight(*api->directory, request.caller->who());
     LongAnswer body;
     body.begin_list("lines");
     for (std::size_t i = 0; i < api->directory->lines.size(); ++i) {
         const LineEntry& line = api->directory->lines[i];
-        body.add(describe(line, line.bus->status()));
+        if (sight.line(line)) body.add(describe(line, status_of(line, sight)));
         if (!body.is_turn_over()) continue;
         boost::asio::awaitable<void> turn = yield_turn();
         co_await std::move(turn);
@@ -106,10 +118,15 @@ Handling get_lines(HttpRequest request, const Api* api) {
 Handling get_line(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
-    const bus::LineStatus status = (*line)->bus->status();
+    const Sight sight(*api->directory, request.caller->who());
+    const bus::LineStatus status = status_of(**line, sight);
     json::object body = describe(**line, status);
     body["findings"] = describe(status.findings);
-    body["clients"] = describe((*line)->bus->clients());
+    std::vector<bus::ClientShare> clients = (*line)->bus->clients();
+    // Polls and relays are called by their stations.
+    if (!sight.whole(**line))
+        std::erase_if(clients, [](const bus::ClientShare& one) { return !one.address; });
+    body["clients"] = describe(clients);
     co_return json_response(200, body);
 }
 

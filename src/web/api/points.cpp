@@ -20,6 +20,7 @@
 #include "panelgate/web/http/query.hpp"
 #include "reading.hpp"
 #include "routes.hpp"
+#include "sight.hpp"
 #include "station_path.hpp"
 
 namespace panelgate::web {
@@ -114,11 +115,19 @@ json::object describe(const Api& api, const points::StationPoints& station, cons
 /// A point and its station.
 using Owned = std::pair<const StationEntry*, const Point*>;
 
-std::vector<Owned> points_of_all(const Directory& directory) {
+std::vector<Owned> points_of(const StationEntry& station, const Sight& sight) {
+    std::vector<Owned> seen;
+    if (station.points == nullptr) return seen;
+    for (const Point& point : station.points->points())
+        if (sight.point(station, point)) seen.emplace_back(&station, &point);
+    return seen;
+}
+
+std::vector<Owned> points_of_all(const Directory& directory, const Sight& sight) {
     std::vector<Owned> all;
     for (const StationEntry& station : directory.stations) {
-        if (station.points == nullptr) continue;
-        for (const Point& point : station.points->points()) all.emplace_back(&station, &point);
+        const std::vector<Owned> own = points_of(station, sight);
+        all.insert(all.end(), own.begin(), own.end());
     }
     return all;
 }
@@ -148,12 +157,15 @@ Handling get_points(HttpRequest request, const Api* api) {
     if (*raw && prefers_csv(request.headers["accept"]))
         co_return to_response(problem(400, "raw is for JSON, not for text/csv"));
     const points::StationPoints* const all = station->points;
+    const Sight sight(*api->directory, request.caller->who());
+    std::vector<const Point*> seen;
+    for (const Owned& owned : points_of(*station, sight)) seen.push_back(owned.second);
     Table table;
     table.name = "points";
     table.columns = kColumns;
-    table.count = all == nullptr ? 0 : all->points().size();
-    table.entry = [api, all, with_raw = *raw](std::size_t i) {
-        return describe(*api, *all, all->points()[i], with_raw);
+    table.count = seen.size();
+    table.entry = [api, all, seen = std::move(seen), with_raw = *raw](std::size_t i) {
+        return describe(*api, *all, *seen[i], with_raw);
     };
     Handling answering = table_answer(std::move(request), std::move(table));
     co_return co_await std::move(answering);
@@ -163,7 +175,7 @@ Handling get_all_points(HttpRequest request, const Api* api) {
     Table table;
     table.name = "points";
     table.columns = kColumnsOfAll;
-    auto all = points_of_all(*api->directory);
+    auto all = points_of_all(*api->directory, Sight(*api->directory, request.caller->who()));
     table.count = all.size();
     table.entry = [api, all = std::move(all)](std::size_t i) {
         const auto& [station, point] = all[i];
@@ -233,10 +245,12 @@ Handling get_interpretations(HttpRequest request, const Api* api) {
     co_return json_response(200, body);
 }
 
-Handling get_relays(HttpRequest, const Api* api) {
+Handling get_relays(HttpRequest request, const Api* api) {
     json::array list;
+    const Sight sight(*api->directory, request.caller->who());
     const TimePoint now = api->providers.now();
     for (const points::RelayStatus& relay : api->providers.relays()) {
+        if (!sight.everything()) break;  // it is about two stations
         json::object object;
         object["name"] = relay.name;
         object["state"] = text_of(relay);

@@ -14,6 +14,8 @@ namespace {
 constexpr Role kFree = Role::none;
 constexpr Role kSee = Role::viewer;
 constexpr Role kChange = Role::operator_;
+constexpr Role kEngineer = Role::engineer;
+constexpr Role kAdmin = Role::admin;
 constexpr std::string_view kReading = "count type order length raw";
 
 /// A page contains no data of the plant: every client gets it, and its token requests the data.
@@ -49,7 +51,7 @@ constexpr Row kRows[] = {
     {"GET", "/api/v1/version", get_version, kSee},
     {"GET", "/api/v1/configuration", get_configuration, kSee},
     {"GET", "/api/v1/reload", get_reload, kSee},
-    {"POST", "/api/v1/reload", post_reload, kChange, kOnce, "rollback weaker"},
+    {"POST", "/api/v1/reload", post_reload, kAdmin, kOnce, "rollback weaker"},
     {"GET", "/api/v1/lines", get_lines, kSee, kTagged},
     {"GET", "/api/v1/lines/{}", get_line, kSee, kTagged},
     {"GET", "/api/v1/lines/{}/trace", get_trace, kSee, kPlain, "last since"},
@@ -57,17 +59,17 @@ constexpr Row kRows[] = {
     {"GET", "/api/v1/lines/{}/trace.pcapng", get_trace_pcapng, kSee},
     {"GET", "/api/v1/lines/{}/incidents", get_incidents, kSee, kTagged},
     {"GET", "/api/v1/lines/{}/incidents/{}", get_incident, kSee},
-    {"POST", "/api/v1/lines/{}/broadcast", post_broadcast, kChange, kWrites},
-    {"POST", "/api/v1/lines/{}/raw", post_raw, kChange, kWrites},
+    {"POST", "/api/v1/lines/{}/broadcast", post_broadcast, kEngineer, kWrites},
+    {"POST", "/api/v1/lines/{}/raw", post_raw, kEngineer, kWrites},
     {"GET", "/api/v1/lines/{}/discover", get_discovery, kSee},
-    {"POST", "/api/v1/lines/{}/discover", post_discover, kChange, kOnce},
-    {"DELETE", "/api/v1/lines/{}/discover", delete_discovery, kChange, kOnce},
+    {"POST", "/api/v1/lines/{}/discover", post_discover, kEngineer, kOnce},
+    {"DELETE", "/api/v1/lines/{}/discover", delete_discovery, kEngineer, kOnce},
     {"POST", "/api/v1/read", post_read, kSee, kAsks},
     {"POST", "/api/v1/write", post_write, kChange, kWrites},
     {"GET", "/api/v1/stations", get_stations, kSee, kTagged},
     {"GET", "/api/v1/stations/{}", get_station, kSee, kTagged},
     {"GET", "/api/v1/simulator/{}", get_simulated, kSee},
-    {"PUT", "/api/v1/simulator/{}", put_simulated, kChange},
+    {"PUT", "/api/v1/simulator/{}", put_simulated, kEngineer},
     {"GET", "/api/v1/events", get_events, kSee, kPlain, "types line station point"},
     {"GET", "/api/v1/relays", get_relays, kSee, kTagged},
     {"GET", "/api/v1/points", get_all_points, kSee, kTagged},

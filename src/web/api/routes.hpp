@@ -20,6 +20,8 @@ struct Api {
     std::shared_ptr<const Directory> keeps;  ///< keeps the directory alive when it is replaced
     Providers providers;
     std::shared_ptr<KeyBook> keys;  ///< never null
+    /// What is served now: for what outlives a reload. Never null.
+    std::shared_ptr<const std::shared_ptr<const Directory>> current;
     /// The answers of get_configuration(), by the client's role. Never null.
     std::shared_ptr<std::map<Role, std::shared_ptr<KeptAnswer>>> configuration;
 };

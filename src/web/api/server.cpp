@@ -22,6 +22,8 @@ Server::Server(boost::asio::any_io_executor executor, Settings settings,
 std::shared_ptr<const Site> Server::site_of(Settings settings,
                                             std::shared_ptr<const Directory> directory) const {
     auto api = std::make_shared<Api>();
+    *current_ = directory;
+    api->current = current_;
     api->directory = directory.get();
     api->keeps = std::move(directory);
     api->providers = providers_;

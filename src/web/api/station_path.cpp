@@ -155,6 +155,11 @@ std::string detail_of(const bus::Refusal& refusal) {
         case bus::Rule::unrecorded:
             return "a write to " + station +
                    " could not be recorded: the audit's file takes nothing now";
+        case bus::Rule::denied:
+            return (refusal.why == access::kDefaultRule
+                        ? "no rule of access allows it, and the default is deny"
+                        : "the rule '" + refusal.why + "' of access denies it") +
+                   std::string(refusal.station.empty() ? "" : " at " + station);
         case bus::Rule::function:
         case bus::Rule::quantity:
         case bus::Rule::range:
@@ -184,6 +189,7 @@ Problem problem_of(const bus::Refusal& refusal) {
     Problem made = refused(status_of(refusal.rule), refusal.rule,
                            "refused here, nothing was sent: " + detail_of(refusal));
     made.extensions["modbus_exception"] = static_cast<std::uint8_t>(refusal.code);
+    if (refusal.rule == bus::Rule::denied) made.extensions["rule"] = refusal.why;
     return made;
 }
 

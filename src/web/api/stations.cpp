@@ -17,6 +17,7 @@
 #include "panelgate/points/station_points.hpp"
 #include "reading.hpp"
 #include "routes.hpp"
+#include "sight.hpp"
 #include "station_path.hpp"
 
 namespace panelgate::web {
@@ -85,10 +86,12 @@ json::array describe_polls(const points::StationPoints* points, TimePoint now) {
 }  // namespace
 
 Handling get_stations(HttpRequest request, const Api* api) {
+    const Sight sight(*api->directory, request.caller->who());
     LongAnswer body;
     body.begin_list("stations");
     for (std::size_t i = 0; i < api->directory->stations.size(); ++i) {
-        body.add(describe(api->directory->stations[i]));
+        const StationEntry& station = api->directory->stations[i];
+        if (sight.station(station)) body.add(describe(station));
         if (!body.is_turn_over()) continue;
         boost::asio::awaitable<void> turn = yield_turn();
         co_await std::move(turn);
@@ -283,6 +286,7 @@ Handling post_raw(HttpRequest request, const Api* api) {
     const bool broadcast = made.station == 0;
     const Patience patience(request, (*line)->deadline, api->providers.now);
     made.within = patience.left();
+    made.raw = true;
     bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));
     co_return broadcast ? broadcast_answer(answer) : raw_answer(answer);
 }

@@ -21,6 +21,7 @@
 #include "panelgate/web/http/query.hpp"
 #include "pcapng.hpp"
 #include "routes.hpp"
+#include "sight.hpp"
 #include "station_path.hpp"
 
 namespace panelgate::web {
@@ -313,6 +314,18 @@ HttpResponse pcapng_response(std::string body, const std::string& file_name) {
     return response;
 }
 
+namespace {
+
+/// A capture has no place for a frame without bytes.
+void mask_capture(const Sight& sight, const LineEntry& line, bus::TracePart& part) {
+    sight.mask(line, part);
+    std::erase_if(part.frames, [](const bus::TraceFrame& frame) { return frame.bytes.empty(); });
+    std::erase_if(part.transactions,
+                  [](const bus::TraceTransaction& one) { return one.request.empty(); });
+}
+
+}  // namespace
+
 /// The whole trace at the time of the request, without entries that come later.
 Handling get_trace_pcapng(HttpRequest request, const Api* api) {
     constexpr std::size_t kOfATurn = 64;  // entries: about 0.1 ms of work
@@ -324,9 +337,10 @@ Handling get_trace_pcapng(HttpRequest request, const Api* api) {
     std::string body;
     const std::uint64_t newest = last_of_trace(*bus, 1).next;
     for (std::uint64_t since = 0; since < newest;) {
-        const TracePage page = trace_since(*bus, since, kOfATurn);
+        TracePage page = trace_since(*bus, since, kOfATurn);
         if (page.next <= since) break;
         since = page.next;
+        mask_capture(Sight(*api->directory, request.caller->who()), **line, page.part);
         file.add(page.part);
         body += file.take();
         boost::asio::awaitable<void> turn = yield_turn();
@@ -377,8 +391,9 @@ HttpResponse varied(HttpResponse response) {
 Handling get_trace(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
-    const auto page = page_of(request, *(*line)->bus);
+    auto page = page_of(request, *(*line)->bus);
     if (!page) co_return to_response(page.error());
+    Sight(*api->directory, request.caller->who()).mask(**line, page->part);
     if (wants_text(request)) co_return varied(text_response(trace_text(page->part)));
     LongAnswer body;
     boost::asio::awaitable<void> all = add_part(&body, &page->part);
@@ -412,8 +427,12 @@ Handling get_incidents(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     json::array list;
-    for (const bus::IncidentHead& head : (*line)->bus->incidents())
+    std::vector<bus::IncidentHead> incidents = (*line)->bus->incidents();
+    const Sight sight(*api->directory, request.caller->who());
+    for (bus::IncidentHead& head : incidents) {
+        sight.mask(**line, head);
         list.push_back(trace_json(head));
+    }
     co_return json_response(200, json::object{{"incidents", std::move(list)}});
 }
 
@@ -422,17 +441,21 @@ Handling get_incident(HttpRequest request, const Api* api) {
     if (!line) co_return to_response(line.error());
     const std::string name = (*line)->name;
     const auto wanted = wanted_of(request.arguments[1]);
-    const auto found = wanted ? (*line)->bus->incident(wanted->id) : std::nullopt;
+    auto found = wanted ? (*line)->bus->incident(wanted->id) : std::nullopt;
     if (!found)
         co_return to_response(
             problem(404, "line '" + name + "' keeps no incident '" + request.arguments[1] + "'"));
+    const Sight sight(*api->directory, request.caller->who());
+    sight.mask(**line, found->head);
     if (wanted->capture) {
+        mask_capture(sight, **line, found->part);
         TracePcapng file(api->providers.version, name);
         file.add(found->part);
         std::string body = file.take();
         body += file.finish();
         co_return pcapng_response(std::move(body), name + '-' + request.arguments[1]);
     }
+    sight.mask(**line, found->part);
     LongAnswer body;
     for (const auto& [member, value] : trace_json(found->head)) body.member(member, value);
     boost::asio::awaitable<void> all = add_part(&body, &found->part);

@@ -22,7 +22,8 @@ constexpr const char* kComment = ": \n\n";
 bool EventFilter::passes(const EventTopic& topic) const {
     if (!allows(types, topic.type) || !allows(lines, topic.line)) return false;
     if (!stations.empty() && !stations.contains({topic.line, topic.station})) return false;
-    return points.empty() || points.contains({topic.station, topic.point});
+    if (!points.empty() && !points.contains({topic.station, topic.point})) return false;
+    return !may_see || may_see(topic);
 }
 
 std::string EventHub::Listener::take() {

@@ -176,7 +176,8 @@ std::optional<Problem> check_access(const HttpRequest& request, Role needed,
     if (token == nullptr) return unauthorized("this token is not known");
     if (has_expired(*token, request))
         return unauthorized("this token has expired, on " + rfc3339(*token->expires));
-    if (token->role < needed) return problem(403, "this needs the role operator");
+    if (token->role < needed)
+        return problem(403, "this needs the role " + std::string(label(needed)));
     return std::nullopt;
 }
 

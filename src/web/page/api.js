@@ -97,7 +97,11 @@ export function offers(pattern) {
     return gateway.configuration?.rest.some((route) => `${route.method} ${route.path}` === pattern) ?? false;
 }
 
-export const mayWrite = () => gateway.role === 'operator';
+const ROLES = ['none', 'viewer', 'operator', 'engineer', 'admin'];
+const may = (role) => ROLES.indexOf(gateway.role) >= ROLES.indexOf(role);
+export const mayWrite = () => may('operator');
+/** May discover stations and set simulated faults. */
+export const mayEngineer = () => may('engineer');
 
 /** Learns what is configured, and what we may do. */
 export async function introduce() {

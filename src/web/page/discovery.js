@@ -1,5 +1,5 @@
 // Looks for stations that nobody has listed, on a line that runs.
-import {get, mayWrite, path, post, remove} from './api.js';
+import {get, mayEngineer, path, post, remove} from './api.js';
 import {refusal} from './confirm.js';
 import {choice, h, replace, table, text} from './dom.js';
 import {duration, t} from './language.js';
@@ -41,8 +41,8 @@ class Discovery {
     }
 
     #form() {
-        if (!mayWrite()) {
-            return h('div', null, h('p', null, t('role.needed')), h('button', {type: 'button', onclick: askToken}, t('token.enter')));
+        if (!mayEngineer()) {
+            return h('div', null, h('p', null, t('role.engineer.needed')), h('button', {type: 'button', onclick: askToken}, t('token.enter')));
         }
         return h('form', {class: 'request three', onsubmit: (event) => { event.preventDefault(); this.#look(); }},
             h('label', null, h('span', null, t('discovery.stations')), this.stations),

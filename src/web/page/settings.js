@@ -13,7 +13,7 @@ const access = (value) => h('span', {class: `badge ${value === 'read_only' ? 'go
 
 function http({http: door}) {
     if (!door) return null;
-    const roles = {operator: 'bad', viewer: 'warn', none: 'good'};
+    const roles = {admin: 'bad', engineer: 'bad', operator: 'bad', viewer: 'warn', none: 'good'};
     return h('section', {class: 'card'}, h('h2', null, 'HTTP'), facts([[t('listens.on'), h('code', null, door.listen)],
         [t('anonymous'), h('span', {class: `badge ${roles[door.anonymous]}`}, word('role', door.anonymous))],
         [t('tokens'), door.tokens.length ? door.tokens.map((one) => `${one.name}: ${word('role', one.role)}`).join(', ') : '–'],

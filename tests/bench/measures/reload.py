@@ -42,7 +42,7 @@ class Asking(threading.Thread):
 
 def variants():
     """The same plant; on line 2 other retries, another rate of polls, another wire."""
-    text = rig.config.wide(8, 31, 10).replace("http: {", "http: {anonymous: operator, ", 1)
+    text = rig.config.wide(8, 31, 10).replace("http: {", "http: {anonymous: admin, ", 1)
     text += f"modbus_tcp: [{{{rig.config.FREE_PORT}, lines: [line1]}}]\n"
     yield text
     head, line2, rest = text.partition("  - name: line2\n")

@@ -38,6 +38,7 @@ config::MemoryFiles all_files() {
     const tls::Issued gateway = tls::issue_server(ca, {"gateway"}, {0, 1});
     std::map<std::string, std::string> texts{{"/run/secrets/ops", "secret-0123456789"},
                                              {"/run/secrets/other", "other-0123456789"},
+                                             {"/run/secrets/two", "second-0123456789"},
                                              {"/profiles/own.yaml", text_of(kGeneric)}};
     for (const std::string name : {"/tls/a", "/tls/b"}) {
         texts[name + ".crt"] = gateway.certificate;
@@ -82,6 +83,7 @@ mqtt: {broker: "mqtt://b:1883", topic: x, format: json}
 relays: [{from: a-1/400001, to: a-1/400101, on_change: true}]
 log: {level: warn, format: json}
 realtime: {priority: 20, lock_memory: true}
+access: {rules: [{name: no, deny: [write], range: {table: coils, address: 1}}]}
 )";
 
 /// Has what every_key.yaml has in only one way, or not at all.
@@ -117,8 +119,16 @@ serial_masters:
      broadcast: silent, on_failure: silence, echo: auto, response_timeout: 2s}
   - {name: hmi, device: /dev/ttyS3, lines: [a], framing: rtu}
 http:
-  tokens: [{name: ops, role: operator, file: /run/secrets/ops, expires: 2027-12-31}]
+  tokens: [{name: ops, role: operator, file: /run/secrets/ops, expires: 2027-12-31},
+           {name: two, role: viewer, file: /run/secrets/two}]
   tls: {certificate: /tls/a.crt, key: /tls/a.key, ca: /tls/a-ca.crt, client: optional}
+access:
+  default: deny
+  rules:
+    - {name: no, deny: [write], from: [10.1.0.0/16], roles: [operator], tokens: [ops],
+       faces: [http], listeners: ["127.0.0.1:502"], stations: [a/1], functions: [6],
+       range: "400001"}
+    - {name: yes, allow: [write], range: {table: holding-registers, address: 5, count: 2}}
 mqtt: {broker: "mqtts://b:8883", topic: x, qos: 1, client_id: x, username: x, store: 200,
        password_file: /run/secrets/ops, keep_alive: 60s, write: none, ca: /run/secrets/ops,
        certificate: /run/secrets/ops, key: /run/secrets/ops}
@@ -141,7 +151,7 @@ constexpr const char* kWords =
     "viewer operator warn json u16 i16 BADC UW120 GDT220 UB190 400009 400109 "
     "a-1/400209 panasonic-gt b 127.0.0.1:99 10.0.0.0/8 /dev/ttyS9 press/UW140 oven/GDT300 "
     "a/2 floor1/20 /run/secrets/other /profiles /tls/b.crt /tls/b.key /tls/b-ca.crt /tls/b.crl "
-    "optional TLSv1.3 20MiB continue 2028-01-31 ";
+    "optional TLSv1.3 read two mqtt coils 127.0.0.1:503 allow 20MiB continue 2028-01-31 ";
 
 /// Alternative values, likely ones first.
 std::vector<std::string> others(const yaml::Node& value) {
@@ -181,7 +191,7 @@ void expect_needs(const config::Config& before, const config::Config& after,
     std::set<std::string> done;
     for (const Interruption& one : interruptions(before, after))
         if (!removed.contains(one.path)) done.insert(one.what);
-    const bool publishes = key.starts_with("lines/");
+    const bool publishes = key.starts_with("lines/") || key.starts_with("access/");
     if (publishes) done.erase(std::string(config::kConnectsAnew));
     EXPECT_EQ(said, done) << key;
 }

@@ -470,7 +470,7 @@ TEST(ConfigShipped, TheDemoHasTheFivePanelsOfTheContract) {
               "oven 20 panasonic-gt\nfiller 1 omron-cp2e\n");
     EXPECT_EQ(config.modbus_tcp.at(0).name(), "127.0.0.1:1502");
     EXPECT_EQ(config.http->name(), "127.0.0.1:8080");
-    EXPECT_EQ(config.http->anonymous, Role::operator_);
+    EXPECT_EQ(config.http->anonymous, Role::admin);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/access/line_rules.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus_client.hpp"
@@ -32,6 +33,7 @@ struct LineEntry {
     Duration deadline = 2s;  ///< longest time from a request's arrival to its answer
     SerialFormat serial{};   ///< needed to compute the bus time of a read
     const bus::LineHistory* history = nullptr;  ///< null: no history; outlives the directory
+    std::shared_ptr<const access::LineRules> access{};  ///< null: everybody may do everything
 };
 
 /// Reads and sets the simulated faults of a panel, by name.

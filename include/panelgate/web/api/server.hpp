@@ -106,6 +106,9 @@ class Server {
     Providers providers_;
     Surface surface_;
     std::shared_ptr<KeyBook> keys_;
+    /// The directory that is served, also for streams that began with an earlier one.
+    std::shared_ptr<std::shared_ptr<const Directory>> current_ =
+        std::make_shared<std::shared_ptr<const Directory>>();
     std::shared_ptr<HttpListener> listener_;
 };
 

@@ -30,6 +30,8 @@ struct EventFilter {
     std::set<std::string> lines;
     std::set<std::pair<std::string, std::string>> stations;  ///< line, station
     std::set<std::pair<std::string, std::string>> points;    ///< station, point
+    /// What the client has a right to; empty: everything.
+    std::function<bool(const EventTopic&)> may_see{};
 
     bool passes(const EventTopic& topic) const;
 };

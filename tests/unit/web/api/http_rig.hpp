@@ -154,7 +154,7 @@ class HttpRig : public ::testing::Test {
   protected:
     HttpRig() : bus(io.get_executor()), panel(test_profile()) {
         settings.port = 0;
-        settings.anonymous = Role::operator_;
+        settings.anonymous = Role::admin;
         settings.hosts = {"x"};
         directory.lines.push_back({"floor1", "/dev/ttyUSB0", &bus, true});
         directory.lines.push_back({"floor2", "/dev/ttyUSB1", &bus, false});

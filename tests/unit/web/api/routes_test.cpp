@@ -16,6 +16,8 @@ class Access : public HttpRig {
     Access() {
         settings.tokens.push_back({"panel", Role::viewer, hash_of("see-me")});
         settings.tokens.push_back({"ops", Role::operator_, hash_of("let-me")});
+        settings.tokens.push_back({"lab", Role::engineer, hash_of("make-me")});
+        settings.tokens.push_back({"boss", Role::admin, hash_of("trust-me")});
         settings.tokens.push_back({"broken", Role::operator_, ""});
     }
     /// Status of a request with this token; "" sends none.
@@ -35,13 +37,23 @@ TEST_F(Access, IsByRoles) {
         const char* token;
         unsigned read;
         unsigned write;
+        unsigned engineer;  ///< raw and broadcast
+        unsigned reload;
     };
+    // This server has nothing to reload: 409 is as far as one may come.
     constexpr Row kRows[] = {
-        {Role::none, "", 401, 401},           {Role::none, "see-me", 200, 403},
-        {Role::none, "let-me", 200, 200},     {Role::viewer, "", 200, 401},
-        {Role::viewer, "see-me", 200, 403},   {Role::viewer, "let-me", 200, 200},
-        {Role::operator_, "", 200, 200},      {Role::operator_, "see-me", 200, 403},
-        {Role::operator_, "wrong", 401, 401},
+        {Role::none, "", 401, 401, 401, 401},
+        {Role::none, "see-me", 200, 403, 403, 403},
+        {Role::none, "let-me", 200, 200, 403, 403},
+        {Role::none, "make-me", 200, 200, 200, 403},
+        {Role::none, "trust-me", 200, 200, 200, 409},
+        {Role::viewer, "", 200, 401, 401, 401},
+        {Role::viewer, "see-me", 200, 403, 403, 403},
+        {Role::operator_, "", 200, 200, 401, 401},
+        {Role::operator_, "see-me", 200, 403, 403, 403},
+        {Role::operator_, "wrong", 401, 401, 401, 401},
+        {Role::engineer, "", 200, 200, 200, 401},
+        {Role::admin, "", 200, 200, 200, 409},
     };
     const char* broadcast = R"({"table":"coils","address":1,"values":[1]})";
     for (const Row& row : kRows) {
@@ -54,9 +66,10 @@ TEST_F(Access, IsByRoles) {
             EXPECT_EQ(status(row.token, "GET", path), 200u) << path << " holds no data";
         EXPECT_EQ(write(row.token), row.write);
         EXPECT_EQ(status(row.token, "POST", "/api/v1/lines/floor1/broadcast", broadcast),
-                  row.write == 200 ? 202u : row.write);
+                  row.engineer == 200 ? 202u : row.engineer);
         EXPECT_EQ(status(row.token, "POST", kRaw, R"({"station":5,"pdu":"0300010001"})"),
-                  row.write);
+                  row.engineer);
+        EXPECT_EQ(status(row.token, "POST", "/api/v1/reload"), row.reload);
     }
 }
 

@@ -1,0 +1,116 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "panelgate/access/settings.hpp"
+#include "panelgate/base/who.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
+
+namespace panelgate::access {
+
+/// What decides where no rule matches.
+inline constexpr std::string_view kDefaultRule = "default";
+
+struct Verdict {
+    bool allowed = true;
+    const Rule* rule = nullptr;  ///< that decided; null: the default
+    Act act = Act::read;         ///< what was refused, or judged last
+
+    std::string_view rule_name() const { return rule == nullptr ? kDefaultRule : rule->name; }
+};
+
+/// The rules as one line's stations meet them. Copies share nothing; single-threaded: judging fills
+/// a cache, so that many rules cost next to nothing. Pure.
+class LineRules {
+  public:
+    /// Without rules everything is allowed. `settings` is kept. `listed`: the line's stations.
+    LineRules() = default;
+    LineRules(std::shared_ptr<const Settings> settings, std::string line,
+              std::vector<std::uint8_t> listed);
+
+    /// A request as it was asked and, where it was translated, as it is sent.
+    struct Question {
+        std::uint8_t station = 0;  ///< 0: a broadcast, judged at each listed station
+        const modbus::Request* asked = nullptr;
+        const modbus::Request* sent = nullptr;  ///< null: as asked
+        bool raw = false;
+    };
+    /// The gateway's own requests are allowed. Nobody (null) is somebody without role and address.
+    Verdict judge(const WhoRef& who, const Question& question) const;
+    Verdict judge(const WhoRef& who, std::uint8_t station, const modbus::Request& request) const {
+        return judge(who, {.station = station, .asked = &request});
+    }
+    /// One act on some items, or with a function that names none.
+    Verdict judge(const WhoRef& who, std::uint8_t station, Act act, std::uint8_t function,
+                  const std::optional<modbus::Span>& items) const;
+
+    /// True if some item of the station may be read, or written.
+    bool may_some(const WhoRef& who, std::uint8_t station, Act act) const;
+    /// True if every item of its tables may be read, or written.
+    bool may_all(const WhoRef& who, std::uint8_t station, Act act) const;
+    /// may_all() of reads, remembered.
+    bool reads_all(const WhoRef& who, std::uint8_t station) const;
+    /// True if both decide alike on any line.
+    bool says_the_same(const LineRules& other) const {
+        return is_open() ? other.is_open() : other.settings_ && *settings_ == *other.settings_;
+    }
+    /// What may refuse: the names of all rules that deny, then the default. Empty if nothing does.
+    std::vector<std::string> denying_names() const;
+    /// True if nothing is ever refused.
+    bool is_open() const { return settings_ == nullptr || settings_->is_open(); }
+
+  private:
+    /// A rule that matches somebody at a station.
+    struct Applied {
+        const Rule* rule = nullptr;
+        const std::vector<modbus::Span>* items = nullptr;  ///< null: every item
+    };
+    /// What somebody meets at a station.
+    struct Meeting {
+        WhoRef who;  ///< keeps the key's address from being used again
+        std::vector<Applied> rules;
+        std::optional<bool> reads_some{};
+        std::optional<bool> reads_all{};
+    };
+    struct Interval {
+        std::uint32_t first = 0;
+        std::uint32_t end = 0;
+    };
+    using Meetings = std::unordered_map<const Who*, std::unique_ptr<Meeting>>;
+
+    Meeting& meet(const WhoRef& who, std::uint8_t station) const;
+    std::vector<Applied> rules_for(const WhoRef& who, std::uint8_t station) const;
+    Verdict judge_request(const WhoRef& who, std::uint8_t station, const Question& question) const;
+    Verdict judge_as(const Meeting& meeting, const modbus::Request& request,
+                     std::optional<Act> besides) const;
+    Verdict decide(const Meeting& meeting, Act act, std::uint8_t function,
+                   const std::optional<modbus::Span>& items) const;
+    Verdict decide_items(const Meeting& meeting, Act act, std::uint8_t function,
+                         const modbus::Span& items) const;
+    bool some_allowed(const Meeting& meeting, Act act, modbus::Table table) const;
+    Verdict by_default(Act act) const;
+    /// Takes these items out of what is left to be decided. True if any of them was there.
+    bool take_out(const modbus::Span& items) const;
+
+    std::shared_ptr<const Settings> settings_;
+    std::string line_;
+    std::vector<std::uint8_t> listed_;
+    /// By address; a rule's items of stations that are not listed.
+    std::vector<std::vector<modbus::Span>> unlisted_items_;
+    mutable std::vector<Meetings> meetings_;
+    mutable std::size_t met_ = 0;
+    mutable std::vector<Interval> left_;  ///< items that no rule has decided yet
+};
+
+/// True if `who` fulfils the conditions on who asks.
+bool is_about(const Rule& rule, const Who& who);
+
+}  // namespace panelgate::access

@@ -1,0 +1,239 @@
+// panelgate check --explain: which rule decides on a request that is told in words.
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "panelgate/access/line_rules.hpp"
+#include "panelgate/base/text.hpp"
+#include "panelgate/base/who.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/profile/judge.hpp"
+#include "panelgate/profile/notation.hpp"
+#include "panelgate/yaml/map_reader.hpp"
+#include "rights_text.hpp"
+
+namespace panelgate::app {
+
+namespace {
+
+using access::Act;
+using modbus::Span;
+
+constexpr const char* kForm =
+    "; write [from=ADDRESS] [role=ROLE] [token=NAME] [face=FACE] [listener=NAME] [count=N] "
+    "read|write|broadcast|raw STATION/PLACE, such as from=10.0.0.7 role=operator write press/UW102";
+
+/// What was asked, as far as it has been understood.
+struct Question {
+    Who who{.role = Role::none};
+    bool has_role = false;
+    bool has_face = false;
+    std::int64_t count = 1;
+    std::optional<Act> act;
+    const config::Line* line = nullptr;
+    const config::Station* station = nullptr;
+    Span items;
+    std::string wrong;
+};
+
+std::optional<Role> role_of(std::string_view word) {
+    for (const Role role : {Role::viewer, Role::operator_, Role::engineer, Role::admin})
+        if (word == label(role)) return role;
+    return std::nullopt;
+}
+
+std::optional<Face> face_of(std::string_view word) {
+    for (const Face face :
+         {Face::modbus_tcp, Face::udp, Face::serial_master, Face::http, Face::mqtt})
+        if (word == label(face)) return face;
+    return std::nullopt;
+}
+
+void set(Question& asked, const std::string& key, const std::string& value) {
+    if (key == "from") {
+        asked.who.address = value;
+    } else if (key == "token") {
+        asked.who.token = value;
+    } else if (key == "listener") {
+        asked.who.listener = value;
+    } else if (key == "role") {
+        const auto role = role_of(value);
+        asked.has_role = true;
+        if (role) asked.who.role = *role;
+        if (!role) asked.who.certificate_role = value;
+    } else if (key == "face") {
+        const auto face = face_of(value);
+        asked.has_face = face.has_value();
+        if (face) asked.who.face = *face;
+        if (!face) asked.wrong = "there is no face '" + value + '\'';
+    } else if (key == "count") {
+        const auto count = yaml::parse_integer(value);
+        if (count && *count >= 1) asked.count = *count;
+        if (!count || *count < 1) asked.wrong = "count is a number from 1";
+    } else {
+        asked.wrong = "'" + key + "' is not known";
+    }
+}
+
+/// TABLE/ADDRESS, a point, or a notation of the panel.
+std::optional<Span> items_of(const config::Station& station, const std::string& place) {
+    const std::size_t slash = place.find('/');
+    if (slash != place.npos) {
+        const auto address = yaml::parse_integer(place.substr(slash + 1));
+        for (const modbus::Table table : modbus::kTables) {
+            if (place.substr(0, slash) == label(table) && address && *address >= 0 &&
+                *address < modbus::kTableItems)
+                return Span{table, static_cast<std::uint32_t>(*address), 1};
+        }
+        return std::nullopt;
+    }
+    const auto point = std::ranges::find(station.points, place, &points::Point::name);
+    if (point != station.points.end()) return Span{point->table, point->address, point->count()};
+    const auto item = profile::parse_notation(*station.profile, place);
+    if (!item) return std::nullopt;
+    return Span{item->area->table, item->address, 1};
+}
+
+void find_place(const config::Config& config, const std::string& text, Question& asked) {
+    const std::size_t slash = text.find('/');
+    for (const config::Line& line : config.lines) {
+        for (const config::Station& station : line.stations) {
+            if (slash == text.npos || station.name != text.substr(0, slash)) continue;
+            asked.line = &line;
+            asked.station = &station;
+        }
+    }
+    if (asked.station == nullptr) {
+        asked.wrong = "'" + text + "' names no station of the configuration";
+        return;
+    }
+    const auto items = items_of(*asked.station, text.substr(slash + 1));
+    if (!items)
+        asked.wrong =
+            "station '" + asked.station->name + "' has no place '" + text.substr(slash + 1) + '\'';
+    if (!items) return;
+    asked.items = *items;
+    if (asked.count > 1) asked.items.count = static_cast<std::uint32_t>(asked.count);
+    if (asked.items.end() > modbus::kTableItems) asked.wrong = "these items end beyond 65535";
+}
+
+/// A token's role, and what a door gives to those who show nothing.
+void complete(const config::Config& config, Question& asked) {
+    if (!asked.who.token.empty() && config.http) {
+        const auto& tokens = config.http->tokens;
+        const auto token = std::ranges::find(tokens, asked.who.token, &web::Token::name);
+        if (token == tokens.end()) asked.wrong = "there is no token '" + asked.who.token + '\'';
+        if (token != tokens.end() && !asked.has_role) asked.who.role = token->role;
+        asked.has_role = true;
+        if (!asked.has_face) asked.who.face = Face::http;
+    }
+    if (asked.has_role && !asked.has_face && asked.who.certificate_role.empty())
+        asked.who.face = Face::http;
+    if (asked.has_role) return;
+    const bool anonymous = asked.who.face == Face::http && config.http;
+    asked.who.role = anonymous ? config.http->anonymous : Role::operator_;
+}
+
+Question parse(const config::Config& config, const std::string& text) {
+    Question asked;
+    std::istringstream in(text);
+    std::string place;
+    for (std::string word; asked.wrong.empty() && in >> word;) {
+        const std::size_t equals = word.find('=');
+        if (equals != word.npos) {
+            set(asked, word.substr(0, equals), word.substr(equals + 1));
+            continue;
+        }
+        bool is_act = false;
+        for (const Act act : {Act::read, Act::write, Act::broadcast, Act::raw}) {
+            if (word != label(act)) continue;
+            asked.act = act;
+            is_act = true;
+        }
+        if (!is_act) place = word;
+    }
+    if (asked.wrong.empty() && !asked.act) asked.wrong = "it does not say what is done";
+    if (asked.wrong.empty()) find_place(config, place, asked);
+    if (asked.wrong.empty()) complete(config, asked);
+    return asked;
+}
+
+/// The request that REST or a Modbus client would send.
+std::optional<modbus::Request> request_of(const Question& asked) {
+    const Span& items = asked.items;
+    const bool reads = asked.act == Act::read || asked.act == Act::raw;
+    Bytes pdu;
+    if (reads) {
+        pdu = modbus::encode_read(items);
+    } else if (items.table == modbus::Table::coils) {
+        const std::vector<bool> bits(items.count);
+        pdu = items.count == 1
+                  ? modbus::encode_write_coil(static_cast<std::uint16_t>(items.first), false)
+                  : modbus::encode_write_coils(static_cast<std::uint16_t>(items.first), bits);
+    } else if (items.table == modbus::Table::holding_registers) {
+        const std::vector<std::uint16_t> registers(items.count);
+        pdu = items.count == 1
+                  ? modbus::encode_write_register(static_cast<std::uint16_t>(items.first), 0)
+                  : modbus::encode_write_registers(static_cast<std::uint16_t>(items.first),
+                                                   registers);
+    }
+    if (pdu.empty() || items.count > 2000 || (!reads && items.count > 120)) return std::nullopt;
+    auto request = modbus::Request::make(std::move(pdu), modbus::QuantityCheck::wide);
+    if (!request) return std::nullopt;
+    return std::move(*request);
+}
+
+/// What decides before any rule; "" if nothing does.
+std::string decided_before(const Question& asked) {
+    const bool writes = asked.act == Act::write || asked.act == Act::broadcast;
+    if (asked.station->listens) return "line '" + asked.line->name + "' is only listened to";
+    if (writes && asked.station->read_only)
+        return "station '" + asked.station->name + "' is read_only";
+    if (asked.who.face != Face::http) return "";
+    const Role needed = asked.act == Act::read    ? Role::viewer
+                        : asked.act == Act::write ? Role::operator_
+                                                  : Role::engineer;
+    if (asked.who.role >= needed) return "";
+    return "over http this needs the role " + std::string(label(needed)) + ", not " +
+           std::string(label(asked.who.role));
+}
+
+std::string place_in(const std::string& file, const access::Rule& rule) {
+    return file + ':' + std::to_string(rule.line) + ':' + std::to_string(rule.column);
+}
+
+}  // namespace
+
+Explanation explain(const config::Config& config, const std::string& file,
+                    const std::string& question) {
+    const Question asked = parse(config, question);
+    if (!asked.wrong.empty()) return {false, "", asked.wrong + kForm};
+    const auto request = request_of(asked);
+    if (!request) return {false, "", "no request does that to so many items of this table"};
+    if (const std::string why = decided_before(asked); !why.empty())
+        return {false, "denied: " + why, ""};
+    std::optional<modbus::Request> sent;
+    if (asked.station->translate && !asked.station->guard)
+        sent = profile::translate(*asked.station->profile, *request);
+    const bool broadcast = asked.act == Act::broadcast;
+    const access::Verdict verdict = asked.line->access.rules->judge(
+        make_who(asked.who), {.station = broadcast ? std::uint8_t{0} : asked.station->id,
+                              .asked = &*request,
+                              .sent = sent && !broadcast ? &*sent : nullptr,
+                              .raw = asked.act == Act::raw});
+    std::string text = verdict.allowed ? "allowed: " : "denied: ";
+    if (verdict.rule == nullptr) {
+        text += std::string("no rule matches, and the default is ") +
+                (config.access.allow_by_default ? "allow" : "deny") + " (" + file + ')';
+    } else {
+        text += "rule '" + verdict.rule->name + "' (" + place_in(file, *verdict.rule) + ')';
+    }
+    return {verdict.allowed, std::move(text), ""};
+}
+
+}  // namespace panelgate::app

@@ -1,0 +1,202 @@
+#include "rights_text.hpp"
+
+#include <algorithm>
+#include <boost/json/array.hpp>
+#include <boost/json/value.hpp>
+#include <cstddef>
+#include <iterator>
+#include <utility>
+
+#include "panelgate/access/line_rules.hpp"
+#include "panelgate/base/who.hpp"
+
+namespace panelgate::app {
+
+namespace json = boost::json;
+
+namespace {
+
+using access::Act;
+using access::Rule;
+
+constexpr Act kActs[] = {Act::read, Act::write, Act::broadcast, Act::raw};
+
+template <class List, class Word>
+void add(json::object& to, const char* key, const List& list, const Word& word) {
+    if (list.empty()) return;
+    json::array all;
+    for (const auto& one : list) all.emplace_back(word(one));
+    to[key] = std::move(all);
+}
+
+json::object rule_json(const Rule& rule) {
+    const auto same = [](const auto& one) { return json::value(one); };
+    json::object made{{"name", rule.name}};
+    std::vector<Act> acts;
+    std::ranges::copy_if(kActs, std::back_inserter(acts),
+                         [&](Act act) { return rule.acts.has(act); });
+    add(made, rule.allow ? "allow" : "deny", acts, [](Act act) { return json::value(label(act)); });
+    add(made, "from", rule.from, [](const Network& network) {
+        return json::value(network.address + '/' + std::to_string(network.prefix));
+    });
+    add(made, "roles", rule.roles, same);
+    add(made, "tokens", rule.tokens, same);
+    add(made, "faces", rule.faces, [](Face face) { return json::value(label(face)); });
+    add(made, "listeners", rule.listeners, same);
+    add(made, "stations", rule.stations, [](const access::Place& place) {
+        return json::value(place.first + '/' + std::to_string(place.second));
+    });
+    add(made, "functions", rule.functions, same);
+    if (rule.has_range()) made["range"] = rule.range;
+    return made;
+}
+
+/// A way in, and who comes by it.
+struct Door {
+    std::string name;
+    WhoRef who;
+    bool read_only = false;
+    bool is_open = false;  ///< whoever reaches it comes in
+};
+
+Door door(std::string name, Who who) {
+    const bool writes = who.role >= Role::operator_;
+    const bool is_open = who.token.empty();
+    return {std::move(name), make_who(std::move(who)), !writes, is_open};
+}
+
+void add_http(const web::Settings& http, std::vector<Door>& doors) {
+    Who who{.face = Face::http, .listener = http.name(), .role = http.anonymous};
+    if (http.anonymous != Role::none) doors.push_back(door("http " + http.name(), who));
+    for (const web::Token& token : http.tokens) {
+        who.token = token.name;
+        who.role = token.role;
+        doors.push_back(door("http token " + token.name, who));
+    }
+}
+
+/// The networks that rules name: each may be treated in its own way.
+std::vector<Network> networks_of(const access::Settings& settings) {
+    std::vector<Network> all;
+    for (const Rule& rule : settings.rules) {
+        for (const Network& network : rule.from) {
+            if (std::ranges::find(all, network) == all.end()) all.push_back(network);
+        }
+    }
+    return all;
+}
+
+std::vector<Door> doors_of(const config::Config& config) {
+    std::vector<Door> doors;
+    const std::vector<Network> networks = networks_of(config.access);
+    for (const tcp_server::Settings& listener : config.modbus_tcp) {
+        Who who{.face = Face::modbus_tcp, .listener = listener.name(), .role = Role::operator_};
+        const std::string name = "modbus_tcp " + listener.name();
+        doors.push_back(door(name, who));
+        doors.back().read_only = listener.read_only;
+        for (const Network& network : networks) {
+            who.address = network.address;
+            doors.push_back(door(
+                name + " from " + network.address + '/' + std::to_string(network.prefix), who));
+            doors.back().read_only = listener.read_only;
+            doors.back().is_open = false;
+        }
+    }
+    for (const serial_server::Settings& master : config.serial_masters) {
+        doors.push_back(
+            door("serial master " + master.name,
+                 {.face = Face::serial_master, .listener = master.name, .role = Role::operator_}));
+        doors.back().read_only = master.access.read_only;
+    }
+    if (config.http) add_http(*config.http, doors);
+    if (config.mqtt) {
+        doors.push_back(
+            door("mqtt " + config.mqtt->broker(),
+                 {.face = Face::mqtt, .listener = config.mqtt->broker(), .role = Role::operator_}));
+        doors.back().read_only = !config.mqtt->write;
+    }
+    return doors;
+}
+
+/// Where a door's clients may write everything, something and nothing.
+struct Reach {
+    std::vector<std::string> all;
+    std::vector<std::string> some;
+    std::vector<std::string> none;
+};
+
+Reach reach_of(const config::Config& config, const Door& door) {
+    Reach reach;
+    for (const config::Line& line : config.lines) {
+        for (const config::Station& station : line.stations) {
+            const access::LineRules& rules = *line.access.rules;
+            const bool never = door.read_only || station.read_only || station.listens;
+            if (never || !rules.may_some(door.who, station.id, Act::write)) {
+                reach.none.push_back(station.name);
+            } else if (rules.may_all(door.who, station.id, Act::write)) {
+                reach.all.push_back(station.name);
+            } else {
+                reach.some.push_back(station.name);
+            }
+        }
+    }
+    return reach;
+}
+
+std::string words(const std::vector<std::string>& names) {
+    constexpr std::size_t kMost = 12;
+    std::string text;
+    for (std::size_t i = 0; i < names.size() && i < kMost; ++i)
+        text += (i == 0 ? "" : ", ") + names[i];
+    if (names.size() > kMost) text += " and " + std::to_string(names.size() - kMost) + " more";
+    return text;
+}
+
+std::string row(const Reach& reach) {
+    if (reach.all.empty() && reach.some.empty()) return "nowhere";
+    if (reach.some.empty() && reach.none.empty()) return "everywhere";
+    std::string text;
+    if (!reach.all.empty()) text = "all of " + words(reach.all);
+    if (!reach.some.empty()) text += (text.empty() ? "" : "; ") + ("some of " + words(reach.some));
+    if (!reach.none.empty()) text += "; nothing of " + words(reach.none);
+    return text;
+}
+
+}  // namespace
+
+json::object access_json(const config::Config& config) {
+    json::array rules;
+    for (const Rule& rule : config.access.rules) rules.push_back(rule_json(rule));
+    return {{"default", config.access.allow_by_default ? "allow" : "deny"},
+            {"rules", std::move(rules)}};
+}
+
+std::string rights_matrix(const config::Config& config) {
+    if (config.access.is_open()) return "";
+    std::string text = "who may write, by " + std::to_string(config.access.rules.size()) +
+                       " rule(s) of access and else " +
+                       (config.access.allow_by_default ? "allowed" : "denied") + ":\n";
+    for (const Door& door : doors_of(config))
+        text += "  " + door.name + ": " + row(reach_of(config, door)) + '\n';
+    return text;
+}
+
+std::vector<std::string> open_doors(const config::Config& config) {
+    std::vector<std::string> warnings;
+    const bool denies = std::ranges::any_of(config.access.rules, [](const Rule& rule) {
+        return !rule.allow && rule.acts.has(Act::write);
+    });
+    if (!denies || !config.access.allow_by_default) return warnings;
+    for (const Door& door : doors_of(config)) {
+        if (!door.is_open) continue;
+        const Reach reach = reach_of(config, door);
+        if (reach.all.empty()) continue;
+        warnings.push_back("rules deny writes, but any client of " + door.name +
+                           " may write everything to " + words(reach.all) +
+                           ": no rule is about it, and the default is allow; end with a rule "
+                           "without conditions, or set default: deny");
+    }
+    return warnings;
+}
+
+}  // namespace panelgate::app

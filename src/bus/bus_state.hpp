@@ -1,0 +1,147 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "accounts.hpp"
+#include "answers.hpp"
+#include "health_events.hpp"
+#include "line_doctor.hpp"
+#include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/base/pool.hpp"
+#include "panelgate/bus/bus.hpp"
+#include "panelgate/bus/line_history.hpp"
+#include "panelgate/line/line.hpp"
+#include "trace_book.hpp"
+
+namespace panelgate::bus {
+
+/// Also the host of the arbiter's drive.
+struct Bus::State final : public line::Line::Events {
+    struct Pending {
+        AnswerHandler handler;
+        std::uint8_t station = 0;
+        std::uint8_t function = 0;
+        TimePoint arrived;
+        std::optional<WriteRecord> write{};
+        Bytes original_pdu{};      ///< if translated: the client's PDU
+        std::uint8_t sent_as = 0;  ///< ... and the function sent; 0: not translated
+        ClientId client = 0;
+        std::unique_ptr<Refusal> denial{};  ///< by settings that changed while it waited
+    };
+
+    State(boost::asio::any_io_executor e, rt::Clock& c, Settings s, std::unique_ptr<line::Line> l)
+        : executor(std::move(e)),
+          clock(c),
+          settings(std::move(s)),
+          line(std::move(l)),
+          arbiter(settings.arbiter),
+          rights(settings.stations, settings.access),
+          account(settings),
+          departed(settings.clients),
+          doctor(settings),
+          health_events(settings),
+          load(c.now()),
+          refusals(executor, clock),
+          wall(clock),
+          book(settings, wall),
+          answers(executor),
+          drive(clock, *line, arbiter, *this) {}
+
+    void on_up() override;
+    void on_down(const std::string& why) override;
+    void on_bytes(ByteView bytes) override;
+
+    void apply(Settings next, std::unique_ptr<line::Line> other, std::shared_ptr<void> far_end);
+    void adopt(Settings next);
+    /// Refuses what waits and is forbidden by the changed settings (P2).
+    void deny_forbidden(TimePoint now);
+    std::optional<Refusal> judge_again(const arbiter::Job& job, const Pending& entry) const;
+    void schedule_line_change();
+    void change_line();
+    void transact(Request request, AnswerHandler handler);
+    void record_departure(ClientId client);
+    void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
+    void act(arbiter::Transmit& transmit) {
+        line->write(transmit.adu);
+        arbiter.set_latency(line->latency());
+    }
+    void act(arbiter::Finish& finish);
+    void act(arbiter::Note& note) { book.note(std::move(note)); }
+    void act(const arbiter::Exchange& exchange) {
+        book.end(exchange);
+        tell_health(exchange.station);
+    }
+    void act(arbiter::Decision& decision) { book.decide(decision.at, std::move(decision.text)); }
+    void act(arbiter::StationEvent& event);
+    void tell_health(std::uint8_t station);
+    void act(const arbiter::Written& written) {
+        observe(settings,
+                WriteEvent{written.station, written.items, written.ended, written.client});
+    }
+    void act(arbiter::Reset& reset) { line->reset(std::string(reset.why)); }
+    void confirm_end(TimePoint now) {
+        if (arbiter.wants_end(now)) arbiter.on_end(now, line->unsent().value_or(Duration::zero()));
+    }
+    void check_delivery(TimePoint now);
+    void on_deadline(TimePoint now);
+    void settled(TimePoint now) {
+        load.record(now, arbiter.counters().busy);
+        if (up) doctor.look(now, counts());
+        if (calls == 0) answers.deliver();
+        schedule_line_change();
+    }
+    /// Runs a client's call: no answer is delivered before it returns.
+    template <class Verb>
+    void call(Verb verb) {
+        ++calls;
+        verb();
+        --calls;
+    }
+    void answer(Pending pending, Answer answer);
+    void deny(Pending& entry, const Refusal& by);
+    LineCounts counts() const {
+        return {arbiter.station_counters(), arbiter.counters().broadcasts, *line};
+    }
+
+    boost::asio::any_io_executor executor;
+    rt::Clock& clock;
+    Settings settings;
+    std::unique_ptr<line::Line> line;
+    arbiter::Arbiter arbiter;
+    Rights rights;
+    Account account;
+    std::map<std::string, std::uint64_t> denials;  ///< by the name of the rule
+    ClientAccounts clients;
+    DepartedClients departed;
+    LineDoctor doctor;
+    HealthEvents health_events;
+    LoadMeter load;
+    Refusals refusals;
+    Wall wall;
+    TraceBook book;
+    Answers answers;
+    line::Drive<arbiter::Arbiter, State> drive;
+    PoolMap<arbiter::Ticket, Pending> pending;
+    /// A new line that replaces this one as soon as no reply is outstanding.
+    struct Change {
+        Settings settings;
+        std::unique_ptr<line::Line> line;
+        std::vector<std::shared_ptr<void>> far_ends;  ///< of the lines replaced so far
+        bool posted = false;                          ///< change_line() is posted
+    };
+    std::optional<Change> change;
+    std::shared_ptr<bool> alive = std::make_shared<bool>(true);
+    int calls = 0;  ///< clients' calls in progress
+    bool up = false;
+    std::uint64_t up_count = 0;  ///< how often the line came up
+    std::string why_down = "not opened yet";
+};
+
+}  // namespace panelgate::bus

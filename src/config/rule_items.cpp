@@ -1,0 +1,204 @@
+#include "rule_items.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "panelgate/profile/judge.hpp"
+#include "panelgate/profile/notation.hpp"
+#include "tables.hpp"
+
+namespace panelgate::config {
+
+namespace {
+
+using access::Place;
+using access::Rule;
+using modbus::Span;
+using yaml::MapReader;
+using yaml::Node;
+
+constexpr Words<modbus::Table, 4> kTableWords{
+    {{"coils", modbus::Table::coils},
+     {"discrete-inputs", modbus::Table::discrete_inputs},
+     {"input-registers", modbus::Table::input_registers},
+     {"holding-registers", modbus::Table::holding_registers}}};
+
+std::optional<Span> intersection(const Span& items, const profile::AddressRange& range) {
+    const std::uint32_t first = std::max(items.first, range.first);
+    const std::uint32_t end = std::min(items.end(), range.last + 1);
+    if (first >= end) return std::nullopt;
+    return Span{items.table, first, end - first};
+}
+
+void append(std::vector<Span>& to, const std::vector<Span>& more) {
+    for (const Span& span : more) {
+        if (std::ranges::find(to, span) == to.end()) to.push_back(span);
+    }
+}
+
+}  // namespace
+
+std::vector<Span> shown_wholly(const profile::PanelProfile& profile, const Span& items) {
+    constexpr std::uint32_t kBits = profile::kBitsPerWord;
+    std::vector<Span> shown{items};
+    for (const profile::Area& area : profile.areas) {
+        if (!area.reaches(items.table)) continue;
+        const auto part = intersection(items, area.readable);
+        if (!part) continue;
+        if (area.view_of.empty()) {
+            append(shown, profile::shown_as(profile, *part));
+            continue;
+        }
+        std::vector<Span> bits{{area.table, part->first, part->count}};
+        for (const modbus::Table table : area.also)
+            bits.push_back({table, part->first, part->count});
+        append(shown, bits);
+        const profile::Area& words = *profile.find_area(std::string_view(area.view_of));
+        const std::uint32_t first = (part->first + kBits - 1) / kBits;
+        const std::uint32_t end = part->end() / kBits;
+        if (first < end)
+            append(shown, profile::shown_as(profile, {words.table, first, end - first}));
+    }
+    return shown;
+}
+
+namespace {
+
+/// GDT100-GDT199, or one item.
+struct Typed {
+    std::string first;
+    std::string last;
+};
+
+Typed typed_range(const std::string& text) {
+    const std::size_t slash = text.find('/');  // tables have a '-' in their names
+    const std::size_t dash = text.find('-', slash == text.npos ? 0 : slash);
+    if (dash == text.npos) return {text, text};
+    const auto trimmed = [](std::string part) {
+        part.erase(0, part.find_first_not_of(' '));
+        part.erase(part.find_last_not_of(' ') + 1);
+        return part;
+    };
+    return {trimmed(text.substr(0, dash)), trimmed(text.substr(dash + 1))};
+}
+
+/// Returns the items at a station; `why`: what is wrong with them there.
+std::optional<Span> named_items(const profile::PanelProfile& profile, const Typed& typed,
+                                std::string& why) {
+    const auto first = profile::parse_notation(profile, typed.first);
+    const auto last = profile::parse_notation(profile, typed.last);
+    if (!first || !last) {
+        why = (first ? last : first).error().message;
+        return std::nullopt;
+    }
+    if (first->area != last->area || first->address > last->address) {
+        why = "range goes from the first to the last item of one area, such as UW100-UW199";
+        return std::nullopt;
+    }
+    return Span{first->area->table, first->address,
+                static_cast<std::uint32_t>(last->address - first->address) + 1};
+}
+
+bool is_meant(const Rule& rule, const Place& place) {
+    return rule.stations.empty() || std::ranges::find(rule.stations, place) != rule.stations.end();
+}
+
+void add_items(Rule& rule, const Place& place, const profile::PanelProfile& profile,
+               const Span& items) {
+    rule.items[place] =
+        rule.allow ? shown_wholly(profile, items) : profile::shown_as(profile, items);
+}
+
+/// "holding-registers/100-109", as the map of the same is shown.
+std::optional<Span> items_of_table(const Typed& typed) {
+    const std::size_t slash = typed.first.find('/');
+    if (slash == std::string::npos) return std::nullopt;
+    const auto word = std::ranges::find(kTableWords, typed.first.substr(0, slash),
+                                        &decltype(kTableWords)::value_type::first);
+    const bool is_one = typed.first == typed.last;
+    const auto first = yaml::parse_integer(typed.first.substr(slash + 1));
+    const auto last = is_one ? first : yaml::parse_integer(typed.last);
+    if (word == kTableWords.end() || !first || !last || *first < 0 || *last < *first ||
+        *last >= modbus::kTableItems)
+        return std::nullopt;
+    return Span{word->second, static_cast<std::uint32_t>(*first),
+                static_cast<std::uint32_t>(*last - *first) + 1};
+}
+
+void add_everywhere(const Config& config, const Span& items, Rule& rule) {
+    rule.unlisted_items = items;
+    rule.range = std::string(label(items.table)) + '/' + std::to_string(items.first);
+    if (items.count > 1) rule.range += '-' + std::to_string(items.end() - 1);
+    for (const Line& line : config.lines) {
+        for (const Station& station : line.stations) {
+            const Place place{line.name, station.id};
+            if (is_meant(rule, place)) add_items(rule, place, *station.profile, items);
+        }
+    }
+}
+
+void load_notation(Loading& loading, MapReader& in, const std::string& text, Rule& rule) {
+    const Typed typed = typed_range(text);
+    if (const auto items = items_of_table(typed))
+        return add_everywhere(loading.config, *items, rule);
+    std::string wrong;
+    for (const Line& line : loading.config.lines) {
+        for (const Station& station : line.stations) {
+            const Place place{line.name, station.id};
+            if (!is_meant(rule, place)) continue;
+            std::string why;
+            if (const auto items = named_items(*station.profile, typed, why)) {
+                add_items(rule, place, *station.profile, *items);
+            } else if (wrong.empty()) {
+                wrong = "at station '" + station.name + "': " + why;
+            }
+        }
+    }
+    const bool all = rule.items.size() >= rule.stations.size();
+    if (!rule.items.empty() && all) return;
+    if (wrong.empty())
+        wrong =
+            "a notation needs listed stations, whose panels are known; write "
+            "range: {table: holding-registers, address: 100, count: 10}";
+    if (!loading.names_missing) in.problem("range", wrong);
+}
+
+void load_table_range(Loading& loading, const Node& node, Rule& rule) {
+    MapReader in(node, loading.problems, "range",
+                 "{table: holding-registers, address: 100, count: 10}");
+    if (in.required_text("table")) {
+        const auto table = in.choice<modbus::Table>("table", kTableWords);
+        const auto address = in.required_integer("address", 0, modbus::kTableItems - 1);
+        const auto count = in.integer("count", 1, modbus::kTableItems);
+        if (table && address) {
+            Span items{*table, static_cast<std::uint32_t>(*address),
+                       static_cast<std::uint32_t>(count.value_or(1))};
+            items.count = std::min(items.count, modbus::kTableItems - items.first);
+            add_everywhere(loading.config, items, rule);
+        }
+    }
+    in.about("table", "", "Table of the items.", "");
+    in.about("address", "", "Address of the first, from 0.", "");
+    in.about("count", "1", "How many.", "");
+    in.finish();
+}
+
+}  // namespace
+
+void load_range(Loading& loading, MapReader& in, Rule& rule) {
+    in.schema("range").may_be_text = true;
+    const Node* node = in.child("range");
+    if (node != nullptr && node->kind == Node::Kind::map) {
+        if (const Node* map = in.map("range")) load_table_range(loading, *map, rule);
+        return;
+    }
+    const auto text = in.text("range");
+    if (!text) return;
+    rule.range = *text;
+    load_notation(loading, in, *text, rule);
+}
+
+}  // namespace panelgate::config

@@ -1,0 +1,222 @@
+#include "sight.hpp"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "panelgate/base/words.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/points/station_points.hpp"
+#include "panelgate/web/http/query.hpp"
+#include "station_path.hpp"
+
+namespace panelgate::web {
+
+namespace {
+
+using access::Act;
+using modbus::Span;
+
+/// Stands for stations that nobody has listed.
+constexpr std::uint8_t kUnlisted = 0;
+constexpr const char* kHidden = "hidden";
+
+Span whole_table() { return {modbus::Table::holding_registers, 0, modbus::kTableItems}; }
+
+std::string_view denying_rule(const LineEntry& line, const WhoRef& who, std::uint8_t id) {
+    return line.access->judge(who, id, Act::read, modbus::kReadHoldingRegisters, whole_table())
+        .rule_name();
+}
+
+Problem denied(const LineEntry& line, const WhoRef& who, std::uint8_t id,
+               const std::string& station) {
+    return problem_of(bus::Refusal{bus::Rule::denied, station,
+                                   modbus::ExceptionCode::illegal_function,
+                                   std::string(denying_rule(line, who, id))});
+}
+
+}  // namespace
+
+bool Sight::everything() const {
+    return std::ranges::all_of(directory_.lines,
+                               [&](const LineEntry& line) { return whole(line); });
+}
+
+bool Sight::line(const LineEntry& line) const {
+    if (!line.access || line.access->is_open()) return true;
+    bool listed = false;
+    for (const StationEntry& one : directory_.stations) {
+        if (one.line != line.name) continue;
+        if (station(line, one.id)) return true;
+        listed = true;
+    }
+    return !listed && station(line, kUnlisted);
+}
+
+bool Sight::whole(const LineEntry& line) const {
+    if (!line.access || line.access->is_open()) return true;
+    const bool listed = std::ranges::all_of(directory_.stations, [&](const StationEntry& one) {
+        return one.line != line.name || whole(line, one.id);
+    });
+    return listed && whole(line, kUnlisted);
+}
+
+bool Sight::station(const LineEntry& line, std::uint8_t id) const {
+    return !line.access || line.access->may_some(who_, id, Act::read);
+}
+
+bool Sight::station(const StationEntry& one) const {
+    const LineEntry* line = directory_.find_line(one.line);
+    return line == nullptr || station(*line, one.id);
+}
+
+bool Sight::whole(const LineEntry& line, std::uint8_t id) const {
+    return !line.access || line.access->reads_all(who_, id);
+}
+
+bool Sight::point(const StationEntry& station, const points::Point& point) const {
+    const LineEntry* line = directory_.find_line(station.line);
+    if (line == nullptr || !line->access) return true;
+    return line->access
+        ->judge(who_, station.id, Act::read, modbus::read_function(point.table),
+                Span{point.table, point.address, point.count()})
+        .allowed;
+}
+
+const StationEntry* Sight::find(std::string_view line, std::string_view station) const {
+    const auto found = std::ranges::find_if(directory_.stations, [&](const StationEntry& one) {
+        return one.name == station && (line.empty() || one.line == line);
+    });
+    return found == directory_.stations.end() ? nullptr : &*found;
+}
+
+bool Sight::named(std::string_view line_name, std::string_view station_name,
+                  std::string_view point_name) const {
+    if (line_name.empty()) return true;
+    const LineEntry* on = directory_.find_line(line_name);
+    if (on == nullptr || !line(*on)) return on == nullptr && everything();
+    if (station_name.empty() || station_name == kAllStations) return true;
+    const StationEntry* one = find(line_name, station_name);
+    if (one == nullptr)
+        return station(*on, to_number<std::uint8_t>(station_name).value_or(kUnlisted));
+    if (point_name.empty() || one->points == nullptr) return station(*one);
+    const auto& all = one->points->points();
+    const auto at = std::ranges::find(all, point_name, &points::Point::name);
+    return at == all.end() ? whole(*on, one->id) : point(*one, *at);
+}
+
+bool Sight::event(const EventTopic& topic) const {
+    if (!topic.station.empty()) return named(topic.line, topic.station, topic.point);
+    const LineEntry* on = directory_.find_line(topic.line);
+    // Its text may name any of the line's stations.
+    return on == nullptr ? everything() : whole(*on);
+}
+
+void Sight::mask(const LineEntry& line, bus::TracePart& part) const {
+    if (whole(line)) return;
+    for (bus::TraceFrame& frame : part.frames) {
+        const bool may_be_anybodys = direction_of(frame.kind) == FrameDirection::discarded;
+        if (!may_be_anybodys && !frame.bytes.empty() && frame.bytes.front() != 0 &&
+            whole(line, frame.bytes.front()))
+            continue;
+        frame.bytes.clear();
+        frame.why.clear();
+    }
+    for (bus::TraceDecision& decision : part.decisions) decision.text = kHidden;
+    for (bus::TraceTransaction& one : part.transactions) {
+        std::erase_if(one.discarded, [](const auto&) { return true; });
+        if (one.station != 0 && whole(line, one.station)) continue;
+        one.request.clear();
+        one.reply.clear();
+        one.client.clear();
+        one.reason = kHidden;
+        if (!station(line, one.station)) one.station = 0;
+    }
+}
+
+void Sight::mask(const LineEntry& line, bus::IncidentHead& incident) const {
+    if (!incident.station || station(line, *incident.station)) return;
+    incident.station.reset();
+    incident.cause = kHidden;
+}
+
+namespace {
+
+/// /api/v1/lines/{line}/...
+std::optional<Problem> check_line(const HttpRequest& request, const Directory& directory,
+                                  const Sight& sight) {
+    const LineEntry* line = directory.find_line(request.path[3]);
+    if (line == nullptr || request.method == "POST") return std::nullopt;
+    const bool discovers = request.path.size() > 4 && request.path[4] == "discover";
+    if (discovers ? sight.whole(*line) : sight.line(*line)) return std::nullopt;
+    return denied(*line, request.caller->who(), kUnlisted, "");
+}
+
+/// What the gateway knows of a station; what is asked of the panel is judged by its bus.
+std::optional<Problem> check_station(const HttpRequest& request, const Directory& directory,
+                                     const Sight& sight) {
+    const auto station = directory.find_station(request.path[3]);
+    if (!station) return std::nullopt;
+    const LineEntry* on = directory.find_line(station->line);
+    if (on == nullptr) return std::nullopt;
+    const LineEntry& line = *on;
+    const bool is_plan = request.path.size() == 7;
+    const bool has_points = request.path.size() > 4 && request.path[4] == "points";
+    if (request.path.size() > 5 && !is_plan && !has_points) return std::nullopt;
+    bool seen = sight.station(line, station->id);
+    if (has_points && request.path.size() > 5 && station->points != nullptr) {
+        const auto& all = station->points->points();
+        const auto point = std::ranges::find(all, request.path[5], &points::Point::name);
+        if (point != all.end()) seen = sight.point(*station, *point);
+    }
+    if (seen) return std::nullopt;
+    return denied(line, request.caller->who(), station->id, station->name);
+}
+
+}  // namespace
+
+std::optional<Problem> check_sight(const HttpRequest& request, const Directory& directory) {
+    const auto& path = request.path;
+    if (path.size() < 4 || path[0] != "api" || !request.caller) return std::nullopt;
+    const Sight sight(directory, request.caller->who());
+    if (path[2] == "lines") return check_line(request, directory, sight);
+    const bool reads = request.method == "GET" || request.method == "HEAD";
+    if (path[2] == "simulator" || (path[2] == "stations" && reads))
+        return check_station(request, directory, sight);
+    return std::nullopt;
+}
+
+namespace {
+
+/// The value of a label in a line of the exposition; names have no quotes. "" if it has none.
+std::string_view label_in(std::string_view line, std::string_view name) {
+    for (const char before : {'{', ','}) {
+        const std::string wanted = before + std::string(name) + "=\"";
+        const auto at = line.find(wanted);
+        if (at == line.npos) continue;
+        const std::string_view rest = line.substr(at + wanted.size());
+        return rest.substr(0, rest.find('"'));
+    }
+    return "";
+}
+
+bool is_seen(std::string_view line, const Sight& sight) {
+    if (line.starts_with('#')) return true;
+    if (!label_in(line, "relay").empty()) return false;
+    return sight.named(label_in(line, "line"), label_in(line, "station"), label_in(line, "point"));
+}
+
+}  // namespace
+
+std::string seen_metrics(std::string_view text, const Sight& sight) {
+    std::string seen;
+    while (!text.empty()) {
+        const auto end = std::min(text.find('\n'), text.size() - 1) + 1;
+        const std::string_view line = text.substr(0, end);
+        if (is_seen(line, sight)) seen += line;
+        text.remove_prefix(end);
+    }
+    return seen;
+}
+
+}  // namespace panelgate::web

@@ -1,0 +1,231 @@
+"""Who may do what: rules of access over all faces, and what a viewer of one station sees."""
+import contextlib
+import http.client
+import json
+import pathlib
+import subprocess
+import tempfile
+import threading
+import unittest
+
+import config
+import harness
+import mqtt_side
+from harness import read_registers, write_register
+from openapi import Document
+from test_points import until
+
+STATIONS = """
+      {id: 31, name: press, profile: autonics-gplp-s, points: [
+        {name: warmth, at: UW200, every: 50ms}, {name: mode, at: UW105, writable: true, every: 50ms}]},
+      {id: 20, name: oven, profile: panasonic-gt, points: [
+        {name: secret-heat, at: GDT100, every: 50ms}, {name: hidden-mode, at: GDT101, writable: true, every: 50ms}]}"""
+RULES = """{default: allow, rules: [
+  {name: eye-sees-press, allow: [read], tokens: [eye], stations: [press]},
+  {name: eye-sees-no-more, deny: [read, write, broadcast, raw], tokens: [eye]},
+  {name: setpoints, allow: [write], faces: [modbus_tcp], stations: [press], range: UW100-UW109},
+  {name: no-modbus-writes, deny: [write, broadcast], faces: [modbus_tcp]},
+  {name: nobody-broadcasts, deny: [broadcast], roles: [engineer]}]}"""
+# Names, ids and places of what the viewer may not see.
+OTHERS = ("oven", "secret-heat", "hidden-mode", "GDT", "panasonic")
+ILLEGAL = b"\x01"
+
+
+@contextlib.contextmanager
+def plant(rules=RULES):
+    with tempfile.TemporaryDirectory() as folder:
+        tokens = []
+        for name, role in (("eye", "viewer"), ("lab", "engineer")):
+            file = pathlib.Path(folder) / name
+            file.write_text(f"token-of-{name}-0123456789")
+            file.chmod(0o600)
+            tokens.append(f"{{name: {name}, role: {role}, file: {file}}}")
+        door = config.ADMIN + f", tokens: [{', '.join(tokens)}]"
+        text = config.gateway(config.line(stations=STATIONS.strip()), http=door, access=rules)
+        file = pathlib.Path(folder) / "panelgate.yaml"
+        file.write_text(text)
+        with harness.Program("run", "-c", str(file)) as program:
+            program.file = file
+            program.http_port()  # the last that it opens
+            until(lambda: ask(program, "GET", "/api/v1/stations/oven/points/secret-heat")[1].find('"good"') > 0)
+            yield program
+
+
+def ask(program, method, path, token=None, body=None):
+    """(status, text)"""
+    connection = http.client.HTTPConnection("127.0.0.1", program.http_port(), timeout=harness.PATIENCE)
+    headers = {"Authorization": f"Bearer token-of-{token}-0123456789"} if token else {}
+    connection.request(method, path, json.dumps(body) if body is not None else None, headers)
+    response = connection.getresponse()
+    text = response.read().decode(errors="replace")
+    connection.close()
+    return response.status, text
+
+
+def frames(program):
+    """What has been sent for clients."""
+    transactions = program.get("/api/v1/lines/floor1/trace?last=500")[1]["transactions"]
+    return [one for one in transactions if one["reason"] in ("write", "broadcast", "read")]
+
+
+class Rules(unittest.TestCase):
+    def test_a_refused_request_is_01_or_403_with_the_rule_counted_logged_and_never_sent(self):
+        with plant() as program, program.client() as client:
+            before = len(frames(program))
+            refused = (write_register(110, 7), bytes.fromhex("10 0069 0006 0C") + bytes(12),
+                       bytes.fromhex("17 0000 0001 006E 0001 02 0001"), bytes.fromhex("05 06E0 FF00"))
+            for pdu in refused:
+                self.assertEqual(client.ask(31, pdu), bytes([pdu[0] | 0x80]) + ILLEGAL, pdu.hex())
+            self.assertEqual(client.ask(20, write_register(100, 1)), b"\x86" + ILLEGAL, "another station")
+            self.assertEqual(client.ask(0, write_register(105, 1)), b"\x86" + ILLEGAL, "a broadcast")
+            self.assertEqual(len(frames(program)), before, "nothing of it was sent")
+            status, text = ask(program, "POST", "/api/v1/lines/floor1/broadcast", "lab",
+                               {"table": "holding-registers", "address": 100, "values": [1]})
+            self.assertEqual((status, json.loads(text)["rule"]), (403, "nobody-broadcasts"))
+            self.assertFalse(json.loads(text)["transmitted"])
+            self.assertEqual(len(frames(program)), before)
+            metrics = ask(program, "GET", "/metrics")[1]
+            self.assertIn('panelgate_access_denied_total{rule="no-modbus-writes"} 6', metrics)
+            self.assertIn('panelgate_access_denied_total{rule="nobody-broadcasts"} 1', metrics)
+            self.assertIn('panelgate_access_denied_total{rule="default"} 0', metrics)
+        self.assertIn("rule=no-modbus-writes", program.log.text())
+
+    def test_what_is_allowed_passes_by_the_same_rules(self):
+        with plant() as program, program.client() as client:
+            self.assertEqual(client.ask(31, write_register(105, 7))[0], 6)
+            self.assertEqual(client.ask(20, read_registers(100))[0], 3)
+            self.assertEqual(ask(program, "PUT", "/api/v1/stations/press/points/mode", "lab", {"value": 3})[0], 200)
+            self.assertEqual(ask(program, "PUT", "/api/v1/stations/oven/points/hidden-mode", None, {"value": 3})[0], 200)
+
+    def test_nobody_is_answered_from_anothers_read(self):
+        with plant() as program:
+            def read(token, statuses):
+                for _ in range(30):
+                    statuses.append(ask(program, "GET", "/api/v1/stations/oven/devices/GDT100", token)[0])
+            may, may_not = [], []
+            threads = [threading.Thread(target=read, args=("lab", may)), threading.Thread(target=read, args=("eye", may_not))]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+            self.assertEqual((set(may), set(may_not)), ({200}, {403}))
+            items = {"items": [{"point": "press/warmth"}, {"station": "oven", "device": "GDT100"}, {"point": "oven/secret-heat"}]}
+            answer = json.loads(ask(program, "POST", "/api/v1/read", "eye", items)[1])
+            self.assertEqual([one["status"] for one in answer["results"]], [200, 403, 403], answer)
+
+
+class Viewer(unittest.TestCase):
+    """Of one station of two."""
+
+    def test_no_path_of_the_document_shows_another_station(self):
+        with plant() as program:
+            document = Document(json.loads(ask(program, "GET", "/openapi.json")[1]))
+            values = {"line": "floor1", "station": "oven", "point": "secret-heat", "table": "holding-registers",
+                      "address": "100", "notation": "GDT100", "incident": "1", "id": "1"}
+            asked = 0
+            for (verb, pattern), operation in document.operations().items():
+                if pattern.startswith(("/docs", "/page", "/openapi.json")) or pattern in ("/", "/api/v1/events"):
+                    continue  # they hold no data; events have a test of their own
+                path = "/".join(values.get(part[1:-1], "1") if part.startswith("{") else part for part in pattern.split("/"))
+                for suffix in ("", "?last=500") if pattern.endswith("trace") else ("",):
+                    status, text = ask(program, verb, path + suffix, "eye", {} if verb in ("PUT", "POST") else None)
+                    asked += 1
+                    if "{station}" in pattern or "{point}" in pattern:
+                        self.assertIn(status, (403, 400, 404, 409), (verb, path, text))
+                        text = text.replace("'oven'", "").replace("no point", "")  # what it has said itself
+                    for word in OTHERS:
+                        self.assertNotIn(word, text.replace(path, ""), f"{verb} {path} -> {status}")
+            self.assertGreater(asked, 30)
+
+    def test_lists_metrics_and_trace_have_the_one(self):
+        with plant() as program:
+            names = [one["name"] for one in json.loads(ask(program, "GET", "/api/v1/stations", "eye")[1])["stations"]]
+            self.assertEqual(names, ["press"])
+            points = json.loads(ask(program, "GET", "/api/v1/points", "eye")[1])["points"]
+            self.assertEqual({one["station"] for one in points}, {"press"})
+            metrics = ask(program, "GET", "/metrics", "eye")[1]
+            self.assertIn('station="press"', metrics)
+            self.assertNotIn("oven", metrics)
+            self.assertIn("oven", ask(program, "GET", "/metrics")[1])
+            settings = json.loads(ask(program, "GET", "/api/v1/configuration", "eye")[1])
+            self.assertEqual([one["name"] for one in settings["configuration"]["lines"][0]["stations"]], ["press"])
+            self.assertEqual(settings["role"], "viewer")
+            trace = json.loads(ask(program, "GET", "/api/v1/lines/floor1/trace?last=200", "eye")[1])
+            self.assertEqual({one["station"] for one in trace["transactions"]}, {31, 0})
+            for one in trace["transactions"]:
+                self.assertEqual(one["request"] == "", one["station"] == 0, "that something was there, not what")
+            self.assertLessEqual({one["station"] for one in trace["frames"]}, {31, None})
+
+    def test_events_are_of_the_one(self):
+        with plant() as program:
+            seen = {}
+            for token in ("eye", "lab"):
+                command = ["curl", "-sN", "--max-time", "3", "-H", f"Authorization: Bearer token-of-{token}-0123456789",
+                           program.url("/api/v1/events")]
+                seen[token] = subprocess.run(command, capture_output=True, check=False).stdout.decode()
+            self.assertIn("oven", seen["lab"])
+            self.assertIn("press", seen["eye"])
+            self.assertNotIn("oven", seen["eye"])
+
+    def test_another_file_changes_what_is_seen_and_nobody_loses_a_stream(self):
+        with plant() as program:
+            self.assertEqual(ask(program, "GET", "/api/v1/stations/oven", "eye")[0], 403)
+            file = program.file
+            file.write_text(file.read_text().replace("tokens: [eye], stations: [press]", "tokens: [eye]"))
+            self.assertEqual(ask(program, "POST", "/api/v1/reload")[0], 200)
+            self.assertEqual(ask(program, "GET", "/api/v1/stations/oven", "eye")[0], 200)
+            status, text = ask(program, "POST", "/api/v1/reload", None, {"rollback": True})
+            self.assertEqual((status, json.loads(text)["weaker"]), (409, ["access: rule eye-sees-press is another"]))
+            self.assertEqual(ask(program, "POST", "/api/v1/reload", None, {"rollback": True, "weaker": True})[0], 200)
+            self.assertEqual(ask(program, "GET", "/api/v1/stations/oven", "eye")[0], 403)
+
+
+@unittest.skipUnless(mqtt_side.BROKER and mqtt_side.paho, "needs mosquitto and python3-paho-mqtt")
+class Mqtt(unittest.TestCase):
+    def test_publishes_what_a_rule_lets_it_read_and_answers_what_it_denies(self):
+        rules = """\naccess: {rules: [
+          {name: ramp-is-secret, deny: [read], faces: [mqtt], range: UW201},
+          {name: mode-is-fixed, deny: [write], faces: [mqtt], range: UW105}]}\n"""
+        with mqtt_side.Broker() as broker, mqtt_side.Listener(broker) as listener:
+            with harness.configured(mqtt_side.plant(broker, more=", write: points") + rules) as program:
+                topic = f"{mqtt_side.TOPIC}/press"
+                listener.wait_for(f"{topic}/level")
+                listener.wait_for(f"{topic}/mode")
+                listener.publish(f"{topic}/mode/set", b"1")
+                said = listener.wait_for(f"{topic}/mode/set/result")
+                self.assertEqual((said["ok"], said["status"], said["rule"]), (False, 403, "mode-is-fixed"))
+                listener.publish(f"{topic}/level/set", b"33")
+                self.assertTrue(listener.wait_for(f"{topic}/level/set/result")["ok"])
+                self.assertEqual(listener.of(f"{topic}/ramp"), [])
+                self.assertIn('rule="mode-is-fixed"} 1', program.get("/metrics")[1])
+
+
+class Explain(unittest.TestCase):
+    def test_names_the_rule_with_file_and_line(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            file.write_text(config.gateway(config.line(stations=STATIONS.strip()), access="""
+  default: allow
+  rules:
+    - {name: near-setpoints, allow: [write], from: [10.0.0.0/24], range: UW100-UW109}
+    - {name: no-writes, deny: [write], roles: [operator]}
+"""))
+            rows = (("from=10.0.0.7 role=operator write press/UW102", 0, "allowed: rule 'near-setpoints'"),
+                    ("from=10.0.0.7 role=operator write press/UW110", 1, "denied: rule 'no-writes'"),
+                    ("from=10.0.0.7 count=3 write press/UW108", 1, "denied: rule 'no-writes'"),
+                    ("from=10.0.1.7 write press/mode", 1, "denied: rule 'no-writes'"),
+                    ("read oven/GDT100", 0, "allowed: no rule matches, and the default is allow"),
+                    ("role=viewer write oven/GDT100", 1, "denied: over http this needs the role operator"),
+                    ("write nobody/UW1", 64, ""), ("role=operator press/UW102", 64, ""))
+            for question, code, text in rows:
+                done = harness.run("check", "-c", file, "--explain", question)
+                self.assertEqual(done.returncode, code, (question, done.stdout, done.stderr))
+                self.assertIn(text, done.stdout, question)
+                if "rule '" in text:
+                    self.assertRegex(done.stdout, r"panelgate\.yaml:\d+:\d+\)")
+            text = harness.run("check", "-c", file).stdout
+            self.assertIn("who may write, by 2 rule(s) of access and else allowed:", text)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,119 @@
+// Rules of access at the bus: before cache, joining and sharing, and again when they change.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bus_case.hpp"
+#include "panelgate/access/line_rules.hpp"
+#include "panelgate/rt/log.hpp"
+#include "support/hex.hpp"
+#include "support/request.hpp"
+
+namespace panelgate::bus::bus_access_test {
+namespace {
+
+using access::Act;
+
+const WhoRef kOperator =
+    make_who({.face = Face::http, .name = "http ops", .role = Role::operator_});
+const WhoRef kViewer = make_who({.face = Face::http, .name = "http eye", .role = Role::viewer});
+
+/// Viewers read nothing of 17; nobody writes register 1.
+class BusAccessTest : public BusCase {
+  protected:
+    BusAccessTest() {
+        access::Rule blind{.name = "blind", .acts = {Act::read}, .roles = {"viewer"}};
+        blind.stations = {{"floor1", 17}};
+        access::Rule fixed{.name = "fixed", .acts = {Act::write}};
+        fixed.range = "holding-registers/1";
+        fixed.unlisted_items = modbus::Span{modbus::Table::holding_registers, 1, 1};
+        rules.rules = {blind, fixed};
+        use_rules();
+        start_bus();
+    }
+    void use_rules() {
+        settings.access = std::make_shared<const access::LineRules>(
+            std::make_shared<const access::Settings>(rules), "floor1",
+            std::vector<std::uint8_t>{17});
+    }
+    Answer ask_as(WhoRef asker, std::uint8_t station, const Bytes& pdu) {
+        who = std::move(asker);
+        return ask(station, pdu);
+    }
+    static std::string rule_of(const Answer& answer) {
+        return answer.refusal ? answer.refusal->why : "";
+    }
+
+    access::Settings rules;
+};
+
+TEST_F(BusAccessTest, WhatARuleDeniesIsRefusedWithItsNameCountedAndNeverSent) {
+    const rt::LogTap log;
+    const Answer write = ask_as(kOperator, 17, kWrite);
+    EXPECT_EQ(end_of(write), "denied");
+    EXPECT_EQ(write.refusal.value().rule, Rule::denied);
+    EXPECT_EQ(rule_of(write), "fixed");
+    EXPECT_EQ(rule_of(ask_as(kOperator, 0, kWrite)), "fixed") << "a broadcast writes it, too";
+    EXPECT_EQ(rule_of(ask_as(kViewer, 17, kRead)), "blind");
+    EXPECT_TRUE(line->written.empty());
+    const auto denials = bus->report().denials;
+    EXPECT_EQ(denials.at("fixed"), 2u);
+    EXPECT_EQ(denials.at("blind"), 1u);
+    EXPECT_EQ(denials.at("default"), 0u) << "what may refuse is there from the start";
+    EXPECT_GE(log.count("client=\"http ops\""), 1u);
+    EXPECT_GE(log.count("rule=fixed"), 1u);
+    EXPECT_TRUE(ask_as(kOperator, 17, kRead).pdu.has_value());
+}
+
+TEST_F(BusAccessTest, P6NobodyIsAnsweredFromAReadThatHeMayNotMake) {
+    std::vector<Answer> allowed;
+    std::vector<Answer> denied;
+    who = kOperator;
+    send(17, kRead, allowed);
+    send(17, kRead, allowed);
+    who = kViewer;
+    send(17, kRead, denied);
+    ASSERT_TRUE(run_until([&] { return allowed.size() == 2 && denied.size() == 1; }));
+    EXPECT_EQ(rule_of(denied[0]), "blind");
+    EXPECT_TRUE(allowed[0].pdu.has_value());
+    EXPECT_TRUE(allowed[1].pdu.has_value());
+}
+
+TEST_F(BusAccessTest, P2WhatWaitsIsJudgedAgainWhenTheRulesChange) {
+    std::vector<Answer> answers;
+    who = kOperator;
+    send(17, kRead, answers);  // keeps the line busy
+    send(17, "06 00 02 00 01"_hex, answers);
+    send(18, kRead, answers);
+    rules.rules.insert(rules.rules.begin(), access::Rule{.name = "closed", .acts = {Act::write}});
+    use_rules();
+    bus->apply(settings, nullptr, nullptr);
+    ASSERT_TRUE(run_until([&] { return answers.size() == 3; }));
+    EXPECT_EQ(std::ranges::count(answers, std::string("closed"), rule_of), 1);
+    EXPECT_EQ(bus->report().denials.at("closed"), 1u);
+    EXPECT_EQ(std::ranges::count(answers, true, &Answer::transmitted), 2) << "the reads";
+}
+
+TEST_F(BusAccessTest, SaysWhatItWouldRefuseToThoseWhoAskOtherLinesAsWell) {
+    Request broadcast{.station = 0, .request = test::request_of(kWrite), .who = kOperator};
+    EXPECT_EQ(bus->refusal_of(broadcast).value().why, "fixed");
+    broadcast.request = test::request_of("06 00 02 00 01"_hex);
+    EXPECT_EQ(bus->refusal_of(broadcast), std::nullopt);
+    const std::uint64_t before = bus->report().denials.at("fixed");
+    bus->count_refused(0, kWrite, kOperator);
+    EXPECT_EQ(bus->report().denials.at("fixed"), before + 1);
+}
+
+TEST_F(BusAccessTest, TheGatewaysOwnRequestsAreNotJudged) {
+    EXPECT_TRUE(ask_as(own_task("poll of press"), 17, kRead).pdu.has_value());
+    who = own_task("relay");
+    line->reply = kWrite;
+    EXPECT_TRUE(ask(17, kWrite).pdu.has_value());
+}
+
+}  // namespace
+}  // namespace panelgate::bus::bus_access_test
