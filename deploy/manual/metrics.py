@@ -15,13 +15,14 @@ FULL = """lines:
 serial_masters: [{name: plc, device: /dev/panelgate-none, serial: {baud: 9600}, lines: [floor1]}]
 mqtt: {broker: "mqtt://127.0.0.1:1"}
 http: {listen: "127.0.0.1:0"}
-access: {rules: [{name: no-writes, deny: [write]}]}
 audit: {file: /dev/shm/panelgate-manual-none/audit.jsonl}
+access: {rules: [{name: no-writes, deny: [write]}]}
 """
 # What neither has: its labels, and what it takes.
 OTHERS = {"panelgate_findings": "line, station, cause", "panelgate_framing_errors_total": "line",
           "panelgate_parity_errors_total": "line", "panelgate_overruns_total": "line",
-          "panelgate_breaks_total": "line", "panelgate_tls_handshakes_total": "listener, outcome",
+          "panelgate_breaks_total": "line",
+          "panelgate_token_last_use_timestamp_seconds": "token", "panelgate_tls_handshakes_total": "listener, outcome",
           "panelgate_certificate_expiry_timestamp_seconds": "listener"}
 # What a program that was built outside of a repository would not have.
 LABELS = {"panelgate_build_info": "version, commit, compiler"}

@@ -11,8 +11,8 @@ enum ExitCode : int {
     kCut = 1,       ///< a second signal came: outstanding requests were not answered
     kNotReady = 1,  ///< health: /readyz is not 200
     kNotSet = 1,    ///< config get: the key is not set
-    kDenied = 1,    ///< check --explain: the request is denied
     kNo = 1,        ///< audit: the chain is not whole; no such record
+    kDenied = 1,    ///< check --explain: the request is denied
     kUsage = 64,
     kNoInput = 66,
     kUnavailable = 69,

@@ -110,8 +110,8 @@ config::Config but_equal_lines(const config::Config& config, const config::Confi
     made.mqtt = config.mqtt;
     made.log = config.log;
     made.realtime = config.realtime;
-    made.access = config.access;
     made.audit = config.audit;
+    made.access = config.access;
     for (const config::Line& line : config.lines) {
         if (std::ranges::find(other.lines, line) == other.lines.end()) made.lines.push_back(line);
     }

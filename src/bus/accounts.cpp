@@ -116,8 +116,8 @@ void complete(WriteRecord& write, const Answer& answer) {
     write.transaction = answer.transactions.last();
     if (answer.pdu && !answer.refusal) write.exception = modbus::exception_of(*answer.pdu);
     if (!answer.refusal) return;
-    const Rule rule = answer.refusal->rule;
-    write.rule = rule == Rule::denied ? answer.refusal->why : std::string(label(rule));
+    write.denied = answer.refusal->rule == Rule::denied;
+    write.rule = write.denied ? answer.refusal->why : std::string(label(answer.refusal->rule));
 }
 
 void log_write(const Settings& settings, std::uint8_t station, const WriteRecord& write,
@@ -138,7 +138,7 @@ void log_write(const Settings& settings, std::uint8_t station, const WriteRecord
     fields.push_back({"outcome", ended});
     const std::string transaction = std::to_string(write.transaction);
     if (write.transaction != 0) fields.push_back({"transaction", transaction});
-    if (!write.rule.empty()) fields.push_back({"rule", write.rule});
+    if (write.denied) fields.push_back({"rule", write.rule});
     if (!accepted) return rt::log_collapsed("write", place + ' ' + client, fields);
     rt::log_each("write", place, client + ' ' + pdu + ' ' + ended, fields);
 }

@@ -36,7 +36,9 @@ struct WriteRecord {
     /// The last transaction made for it, as in the trace; 0: none.
     arbiter::Transaction transaction = 0;
     std::optional<std::uint8_t> exception{};  ///< the panel's
-    std::string rule{};  ///< what refused it: a rule of `access` by its name, or a bus::Rule
+    /// What refused it: a rule of `access` by its name, or the label of another Rule.
+    std::string rule{};
+    bool denied = false;  ///< by a rule of `access`
 };
 
 /// Returns nullopt for reads.

@@ -19,10 +19,10 @@ std::string_view label(Rule rule) {
             return "listen";
         case Rule::write_protected:
             return "read-only";
-        case Rule::denied:
-            return "denied";
         case Rule::unrecorded:
             return "audit";
+        case Rule::denied:
+            return "denied";
     }
     std::abort();
 }

@@ -81,10 +81,10 @@ void load_modbus_tcp(Loading& loading, yaml::MapReader& root);
 void load_serial_masters(Loading& loading, yaml::MapReader& root);
 void load_http(Loading& loading, yaml::MapReader& root);
 void load_mqtt(Loading& loading, yaml::MapReader& root);
+void load_audit(Loading& loading, yaml::MapReader& root);
 /// Needs lines, servers and masters loaded: rules name them.
 void load_rules(Loading& loading, yaml::MapReader& root);
 /// Gives each line its rules.
 void apply_rules(Config& config);
-void load_audit(Loading& loading, yaml::MapReader& root);
 
 }  // namespace panelgate::config

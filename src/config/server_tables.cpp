@@ -300,6 +300,28 @@ const Keys<mqtt::Settings>& mqtt_keys() {
     return kKeys;
 }
 
+const Keys<audit::Settings>& audit_keys() {
+    using audit::OnFailure;
+    using audit::Settings;
+    static constexpr Words<OnFailure, 2> kFailures{
+        {{"continue", OnFailure::keep_on}, {"refuse_writes", OnFailure::refuse_writes}}};
+    static const auto kKeys =
+        Keys<Settings>()
+            .other("file",
+                   "File that is written; full ones beside it have a number behind the name.",
+                   [](const Settings& settings) { return settings.file; })
+            .other("rotate", "Size of a file, such as 50MiB; then the next one begins.",
+                   [](const Settings& settings) { return size_text(settings.rotate); })
+            .initially("50MiB")
+            .integer("keep", &Settings::keep, 1, 10'000, "Full files that are kept.")
+            .word("on_failure", &Settings::on_failure, kFailures,
+                  "What happens while the disk takes nothing: continue, which may lose records, or "
+                  "refuse_writes (exception 06).")
+            .boolean("syslog", &Settings::syslog,
+                     "Each record goes to the machine's syslog as well (/dev/log, RFC 5424).");
+    return kKeys;
+}
+
 namespace {
 
 template <class List>
@@ -366,28 +388,6 @@ const Keys<access::Rule>& rule_keys() {
                    "TABLE/FIRST-LAST, or a map. Functions without items are among them only where "
                    "`functions` names them.",
                    [](const Rule& rule) { return rule.range; });
-    return kKeys;
-}
-
-const Keys<audit::Settings>& audit_keys() {
-    using audit::OnFailure;
-    using audit::Settings;
-    static constexpr Words<OnFailure, 2> kFailures{
-        {{"continue", OnFailure::keep_on}, {"refuse_writes", OnFailure::refuse_writes}}};
-    static const auto kKeys =
-        Keys<Settings>()
-            .other("file",
-                   "File that is written; full ones beside it have a number behind the name.",
-                   [](const Settings& settings) { return settings.file; })
-            .other("rotate", "Size of a file, such as 50MiB; then the next one begins.",
-                   [](const Settings& settings) { return size_text(settings.rotate); })
-            .initially("50MiB")
-            .integer("keep", &Settings::keep, 1, 10'000, "Full files that are kept.")
-            .word("on_failure", &Settings::on_failure, kFailures,
-                  "What happens while the disk takes nothing: continue, which may lose records, or "
-                  "refuse_writes (exception 06).")
-            .boolean("syslog", &Settings::syslog,
-                     "Each record goes to the machine's syslog as well (/dev/log, RFC 5424).");
     return kKeys;
 }
 

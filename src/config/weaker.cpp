@@ -270,6 +270,20 @@ void compare_mqtt(Lines& all, const Config& running, const Config& next) {
     if (!running.mqtt || !running.mqtt->write) all.emplace_back("mqtt: write false -> true");
 }
 
+void compare_audit(Lines& all, const Config& running, const Config& next) {
+    if (!running.audit) return;
+    if (!next.audit) {
+        all.emplace_back("audit: is switched off");
+        return;
+    }
+    if (next.audit->file != running.audit->file)
+        all.push_back("audit: file " + running.audit->file + " -> " + next.audit->file);
+    if (next.audit->on_failure < running.audit->on_failure)
+        all.emplace_back("audit: on_failure refuse_writes -> continue");
+    if (next.audit->keep * next.audit->rotate < running.audit->keep * running.audit->rotate)
+        all.emplace_back("audit: keeps less");
+}
+
 /// The same for its rule, wherever it stands in its file.
 bool is_same(access::Rule one, access::Rule other) {
     one.line = other.line = one.column = other.column = 0;
@@ -302,20 +316,6 @@ void compare_rules(Lines& all, const access::Settings& running, const access::Se
     if (order != kept) all.emplace_back("access: the rules have another order");
 }
 
-void compare_audit(Lines& all, const Config& running, const Config& next) {
-    if (!running.audit) return;
-    if (!next.audit) {
-        all.emplace_back("audit: is switched off");
-        return;
-    }
-    if (next.audit->file != running.audit->file)
-        all.push_back("audit: file " + running.audit->file + " -> " + next.audit->file);
-    if (next.audit->on_failure < running.audit->on_failure)
-        all.emplace_back("audit: on_failure refuse_writes -> continue");
-    if (next.audit->keep * next.audit->rotate < running.audit->keep * running.audit->rotate)
-        all.emplace_back("audit: keeps less");
-}
-
 }  // namespace
 
 std::vector<std::string> weaker(const Config& running, const Config& next) {
@@ -326,8 +326,8 @@ std::vector<std::string> weaker(const Config& running, const Config& next) {
     compare_serial_masters(all, running, next);
     compare_http(all, running, next);
     compare_mqtt(all, running, next);
-    compare_rules(all, running.access, next.access);
     compare_audit(all, running, next);
+    compare_rules(all, running.access, next.access);
     return all;
 }
 

@@ -64,10 +64,10 @@ struct Settings {
     IncidentSettings incidents;
     doctor::Settings doctor;
     ClientSettings clients{};
-    std::shared_ptr<const access::LineRules> access{};    ///< null: everybody may do everything
     std::function<void(const WriteEnd&)> record_write{};  ///< may be empty; must not call the bus
     /// True while no write may be sent, as it could not be recorded. May be empty.
     std::function<bool()> refuses_writes{};
+    std::shared_ptr<const access::LineRules> access{};  ///< null: everybody may do everything
 };
 
 /// Drives one line with one arbiter. Not thread-safe: use it only on the executor's thread.

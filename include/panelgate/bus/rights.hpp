@@ -28,10 +28,10 @@ enum class Rule : std::uint8_t {
     range,            ///< some items are outside the panel's memory
     listening,        ///< the line is in listen mode
     write_protected,  ///< the items are read-only in the panel
-    denied,           ///< a rule of `access`, or its default
     unrecorded,       ///< no write is sent while it cannot be recorded (audit.on_failure)
+    denied,           ///< a rule of `access`, or its default
 };
-/// Returns "access", "function", "quantity", "range", "listen", "read-only", "denied" or "audit":
+/// Returns "access", "function", "quantity", "range", "listen", "read-only", "audit" or "denied":
 /// stable identifiers.
 std::string_view label(Rule rule);
 inline bool is_access(Rule rule) {

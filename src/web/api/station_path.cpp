@@ -152,14 +152,14 @@ std::string detail_of(const bus::Refusal& refusal) {
             return "line '" + refusal.why +
                    "' has another master: it is only listened to (mode: listen); its points show "
                    "what passed by";
+        case bus::Rule::unrecorded:
+            return "a write to " + station +
+                   " could not be recorded: the audit's file takes nothing now";
         case bus::Rule::denied:
             return (refusal.why == access::kDefaultRule
                         ? "no rule of access allows it, and the default is deny"
                         : "the rule '" + refusal.why + "' of access denies it") +
                    std::string(refusal.station.empty() ? "" : " at " + station);
-        case bus::Rule::unrecorded:
-            return "a write to " + station +
-                   " could not be recorded: the audit's file takes nothing now";
         case bus::Rule::function:
         case bus::Rule::quantity:
         case bus::Rule::range:
