@@ -172,7 +172,7 @@ void Bus::State::answer(Pending entry, Answer result) {
     const TimePoint now = clock.now();
     const Duration took = now - entry.arrived;
     const Outcome outcome = outcome_of(result);
-    if (result.refusal && result.refusal->rule == Rule::denied) deny(entry, *result.refusal);
+    if (result.refusal && result.refusal->rule == Rule::denied) ++denials[result.refusal->why];
     if (entry.write) complete(*entry.write, result);
     account.add(entry.station, entry.function, entry.write, outcome, took);
     clients.count_outcome(entry.client, outcome, now);
