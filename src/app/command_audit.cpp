@@ -81,7 +81,7 @@ void print_good(const audit::Report& report, std::size_t files, bool has_log) {
     std::cout << "whole: " << report.records << (report.records == 1 ? " record" : " records")
               << " (" << report.first << " to " << report.last.number << ") in " << files
               << (files == 1 ? " file" : " files") << '\n'
-              << "last hash " << text_of(report.last.hash) << '\n';
+              << "last hash " << panelgate::text_of(report.last.hash) << '\n';
     if (has_log) {
         std::cout << report.anchored << " of them named by the log\n";
     } else {

@@ -249,7 +249,7 @@ std::string usual_name() {
 }
 
 /// Writes a new file that only its owner can read.
-ExitCode write_new(const std::string& file, const std::string& text) {
+ExitCode write_report(const std::string& file, const std::string& text) {
     const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (fd < 0 && errno == EEXIST) {
         std::cerr << "panelgate: " << file << " is there already; give another name with -o\n";
@@ -274,7 +274,7 @@ ExitCode write_new(const std::string& file, const std::string& text) {
 
 ExitCode report(const GatewayOptions& at, const std::string& file) {
     const std::string name = file.empty() ? usual_name() : file;
-    if (name != "-" && ::access(name.c_str(), F_OK) == 0) return write_new(name, "");
+    if (name != "-" && ::access(name.c_str(), F_OK) == 0) return write_report(name, "");
     ExitCode code = kFine;
     const auto gateway = GatewayClient::make(at, code);
     if (!gateway) return code;
@@ -287,7 +287,7 @@ ExitCode report(const GatewayOptions& at, const std::string& file) {
         std::cout << *text;
         return kFine;
     }
-    code = write_new(name, *text);
+    code = write_report(name, *text);
     if (code == kFine)
         std::cerr << "panelgate: wrote " << name << ", " << text->size() / 1024 + 1
                   << " KiB: configuration without secrets, state, findings, incidents, traces and "

@@ -29,7 +29,7 @@ constexpr const char* kForm =
     "read|write|broadcast|raw STATION/PLACE, such as from=10.0.0.7 role=operator write press/UW102";
 
 /// What was asked, as far as it has been understood.
-struct Question {
+struct AskedRight {
     Who who{.role = Role::none};
     bool has_role = false;
     bool has_face = false;
@@ -54,7 +54,7 @@ std::optional<Face> face_of(std::string_view word) {
     return std::nullopt;
 }
 
-void set(Question& asked, const std::string& key, const std::string& value) {
+void set(AskedRight& asked, const std::string& key, const std::string& value) {
     if (key == "from") {
         asked.who.address = value;
     } else if (key == "token") {
@@ -99,7 +99,7 @@ std::optional<Span> items_of(const config::Station& station, const std::string& 
     return Span{item->area->table, item->address, 1};
 }
 
-void find_place(const config::Config& config, const std::string& text, Question& asked) {
+void find_place(const config::Config& config, const std::string& text, AskedRight& asked) {
     const std::size_t slash = text.find('/');
     for (const config::Line& line : config.lines) {
         for (const config::Station& station : line.stations) {
@@ -123,7 +123,7 @@ void find_place(const config::Config& config, const std::string& text, Question&
 }
 
 /// A token's role, and what a door gives to those who show nothing.
-void complete(const config::Config& config, Question& asked) {
+void complete(const config::Config& config, AskedRight& asked) {
     if (!asked.who.token.empty() && config.http) {
         const auto& tokens = config.http->tokens;
         const auto token = std::ranges::find(tokens, asked.who.token, &web::Token::name);
@@ -139,8 +139,8 @@ void complete(const config::Config& config, Question& asked) {
     asked.who.role = anonymous ? config.http->anonymous : Role::operator_;
 }
 
-Question parse(const config::Config& config, const std::string& text) {
-    Question asked;
+AskedRight parse(const config::Config& config, const std::string& text) {
+    AskedRight asked;
     std::istringstream in(text);
     std::string place;
     for (std::string word; asked.wrong.empty() && in >> word;) {
@@ -164,7 +164,7 @@ Question parse(const config::Config& config, const std::string& text) {
 }
 
 /// The request that REST or a Modbus client would send.
-std::optional<modbus::Request> request_of(const Question& asked) {
+std::optional<modbus::Request> request_of(const AskedRight& asked) {
     const Span& items = asked.items;
     const bool reads = asked.act == Act::read || asked.act == Act::raw;
     Bytes pdu;
@@ -189,7 +189,7 @@ std::optional<modbus::Request> request_of(const Question& asked) {
 }
 
 /// What decides before any rule; "" if nothing does.
-std::string decided_before(const Question& asked) {
+std::string decided_before(const AskedRight& asked) {
     const bool writes = asked.act == Act::write || asked.act == Act::broadcast;
     if (asked.station->listens) return "line '" + asked.line->name + "' is only listened to";
     if (writes && asked.station->read_only)
@@ -211,7 +211,7 @@ std::string place_in(const std::string& file, const access::Rule& rule) {
 
 Explanation explain(const config::Config& config, const std::string& file,
                     const std::string& question) {
-    const Question asked = parse(config, question);
+    const AskedRight asked = parse(config, question);
     if (!asked.wrong.empty()) return {false, "", asked.wrong + kForm};
     const auto request = request_of(asked);
     if (!request) return {false, "", "no request does that to so many items of this table"};

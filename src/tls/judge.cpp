@@ -12,7 +12,7 @@
 namespace panelgate::tls {
 namespace {
 
-constexpr std::int64_t kDay = 24 * 3600;
+constexpr std::int64_t kSecondsADay = 24 * 3600;
 
 class Judge {
   public:
@@ -26,9 +26,9 @@ class Judge {
         } else if (begin > now_) {
             say(what + " is valid from " + date_text(begin) +
                 " only; compare the clock of the machine that made it");
-        } else if (end - now_ < kAnnouncedDays * kDay) {
+        } else if (end - now_ < kAnnouncedDays * kSecondsADay) {
             say(what + " expires on " + date_text(end) + ", in " +
-                std::to_string((end - now_) / kDay) + " days; put a new one in its place");
+                std::to_string((end - now_) / kSecondsADay) + " days; put a new one in its place");
         }
     }
     void judge_server(const std::vector<std::string>& names) {
