@@ -382,7 +382,7 @@ class Refusing(unittest.TestCase):
         self.assertEqual(of_meter[1]["rule"], "access")
 
     def test_reload_tells_who_changed_what_and_goes_on_in_another_file(self):
-        self.write_config()
+        self.write_config(anonymous="admin")
         self.folder.mkdir()
         with self.gateway() as program:
             program.http_port()

@@ -45,6 +45,7 @@ def box(adapter):
                     queue="{deadline: 10s}"),
         config.line("quick", "sim", polled(5, "loud"), baud=1000000),
         http=config.ADMIN, log="{level: trace}",
+        audit=f"{{file: {adapter.parent}/none/audit.jsonl}}",  # AuditFails: there is no such folder
         mqtt="{broker: 'mqtt://127.0.0.1:1', topic: box}")  # BrokerAway
 
 
