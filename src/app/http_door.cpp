@@ -289,9 +289,38 @@ std::string without_scheme(std::string http) {
 
 }  // namespace
 
+namespace {
+
+/// From a file with faults, such as a key that only the gateway may read: where `http` has `tls`,
+/// nothing is asked in plain.
+std::optional<tls::Trust> trust_despite_faults(const std::string& file) {
+    const auto text = config::RealFiles::read_any(path_of(file));
+    if (!text) return std::nullopt;
+    yaml::Problems faults(file);
+    const yaml::Node tree = yaml::parse(*text, faults);
+    if (!faults.empty()) {
+        if (text->find("tls:") == std::string::npos) return std::nullopt;
+        return tls::Trust{};
+    }
+    const yaml::Node* http = tree.find("http");
+    const yaml::Node* secure = http == nullptr ? nullptr : http->find("tls");
+    if (secure == nullptr) return std::nullopt;
+    const auto content = [&](std::string_view key) {
+        const yaml::Node* path = secure->find(key);
+        return path == nullptr ? std::string()
+                               : config::RealFiles::read_any(path->scalar).value_or("");
+    };
+    return tls::Trust{content("certificate"), content("ca")};
+}
+
+}  // namespace
+
 std::optional<tls::Trust> http_trust(const std::string& file, const std::string& http) {
     if (http.starts_with(kPlainScheme)) return std::nullopt;
     const std::optional<config::Config> config = read_quietly(file);
+    if (!config) {
+        if (auto trust = trust_despite_faults(file)) return trust;
+    }
     if (config && config->http && config->http->tls) {
         const tls::Material& files = config->http->tls->material;
         return tls::Trust{files.certificate, files.ca};

@@ -95,6 +95,9 @@ void compare_listeners(Lines& all, const Config& running, const Config& next) {
             continue;
         }
         if (!was->udp && listener.udp) all.push_back(endpoint + ": udp false -> true");
+        if (!was->diagnostics_unit && listener.diagnostics_unit)
+            all.push_back(endpoint + ": diagnostics_unit null -> " +
+                          std::to_string(*listener.diagnostics_unit));
         compare_tls(all, endpoint, was->tls, listener.tls);
         compare_allow(all, endpoint, was->allow, listener.allow);
         compare_rights(all, endpoint, *was, listener);

@@ -70,6 +70,8 @@ void Session::on_secure(bool secure) {
 Guest Session::guest() const {
     const bool half_sent =
         due_ && shared_->clock.now() - active_ < shared_->settings.half_sent_pause;
+    // Whoever has not shown who he is gives way before anybody who has.
+    if (handshaking_) return {host_, true, TimePoint::min()};
     return {host_, pipeline_->empty() && !writing_ && !half_sent, active_};
 }
 

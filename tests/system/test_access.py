@@ -150,6 +150,7 @@ class Viewer(unittest.TestCase):
             settings = json.loads(ask(program, "GET", "/api/v1/configuration", "eye")[1])
             self.assertEqual([one["name"] for one in settings["configuration"]["lines"][0]["stations"]], ["press"])
             self.assertEqual(settings["role"], "viewer")
+            self.assertNotIn("oven", json.dumps(settings), "nor its polls")
             trace = json.loads(ask(program, "GET", "/api/v1/lines/floor1/trace?last=200", "eye")[1])
             self.assertEqual({one["station"] for one in trace["transactions"]}, {31, 0})
             for one in trace["transactions"]:

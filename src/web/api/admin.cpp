@@ -179,14 +179,19 @@ std::string seen_configuration(const std::string& text, const Sight& sight) {
     for (json::value& line : top["lines"].as_array()) {
         json::object& object = line.as_object();
         const std::string name(object["name"].as_string());
-        json::array stations;
-        for (const json::value& station : object["stations"].as_array()) {
-            const std::string own(station.at("name").as_string());
-            if (sight.named(name, own, "")) stations.push_back(station);
-        }
-        if (stations.empty()) continue;
-        object["stations"] = std::move(stations);
-        lines.push_back(std::move(object));
+        const auto seen = [&](const char* list, const char* key) {
+            json::array kept;
+            for (const json::value& one : object[list].as_array())
+                if (sight.named(name, std::string(one.at(key).as_string()), ""))
+                    kept.push_back(one);
+            return kept;
+        };
+        json::object shown{{"stations", seen("stations", "name")},
+                           {"polls", seen("polls", "station")}};
+        if (shown["stations"].as_array().empty()) continue;
+        for (const char* key : {"name", "device", "mode", "serial", "unlisted_stations"})
+            if (const json::value* own = object.if_contains(key)) shown[key] = *own;
+        lines.push_back(std::move(shown));
     }
     top["lines"] = std::move(lines);
     return json_text(whole);

@@ -116,6 +116,8 @@ class Places {
     /// A complete request has arrived: the connection keeps its place until idle(). These calls
     /// ignore unknown ids.
     void busy(Id id);
+    /// Its TLS handshake has begun: until idle() it gives way before any other.
+    void shakes_hands(Id id);
     /// Its address guesses tokens and its own token is not checked yet: another address may
     /// displace it. Not the same address, or a guess could displace a right token.
     void suspect(Id id);
@@ -128,7 +130,7 @@ class Places {
     void leave(Id id);
 
   private:
-    enum class State : std::uint8_t { idle, busy, suspect, wrong, streaming };
+    enum class State : std::uint8_t { idle, handshake, busy, suspect, wrong, streaming };
     struct Guest {
         std::string address;
         bool probes_only = false;

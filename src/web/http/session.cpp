@@ -158,6 +158,7 @@ asio::awaitable<bool> HttpSession::secure() {
     const std::string name = endpoint_text(caller_->address(), client.port());
     bool ended = false;
     bool secure = false;
+    shared_->places.shakes_hands(caller_->id());
     turn_.expires_at(asio::steady_timer::time_point::max());
     std::function<void(bool)> done = [this, &ended, &secure](bool is_secure) {
         ended = true;
@@ -169,6 +170,7 @@ asio::awaitable<bool> HttpSession::secure() {
         turn_.expires_at(asio::steady_timer::time_point::max());
         co_await turn_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
     }
+    shared_->places.idle(caller_->id());
     if (secure) take_certificate();
     co_return secure;
 }
