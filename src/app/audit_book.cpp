@@ -295,9 +295,9 @@ bool AuditBook::is_vain_repeat(const std::string& line, const bus::WriteEnd& end
     what += label(end.outcome);
     what += '\t';
     what += end.rule;
-    const std::string station =
-        known != nullptr ? known->station->name : std::to_string(end.station);
     return is_repeat(end.who, what, refused ? 1 : kNotSent, [&] {
+        const std::string station =
+            known != nullptr ? known->station->name : std::to_string(end.station);
         return member("line", line) + member("station", station) +
                member("outcome", outcome_of(end)) +
                (refused ? end.rule.empty() ? std::string() : member("rule", end.rule)

@@ -13,17 +13,7 @@ constexpr std::string_view kBegin = "{\"n\":";
 constexpr std::string_view kHash = ",\"hash\":\"";
 constexpr std::string_view kClose = "\"}";
 constexpr std::size_t kSealSize = kHash.size() + 64 + kClose.size();
-constexpr std::string_view kPrevious = "\"previous\":\"";
-
 bool is_hex(char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); }
-
-bool is_kind(std::string_view body, std::string_view kind) {
-    constexpr std::string_view kKey = ",\"kind\":\"";
-    const auto at = body.find(kKey);
-    if (at == body.npos) return false;
-    const std::string_view rest = body.substr(at + kKey.size());
-    return rest.starts_with(kind) && rest.substr(kind.size()).starts_with('"');
-}
 
 }  // namespace
 
@@ -75,11 +65,19 @@ std::optional<Sealed> parse_line(std::string_view line) {
     return record;
 }
 
+std::string_view member_of(std::string_view body, std::string_view key) {
+    const std::string sought = '"' + std::string(key) + "\":";
+    auto at = body.find(sought);
+    while (at != body.npos && at > 0 && body[at - 1] != ',') at = body.find(sought, at + 1);
+    if (at == body.npos) return {};
+    const std::string_view rest = body.substr(at + sought.size());
+    if (rest.starts_with('"')) return rest.substr(1, rest.find('"', 1) - 1);
+    return rest.substr(0, rest.find(','));
+}
+
 std::optional<Hash> previous_in(const Sealed& record) {
-    if (!is_kind(record.body, "file")) return std::nullopt;
-    const auto at = record.body.find(kPrevious);
-    if (at == record.body.npos) return std::nullopt;
-    return parse_hash(record.body.substr(at + kPrevious.size()).substr(0, 64));
+    if (member_of(record.body, "kind") != "file") return std::nullopt;
+    return parse_hash(member_of(record.body, "previous"));
 }
 
 Tail parse_tail(std::string_view end) {
@@ -95,7 +93,7 @@ Tail parse_tail(std::string_view end) {
         return tail;
     }
     tail.last = {record->number, record->hash};
-    tail.ended = is_kind(record->body, "end");
+    tail.ended = member_of(record->body, "kind") == "end";
     return tail;
 }
 

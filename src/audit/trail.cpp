@@ -63,9 +63,9 @@ class Syslog {
     /// facility "log audit" at level info.
     bool send_one(std::string_view body) {
         text_ = "<110>1 ";
-        text_ += quoted_behind(body, "\"time\":\"");
+        text_ += member_of(body, "time");
         text_ += ' ' + host_ + " panelgate " + std::to_string(::getpid()) + ' ';
-        text_ += quoted_behind(body, "\"kind\":\"");
+        text_ += member_of(body, "kind");
         text_ += " - {";
         text_ += body;
         text_ += '}';
@@ -74,12 +74,6 @@ class Syslog {
             return true;
         if (errno != EAGAIN && errno != ENOBUFS) close();  // it was restarted: the next one tries
         return false;
-    }
-    static std::string_view quoted_behind(std::string_view body, std::string_view key) {
-        const auto at = body.find(key);
-        if (at == body.npos) return "-";
-        const std::string_view rest = body.substr(at + key.size());
-        return rest.substr(0, rest.find('"'));
     }
     bool connect() {
         sockaddr_un address{};
@@ -116,6 +110,7 @@ struct Trail::State {
     }
 
     void run();
+    void round(std::unique_lock<std::mutex>& lock);
     bool wait(std::unique_lock<std::mutex>& lock);
     void take_over();
     void work();
@@ -225,25 +220,24 @@ void Trail::State::publish() {
     counters.failing = failing;
 }
 
+/// Takes what waits, and writes it without the lock.
+void Trail::State::round(std::unique_lock<std::mutex>& lock) {
+    take_over();
+    lock.unlock();
+    work();
+    lock.lock();
+    publish();
+}
+
 void Trail::State::run() {
     bool last = false;
     std::unique_lock lock(mutex);
     while (!last) {
         last = writer.last().number > 0 || failing ? wait(lock) : stop;
-        take_over();
-        lock.unlock();
-        work();
-        lock.lock();
-        publish();
+        round(lock);
     }
     // What came while the last try was going on, and what belongs to another file.
-    for (int i = 0; i < 2 && !failing; ++i) {
-        take_over();
-        lock.unlock();
-        work();
-        lock.lock();
-        publish();
-    }
+    for (int i = 0; i < 2 && !failing; ++i) round(lock);
 }
 
 Trail::Trail(const Settings& settings, Hooks hooks)

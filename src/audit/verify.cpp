@@ -44,16 +44,6 @@ std::string_view digits_behind(std::string_view line, std::string_view key, bool
     return rest.substr(0, end);
 }
 
-/// The text of a member that is a number, a flag or a text without escapes; "" if there is none.
-std::string_view member(std::string_view body, std::string_view key) {
-    const std::string sought = ",\"" + std::string(key) + "\":";
-    const auto at = body.find(sought);
-    if (at == body.npos) return {};
-    const std::string_view rest = body.substr(at + sought.size());
-    if (rest.starts_with('"')) return rest.substr(1, rest.find('"', 1) - 1);
-    return rest.substr(0, rest.find(','));
-}
-
 }  // namespace
 
 void collect_anchor(std::string_view log_line, Anchors& anchors) {
@@ -222,19 +212,18 @@ void Verifier::decide_at_end() {
 
 /// What the records themselves say is missing.
 void Verifier::remark(const Sealed& record) {
-    const std::string_view kind = member(record.body, "kind");
+    const std::string_view kind = member_of(record.body, "kind");
     if ((kind != "lost" && kind != "start") || report_.remarks.size() >= kRemarks) return;
-    const std::string body = ',' + std::string(record.body);
     const std::string when =
-        record_text(record.number) + " (" + std::string(member(body, "time")) + "): ";
+        record_text(record.number) + " (" + std::string(member_of(record.body, "time")) + "): ";
     if (kind == "lost")
-        report_.remarks.push_back(when + std::string(member(record.body, "count")) +
+        report_.remarks.push_back(when + std::string(member_of(record.body, "count")) +
                                   " records were left out, the disk took nothing");
-    if (member(record.body, "unclean") == "true")
+    if (member_of(record.body, "unclean") == "true")
         report_.remarks.push_back(when +
                                   "the run before did not end in order; what it did in its "
                                   "last second may be missing");
-    const std::string_view torn = member(record.body, "torn_bytes");
+    const std::string_view torn = member_of(record.body, "torn_bytes");
     if (!torn.empty())
         report_.remarks.push_back(when + "a torn line of " + std::string(torn) +
                                   " bytes was found and taken over into this record");

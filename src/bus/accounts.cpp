@@ -161,10 +161,6 @@ void record_write(const Settings& settings, std::uint8_t station, const WriteRec
     settings.record_write(end);
 }
 
-}  // namespace
-
-namespace {
-
 /// Returns the host without port and brackets.
 std::string_view host_in(std::string_view word) {
     if (word.starts_with('[')) return word.substr(1, word.find(']') - 1);

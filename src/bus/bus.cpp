@@ -230,10 +230,11 @@ void Bus::transact(Request request, AnswerHandler handler) {
 void Bus::count_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) {
     // A broadcast over several lines is judged before it is submitted to any of them.
     std::string rule;
-    const auto request =
-        modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
-    if (request && station == 0) {
-        const auto denial = state_->rights.judge(who, {.station = station, .asked = &*request});
+    if (station == 0) {
+        const auto request =
+            modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
+        std::optional<Refusal> denial;
+        if (request) denial = state_->rights.judge(who, {.station = station, .asked = &*request});
         if (denial) rule = denial->why;
     }
     if (!rule.empty()) ++state_->denials[rule];

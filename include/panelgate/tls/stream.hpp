@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/compose.hpp>
@@ -73,10 +74,10 @@ class Stream {
         boost::system::error_code error{};
         Need need = Need::nothing;
     };
-    template <class Buffers>
-    struct Read;
-    template <class Buffers>
-    struct Write;
+    struct Reading;
+    struct Writing;
+    template <class Buffers, class Way>
+    struct Transfer;
 
     Step read_secure(boost::asio::mutable_buffer into);
     Step write_secure(boost::asio::const_buffer bytes);
@@ -97,108 +98,85 @@ class Stream {
     std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
 };
 
-/// The first part of a read: a buffer that is not empty.
-template <class Buffers>
-boost::asio::mutable_buffer first_of(const Buffers& buffers) {
+/// The first buffer that is not empty.
+template <class Buffer, class Buffers>
+Buffer first_of(const Buffers& buffers) {
     const auto end = boost::asio::buffer_sequence_end(buffers);
     for (auto at = boost::asio::buffer_sequence_begin(buffers); at != end; ++at) {
-        const boost::asio::mutable_buffer one(*at);
+        const Buffer one(*at);
         if (one.size() > 0) return one;
     }
     return {};
 }
 
-template <class Buffers>
-struct Stream::Read {
-    enum class At : std::uint8_t { begin, plain, waited, posted };
-
-    Stream& stream;
-    Buffers buffers;
-    At at = At::begin;
-    Step step{};
-
-    template <class Self>
-    void operator()(Self& self, boost::system::error_code error = {}, std::size_t size = 0) {
-        Stream& on = stream;
-        if (at == At::begin && !on.is_secure()) {
-            at = At::plain;
-            const Buffers into = buffers;
-            return on.socket_.async_read_some(into, std::move(self));
-        }
-        if (at == At::plain) return end(self, error, size);
-        if (at == At::posted) return end(self, step.error, step.bytes);
-        if (error) return end(self, error, 0);
-        step = on.read_secure(first_of(buffers));
-        const bool inside =
-            at == At::begin;  // of the call that begins it: no handler may run there
-        if (step.need != Need::nothing) {
-            at = At::waited;
-            return on.wait(step.need, std::move(self));
-        }
-        if (!inside) return end(self, step.error, step.bytes);
-        at = At::posted;
-        boost::asio::post(on.get_executor(), std::move(self));
+struct Stream::Reading {
+    template <class Buffers, class Self>
+    static void plain(boost::asio::ip::tcp::socket& socket, const Buffers& into, Self&& self) {
+        socket.async_read_some(into, std::forward<Self>(self));
     }
-    template <class Self>
-    void end(Self& self, boost::system::error_code error, std::size_t size) {
-        --stream.pending_;
-        self.complete(error, size);
+    template <class Buffers>
+    Step secure(Stream& on, const Buffers& into) {
+        return on.read_secure(first_of<boost::asio::mutable_buffer>(into));
     }
 };
 
-/// Several small buffers become one record.
-template <class Buffers>
-struct Stream::Write {
-    enum class At : std::uint8_t { begin, plain, waited, posted };
+/// Several small buffers become one record, which is the same when it is tried again.
+struct Stream::Writing {
     static constexpr std::size_t kRecord = 16 * 1024;
+
+    std::string gathered{};
+
+    template <class Buffers, class Self>
+    static void plain(boost::asio::ip::tcp::socket& socket, const Buffers& from, Self&& self) {
+        socket.async_write_some(from, std::forward<Self>(self));
+    }
+    template <class Buffers>
+    Step secure(Stream& on, const Buffers& from) {
+        return on.write_secure(record(from));
+    }
+    template <class Buffers>
+    boost::asio::const_buffer record(const Buffers& buffers) {
+        const auto first = first_of<boost::asio::const_buffer>(buffers);
+        const std::size_t all = boost::asio::buffer_size(buffers);
+        if (first.size() == all || first.size() >= kRecord) return first;
+        if (gathered.empty()) {
+            gathered.resize(std::min(kRecord, all));
+            boost::asio::buffer_copy(boost::asio::buffer(gathered), buffers);
+        }
+        return boost::asio::buffer(gathered);
+    }
+};
+
+/// One read or write, as `Way` does it.
+template <class Buffers, class Way>
+struct Stream::Transfer {
+    enum class At : std::uint8_t { begin, plain, waited, posted };
 
     Stream& stream;
     Buffers buffers;
     At at = At::begin;
     Step step{};
-    std::string gathered{};
+    Way way{};
 
     template <class Self>
     void operator()(Self& self, boost::system::error_code error = {}, std::size_t size = 0) {
         Stream& on = stream;
         if (at == At::begin && !on.is_secure()) {
             at = At::plain;
-            const Buffers from = buffers;
-            return on.socket_.async_write_some(from, std::move(self));
+            const Buffers all = buffers;
+            return Way::plain(on.socket_, all, std::move(self));
         }
         if (at == At::plain) return end(self, error, size);
         if (at == At::posted) return end(self, step.error, step.bytes);
         if (error) return end(self, error, 0);
-        const bool inside = at == At::begin;
-        step = on.write_secure(inside ? record() : again());
+        step = way.secure(on, buffers);
         if (step.need != Need::nothing) {
             at = At::waited;
             return on.wait(step.need, std::move(self));
         }
-        if (!inside) return end(self, step.error, step.bytes);
-        at = At::posted;
+        if (at == At::waited) return end(self, step.error, step.bytes);
+        at = At::posted;  // no handler may run inside of the call that begins it
         boost::asio::post(on.get_executor(), std::move(self));
-    }
-    boost::asio::const_buffer record() {
-        const boost::asio::const_buffer first = whole();
-        if (first.size() == boost::asio::buffer_size(buffers) || first.size() >= kRecord)
-            return first;
-        gathered.resize(std::min(kRecord, boost::asio::buffer_size(buffers)));
-        boost::asio::buffer_copy(boost::asio::buffer(gathered), buffers);
-        return boost::asio::buffer(gathered);
-    }
-    boost::asio::const_buffer again() {
-        return gathered.empty() ? whole()
-                                : boost::asio::const_buffer(boost::asio::buffer(gathered));
-    }
-    /// The first buffer that is not empty.
-    boost::asio::const_buffer whole() const {
-        const auto last = boost::asio::buffer_sequence_end(buffers);
-        for (auto one = boost::asio::buffer_sequence_begin(buffers); one != last; ++one) {
-            const boost::asio::const_buffer bytes(*one);
-            if (bytes.size() > 0) return bytes;
-        }
-        return {};
     }
     template <class Self>
     void end(Self& self, boost::system::error_code error, std::size_t size) {
@@ -211,14 +189,14 @@ template <class Buffers, class Token>
 auto Stream::async_read_some(const Buffers& buffers, Token&& token) {
     ++pending_;
     return boost::asio::async_compose<Token, void(boost::system::error_code, std::size_t)>(
-        Read<Buffers>{*this, buffers}, token, socket_);
+        Transfer<Buffers, Reading>{*this, buffers}, token, socket_);
 }
 
 template <class Buffers, class Token>
 auto Stream::async_write_some(const Buffers& buffers, Token&& token) {
     ++pending_;
     return boost::asio::async_compose<Token, void(boost::system::error_code, std::size_t)>(
-        Write<Buffers>{*this, buffers}, token, socket_);
+        Transfer<Buffers, Writing>{*this, buffers}, token, socket_);
 }
 
 }  // namespace panelgate::tls
