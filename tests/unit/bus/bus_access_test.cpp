@@ -107,6 +107,7 @@ TEST_F(BusAccessTest, P2AWriteThatWasSentIsNotRepeatedAfterItIsForbidden) {
     line->reply.clear();
     std::vector<Answer> answers;
     send(17, "06 00 02 00 01"_hex, answers);
+    ASSERT_TRUE(run_until([&] { return line->written.size() > before; }));
     rules.rules.insert(rules.rules.begin(), access::Rule{.name = "closed", .acts = {Act::write}});
     use_rules();
     bus->apply(settings, nullptr, nullptr);
