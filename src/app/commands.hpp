@@ -104,7 +104,7 @@ struct WatchOptions {
 /// Prints a line at each change of places.
 ExitCode watch(const GatewayOptions& at, const WatchOptions& options);
 /// Prints the state of lines and stations.
-ExitCode status(const GatewayOptions& at);
+ExitCode status(const GatewayOptions& at, bool json);
 /// Shows load, clients and slow panels; again each second unless `once`.
 ExitCode top(const GatewayOptions& at, bool once);
 struct TraceOptions {
