@@ -34,6 +34,39 @@ std::optional<Span> with_items(std::optional<Span> span) {
     return span;
 }
 
+constexpr Right right_of(Act act) {
+    switch (act) {
+        case Act::read:
+            return Right::read;
+        case Act::write:
+            return Right::write;
+        case Act::broadcast:
+            return Right::broadcast;
+        case Act::raw:
+            return Right::raw;
+    }
+    std::abort();
+}
+
+/// Default roles are what doors want; what an own one lacks is refused wherever it comes in.
+bool lacks(const WhoRef& who, Act act) {
+    return who && who->own_role && !who->own_role->rights.has(right_of(act));
+}
+
+Verdict by_role(const WhoRef& who, Act act) { return {false, nullptr, act, who->own_role->name}; }
+
+/// What this request does.
+Acts acts_of(const LineRules::Question& question) {
+    Acts acts;
+    const modbus::Access access = question.asked->access();
+    const bool reads = access.read || (!access.write && question.asked->is_read());
+    if (reads) acts.add(Act::read);
+    if (access.write || !reads) acts.add(Act::write);
+    if (question.station == 0) acts.add(Act::broadcast);
+    if (question.raw) acts.add(Act::raw);
+    return acts;
+}
+
 modbus::Function function_for(Act act, modbus::Table table) {
     if (act == Act::read) return modbus::read_function(table);
     return table == modbus::Table::coils ? modbus::kWriteMultipleCoils
@@ -58,7 +91,13 @@ LineRules::LineRules(std::shared_ptr<const Settings> settings, std::string line,
 }
 
 Verdict LineRules::judge(const WhoRef& who, const Question& question) const {
-    if (is_open() || is_trusted(who)) return {};
+    if (is_trusted(who)) return {};
+    if (who && who->own_role) {
+        const Acts acts = acts_of(question);
+        for (const Act act : {Act::read, Act::write, Act::broadcast, Act::raw})
+            if (acts.has(act) && lacks(who, act)) return by_role(who, act);
+    }
+    if (is_open()) return {};
     if (question.station != 0) return judge_request(who, question.station, question);
     // It reaches everybody: without a listed station, those that nobody knows.
     if (listed_.empty()) return judge_request(who, 0, question);
@@ -105,7 +144,9 @@ Verdict LineRules::judge_as(const Meeting& meeting, const modbus::Request& reque
 
 Verdict LineRules::judge(const WhoRef& who, std::uint8_t station, Act act, std::uint8_t function,
                          const std::optional<Span>& items) const {
-    if (is_open() || is_trusted(who)) return {};
+    if (is_trusted(who)) return {};
+    if (lacks(who, act)) return by_role(who, act);
+    if (is_open()) return {};
     return decide(meet(who, station), act, function, with_items(items));
 }
 
@@ -163,6 +204,7 @@ bool LineRules::take_out(const Span& items) const {
 Verdict LineRules::by_default(Act act) const { return {settings_->allow_by_default, nullptr, act}; }
 
 bool LineRules::may_some(const WhoRef& who, std::uint8_t station, Act act) const {
+    if (lacks(who, act)) return false;
     if (is_open() || is_trusted(who)) return true;
     Meeting& meeting = meet(who, station);
     if (act == Act::read && meeting.reads_some) return *meeting.reads_some;
@@ -194,6 +236,7 @@ bool LineRules::may_read_some(const WhoRef& who) const {
 }
 
 bool LineRules::reads_all(const WhoRef& who, std::uint8_t station) const {
+    if (lacks(who, Act::read)) return false;
     if (is_open() || is_trusted(who)) return true;
     Meeting& meeting = meet(who, station);
     if (!meeting.reads_all) meeting.reads_all = may_all(who, station, Act::read);
@@ -201,6 +244,7 @@ bool LineRules::reads_all(const WhoRef& who, std::uint8_t station) const {
 }
 
 bool LineRules::may_all(const WhoRef& who, std::uint8_t station, Act act) const {
+    if (lacks(who, act)) return false;
     if (is_open() || is_trusted(who)) return true;
     const Meeting& meeting = meet(who, station);
     return std::ranges::all_of(modbus::kTables, [&](modbus::Table table) {
@@ -212,6 +256,8 @@ bool LineRules::may_all(const WhoRef& who, std::uint8_t station, Act act) const 
 
 std::vector<std::string> LineRules::denying_names() const {
     std::vector<std::string> names;
+    if (settings_ == nullptr) return names;
+    for (const OwnRole& role : settings_->roles) names.push_back(role.name);
     if (is_open()) return names;
     for (const Rule& rule : settings_->rules) {
         if (!rule.allow) names.push_back(rule.name);

@@ -25,7 +25,7 @@ void add_who(Composer& record, const WhoRef& who) {
     if (!who) return;
     record.text("client", who->name).text("face", label(who->face));
     record.text("listener", who->listener).text("token", who->token);
-    if (who->role != Role::none) record.text("role", label(who->role));
+    if (who->role != Role::none) record.text("role", who->role_name());
     record.text("certificate", who->certificate).text("certificate_role", who->certificate_role);
     record.text("user", who->user);
 }
@@ -410,7 +410,7 @@ void AuditBook::reload(const web::ReloadVerdict& verdict) {
 void AuditBook::tokens(const std::vector<web::Token>& before, const std::vector<web::Token>& now) {
     if (!trail_) return;
     const auto tell_of = [this](const web::Token& token, std::string_view event) {
-        begin(Kind::token).text("token", token.name).text("role", label(token.role));
+        begin(Kind::token).text("token", token.name).text("role", token.standing().name());
         composer_.text("event", event);
         if (token.expires) composer_.text("expires", web::expiry_text(*token.expires));
         record();
@@ -421,9 +421,9 @@ void AuditBook::tokens(const std::vector<web::Token>& before, const std::vector<
             tell_of(token, "added");
         } else if (*old != token) {
             const bool other = old->hash != token.hash;
-            tell_of(token, old->role != token.role ? "role changed"
-                           : other                 ? "replaced"
-                                                   : "changed");
+            tell_of(token, old->standing() != token.standing() ? "role changed"
+                           : other                             ? "replaced"
+                                                               : "changed");
         }
     }
     for (const web::Token& token : before)

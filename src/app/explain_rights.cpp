@@ -41,12 +41,6 @@ struct AskedRight {
     std::string wrong;
 };
 
-std::optional<Role> role_of(std::string_view word) {
-    for (const Role role : {Role::viewer, Role::operator_, Role::engineer, Role::admin})
-        if (word == label(role)) return role;
-    return std::nullopt;
-}
-
 std::optional<Face> face_of(std::string_view word) {
     for (const Face face :
          {Face::modbus_tcp, Face::udp, Face::serial_master, Face::http, Face::mqtt})
@@ -54,7 +48,16 @@ std::optional<Face> face_of(std::string_view word) {
     return std::nullopt;
 }
 
-void set(AskedRight& asked, const std::string& key, const std::string& value) {
+void set_role(AskedRight& asked, const config::Config& config, const std::string& word) {
+    Standing standing = standing_named(word, config.access.roles);
+    asked.has_role = true;
+    if (standing.role == Role::none && !standing.own) asked.who.certificate_role = word;
+    asked.who.role = standing.role;
+    asked.who.own_role = std::move(standing.own);
+}
+
+void set(AskedRight& asked, const config::Config& config, const std::string& key,
+         const std::string& value) {
     if (key == "from") {
         asked.who.address = value;
     } else if (key == "token") {
@@ -62,10 +65,7 @@ void set(AskedRight& asked, const std::string& key, const std::string& value) {
     } else if (key == "listener") {
         asked.who.listener = value;
     } else if (key == "role") {
-        const auto role = role_of(value);
-        asked.has_role = true;
-        if (role) asked.who.role = *role;
-        if (!role) asked.who.certificate_role = value;
+        set_role(asked, config, value);
     } else if (key == "face") {
         const auto face = face_of(value);
         asked.has_face = face.has_value();
@@ -128,7 +128,10 @@ void complete(const config::Config& config, AskedRight& asked) {
         const auto& tokens = config.http->tokens;
         const auto token = std::ranges::find(tokens, asked.who.token, &web::Token::name);
         if (token == tokens.end()) asked.wrong = "there is no token '" + asked.who.token + '\'';
-        if (token != tokens.end() && !asked.has_role) asked.who.role = token->role;
+        if (token != tokens.end() && !asked.has_role) {
+            asked.who.role = token->role;
+            asked.who.own_role = token->own_role;
+        }
         asked.has_role = true;
         if (!asked.has_face) asked.who.face = Face::http;
     }
@@ -137,6 +140,7 @@ void complete(const config::Config& config, AskedRight& asked) {
     if (asked.has_role) return;
     const bool anonymous = asked.who.face == Face::http && config.http;
     asked.who.role = anonymous ? config.http->anonymous : Role::operator_;
+    if (anonymous) asked.who.own_role = config.http->anonymous_own;
 }
 
 AskedRight parse(const config::Config& config, const std::string& text) {
@@ -146,7 +150,7 @@ AskedRight parse(const config::Config& config, const std::string& text) {
     for (std::string word; asked.wrong.empty() && in >> word;) {
         const std::size_t equals = word.find('=');
         if (equals != word.npos) {
-            set(asked, word.substr(0, equals), word.substr(equals + 1));
+            set(asked, config, word.substr(0, equals), word.substr(equals + 1));
             continue;
         }
         bool is_act = false;
@@ -194,7 +198,7 @@ std::string decided_before(const AskedRight& asked) {
     if (asked.station->listens) return "line '" + asked.line->name + "' is only listened to";
     if (writes && asked.station->read_only)
         return "station '" + asked.station->name + "' is read_only";
-    if (asked.who.face != Face::http) return "";
+    if (asked.who.face != Face::http || asked.who.own_role) return "";
     const Role needed = asked.act == Act::read    ? Role::viewer
                         : asked.act == Act::write ? Role::operator_
                                                   : Role::engineer;
@@ -221,13 +225,17 @@ Explanation explain(const config::Config& config, const std::string& file,
     if (asked.station->translate && !asked.station->guard)
         sent = profile::translate(*asked.station->profile, *request);
     const bool broadcast = asked.act == Act::broadcast;
+    const WhoRef who = make_who(asked.who);  // the verdict may name its role
     const access::Verdict verdict = asked.line->access.rules->judge(
-        make_who(asked.who), {.station = broadcast ? std::uint8_t{0} : asked.station->id,
-                              .asked = &*request,
-                              .sent = sent && !broadcast ? &*sent : nullptr,
-                              .raw = asked.act == Act::raw});
+        who, {.station = broadcast ? std::uint8_t{0} : asked.station->id,
+              .asked = &*request,
+              .sent = sent && !broadcast ? &*sent : nullptr,
+              .raw = asked.act == Act::raw});
     std::string text = verdict.allowed ? "allowed: " : "denied: ";
-    if (verdict.rule == nullptr) {
+    if (!verdict.role.empty()) {
+        text += "the role '" + std::string(verdict.role) + "' does not have the right " +
+                std::string(label(verdict.act));
+    } else if (verdict.rule == nullptr) {
         text += std::string("no rule matches, and the default is ") +
                 (config.access.allow_by_default ? "allow" : "deny") + " (" + file + ')';
     } else {

@@ -81,8 +81,16 @@ std::string broadcasts_of(const config::Config& config, const tcp_server::Settin
     return listener.broadcast == Mode::silent ? "sent, and not answered" : "sent and answered";
 }
 
-std::string text_of(Role role) {
-    switch (role) {
+std::string text_of(const Standing& standing) {
+    if (standing.own) {
+        std::string text;
+        for (const Right right : kAllRights) {
+            if (!standing.may(right)) continue;
+            text += (text.empty() ? "" : ", ") + std::string(label(right));
+        }
+        return text;
+    }
+    switch (standing.role) {
         case Role::none:
             return "nothing";
         case Role::viewer:
@@ -144,8 +152,8 @@ Heading heading_of(const serial_server::Settings& master) {
 }
 
 Heading heading_of(const web::Settings& http) {
-    std::string text = "http " + http.name() + ": without a token " + text_of(http.anonymous) +
-                       ", for " + text_of(http.allow);
+    std::string text = "http " + http.name() + ": without a token " +
+                       text_of(http.anonymous_standing()) + ", for " + text_of(http.allow);
     if (!http.hosts.empty()) text += ", as";
     for (const std::string& host : http.hosts) text += ' ' + host;
     return {std::move(text), " listen anonymous allow hosts "};

@@ -23,17 +23,21 @@ struct Door {
 };
 
 Door door(std::string name, Who who) {
-    const bool writes = who.role >= Role::operator_;
+    const bool writes = Standing{who.role, who.own_role}.may(Right::write);
     const bool is_open = who.token.empty();
     return {std::move(name), make_who(std::move(who)), !writes, is_open};
 }
 
 void add_http(const web::Settings& http, std::vector<Door>& doors) {
-    Who who{.face = Face::http, .listener = http.name(), .role = http.anonymous};
+    Who who{.face = Face::http,
+            .listener = http.name(),
+            .role = http.anonymous,
+            .own_role = http.anonymous_own};
     if (http.anonymous != Role::none) doors.push_back(door("http " + http.name(), who));
     for (const web::Token& token : http.tokens) {
         who.token = token.name;
         who.role = token.role;
+        who.own_role = token.own_role;
         doors.push_back(door("http token " + token.name, who));
     }
 }

@@ -35,22 +35,6 @@ std::string_view label(Face face) {
     std::abort();
 }
 
-std::string_view label(Role role) {
-    switch (role) {
-        case Role::none:
-            return "none";
-        case Role::viewer:
-            return "viewer";
-        case Role::operator_:
-            return "operator";
-        case Role::engineer:
-            return "engineer";
-        case Role::admin:
-            return "admin";
-    }
-    std::abort();
-}
-
 std::uint64_t host_number(std::string_view address) {
     const auto number = std::hash<std::string_view>{}(without_mapping(address));
     return number == 0 ? 1 : number;

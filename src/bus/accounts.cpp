@@ -81,8 +81,8 @@ std::string shortened(const std::string& hex) {
 bool may_write(ByteView pdu) { return !modbus::is_pure_read(pdu) && pdu[0] != 0 && pdu[0] < 0x80; }
 
 /// The write was transmitted or executed: a panel may have changed.
-bool is_accepted(const WriteRecord& write, Outcome outcome) {
-    return write.transaction != 0 || outcome == Outcome::ok;
+bool is_accepted(const WriteEnd& write) {
+    return write.transaction != 0 || write.outcome == Outcome::ok;
 }
 
 std::string place_of(const std::optional<modbus::Span>& written) {
@@ -92,15 +92,15 @@ std::string place_of(const std::optional<modbus::Span>& written) {
 
 }  // namespace
 
-std::optional<WriteRecord> write_record_of(const Request& request) {
+std::optional<WriteEnd> write_record_of(const Request& request) {
     const modbus::Request& asked = request.request;
     if (!may_write(asked.pdu())) return std::nullopt;
-    return WriteRecord{request.who, asked.pdu(), asked.access().write, !request.poll};
+    return WriteEnd{request.who, asked.pdu(), asked.access().write, !request.poll};
 }
 
-std::optional<WriteRecord> write_record_of(ByteView pdu, const WhoRef& who) {
+std::optional<WriteEnd> write_record_of(ByteView pdu, const WhoRef& who) {
     if (!may_write(pdu)) return std::nullopt;
-    WriteRecord write{who, Bytes(pdu.begin(), pdu.end())};
+    WriteEnd write{who, Bytes(pdu.begin(), pdu.end())};
     if (modbus::check_request(pdu, modbus::QuantityCheck::wide))
         write.items = modbus::access_of(pdu).write;
     return write;
@@ -128,7 +128,7 @@ std::optional<Refusal> unrecordable(const Settings& settings, std::uint8_t stati
     return unrecorded(name_of(settings.stations, station));
 }
 
-void complete(WriteRecord& write, const Answer& answer) {
+void complete(WriteEnd& write, const Answer& answer) {
     write.transmitted = answer.transmitted;
     write.transaction = answer.transactions.last();
     if (answer.pdu && !answer.refusal) write.exception = modbus::exception_of(*answer.pdu);
@@ -137,17 +137,16 @@ void complete(WriteRecord& write, const Answer& answer) {
     write.rule = write.denied ? answer.refusal->why : std::string(label(answer.refusal->rule));
 }
 
-void log_write(const Settings& settings, std::uint8_t station, const WriteRecord& write,
-               Outcome outcome) {
+void log_write(const Settings& settings, const WriteEnd& write) {
     const std::string name =
-        station == 0 ? std::string("broadcast") : name_of(settings.stations, station);
+        write.station == 0 ? std::string("broadcast") : name_of(settings.stations, write.station);
     const std::string full_name = text_of(write.who);
     const std::string client = without_port(full_name);
     const std::string at = place_of(write.items);
     const std::string pdu = hex_of(write.pdu);
     const std::string place = settings.name + '/' + name + ' ' + at;
-    const std::string ended(label(outcome));
-    const bool accepted = is_accepted(write, outcome);
+    const std::string ended(label(write.outcome));
+    const bool accepted = is_accepted(write);
     std::vector<rt::LogField> fields{
         {"line", settings.name}, {"station", name}, {"client", full_name}};
     if (!at.empty()) fields.push_back({"at", at});
@@ -161,22 +160,6 @@ void log_write(const Settings& settings, std::uint8_t station, const WriteRecord
 }
 
 namespace {
-
-void record_write(const Settings& settings, std::uint8_t station, const WriteRecord& write,
-                  Outcome outcome) {
-    if (!settings.record_write) return;
-    WriteEnd end;
-    end.station = station;
-    end.pdu = write.pdu;
-    end.items = write.items;
-    end.who = write.who;
-    end.outcome = outcome;
-    end.transmitted = write.transmitted;
-    end.transaction = write.transaction;
-    end.exception = write.exception;
-    end.rule = write.rule;
-    settings.record_write(end);
-}
 
 /// Returns the host without port and brackets.
 std::string_view host_in(std::string_view word) {
@@ -423,19 +406,25 @@ void observe(const Settings& settings, const BusEvent& event) {
 
 Account::Account(const Settings& settings) : settings_(settings), counters_(settings.stations) {}
 
-void Account::add(std::uint8_t station, std::uint8_t function,
-                  const std::optional<WriteRecord>& write, Outcome outcome, Duration took) {
+void Account::add(std::uint8_t station, std::uint8_t function, std::optional<WriteEnd> write,
+                  Outcome outcome, Duration took) {
     counters_.count(station, function, outcome, took);
-    if (write && write->logged) log_write(settings_, station, *write, outcome);
-    if (write) record_write(settings_, station, *write, outcome);
+    if (write) end_write(station, *write, outcome);
     observe(settings_, TransactionEvent{station, function, outcome, took});
+}
+
+void Account::end_write(std::uint8_t station, WriteEnd& write, Outcome outcome) {
+    write.station = station;
+    write.outcome = outcome;
+    if (write.logged) log_write(settings_, write);
+    if (settings_.record_write) settings_.record_write(write);
 }
 
 void Account::add_refused(std::uint8_t station, ByteView pdu, const WhoRef& who, std::string rule) {
     if (pdu.empty()) return;
     auto write = write_record_of(pdu, who);
     if (write) write->rule = std::move(rule);
-    add(station, pdu[0], write, Outcome::refused, Duration::zero());
+    add(station, pdu[0], std::move(write), Outcome::refused, Duration::zero());
 }
 
 }  // namespace panelgate::bus

@@ -26,25 +26,10 @@ namespace panelgate::bus {
 /// Logs a station event in one line, with a hint.
 void log_event(const Settings& settings, const arbiter::StationEvent& event);
 
-/// What is recorded of a write when it ends.
-struct WriteRecord {
-    WhoRef who;
-    Bytes pdu;                            ///< as asked
-    std::optional<modbus::Span> items{};  ///< that it writes, if it says so
-    bool logged = true;                   ///< false: the gateway's own (relays), only for the audit
-    bool transmitted = false;
-    /// The last transaction made for it, as in the trace; 0: none.
-    arbiter::Transaction transaction = 0;
-    std::optional<std::uint8_t> exception{};  ///< the panel's
-    /// What refused it: a rule of `access` by its name, or the label of another Rule.
-    std::string rule{};
-    bool denied = false;  ///< by a rule of `access`
-};
-
-/// Returns nullopt for reads.
-std::optional<WriteRecord> write_record_of(const Request& request);
+/// What is known of a write before it ends; nullopt for reads.
+std::optional<WriteEnd> write_record_of(const Request& request);
 /// The same for a PDU that was never submitted; without `items` if it is not a valid request.
-std::optional<WriteRecord> write_record_of(ByteView pdu, const WhoRef& who);
+std::optional<WriteEnd> write_record_of(ByteView pdu, const WhoRef& who);
 /// True if the rules let `who` read something of this station (0: of the line).
 bool may_tell(const Settings& settings, const WhoRef& who, std::uint8_t station);
 /// Counts by the name of the rule: all that may refuse, and no others.
@@ -53,11 +38,10 @@ std::map<std::string, std::uint64_t> denials_by_rule(
 /// Refuses a write while none can be recorded.
 std::optional<Refusal> unrecordable(const Settings& settings, std::uint8_t station);
 /// Completes the record of a write that has ended.
-void complete(WriteRecord& write, const Answer& answer);
-/// Logs at info. Every transmitted write is logged with its whole PDU (rt::log_each); writes that
-/// were refused or abandoned before are rate-limited.
-void log_write(const Settings& settings, std::uint8_t station, const WriteRecord& write,
-               Outcome outcome);
+void complete(WriteEnd& write, const Answer& answer);
+/// Logs at info, without the gateway's own. Every transmitted write is logged with its whole PDU
+/// (rt::log_each); writes that were refused or abandoned before are rate-limited.
+void log_write(const Settings& settings, const WriteEnd& write);
 
 /// Counts each client's requests and their outcomes. Bounded; later answers to a forgotten client
 /// are not counted. Pure.
@@ -194,7 +178,7 @@ class Account {
     /// Call after the settings changed.
     void apply() { counters_.apply(settings_.stations); }
 
-    void add(std::uint8_t station, std::uint8_t function, const std::optional<WriteRecord>& write,
+    void add(std::uint8_t station, std::uint8_t function, std::optional<WriteEnd> write,
              Outcome outcome, Duration took);
     /// Counts a request that a server refused before submitting it, by a rule of `access` if it is
     /// named. An empty PDU is ignored.
@@ -204,6 +188,8 @@ class Account {
     const RequestCounters& counters() const { return counters_; }
 
   private:
+    void end_write(std::uint8_t station, WriteEnd& write, Outcome outcome);
+
     const Settings& settings_;
     RequestCounters counters_;
 };

@@ -179,7 +179,7 @@ void Bus::State::answer(Pending entry, Answer result) {
     const Outcome outcome = outcome_of(result);
     if (result.refusal && result.refusal->rule == Rule::denied) ++denials[result.refusal->why];
     if (entry.write) complete(*entry.write, result);
-    account.add(entry.station, entry.function, entry.write, outcome, took);
+    account.add(entry.station, entry.function, std::move(entry.write), outcome, took);
     clients.count_outcome(entry.client, outcome, now);
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
     if (success) account.counters().succeeded(entry.station, wall_seconds_of(wall.at(now)));

@@ -29,7 +29,7 @@ struct Bus::State final : public line::Line::Events {
         std::uint8_t station = 0;
         std::uint8_t function = 0;
         TimePoint arrived;
-        std::optional<WriteRecord> write{};
+        std::optional<WriteEnd> write{};
         Bytes original_pdu{};      ///< if translated: the client's PDU
         std::uint8_t sent_as = 0;  ///< ... and the function sent; 0: not translated
         ClientId client = 0;

@@ -56,6 +56,7 @@ relays: [{from: press/UW100, to: press/UW200, count: 8, every: 1s}]
 mqtt: {broker: "mqtt://broker.plant:1883"}
 access:
   default: allow
+  roles: [{name: setter, rights: [read, write]}]
   rules:
     - {name: press-setpoints, allow: [read, write], from: [192.168.10.0/24], roles: [operator],
        tokens: [ops], faces: [http], listeners: ["127.0.0.1:8080"], stations: [press],

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "check_doors.hpp"
+#include "load_roles.hpp"
 #include "load_stations.hpp"
 #include "loader.hpp"
 #include "panelgate/base/text.hpp"
@@ -312,6 +313,7 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     load_lines(loading, root);
     keep_profiles(loading.config);
     for (const yaml::Node& body : unused) check_template(loading, body);
+    load_own_roles(loading, root);
     load_modbus_tcp(loading, root);
     load_serial_masters(loading, root);
     load_http(loading, root);

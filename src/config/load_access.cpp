@@ -1,4 +1,5 @@
 #include "load_access.hpp"
+#include "load_roles.hpp"
 
 #include <algorithm>
 #include <array>
@@ -144,13 +145,11 @@ web::Token load_token(Loading& loading, const Node& node) {
     });
     web::Token token;
     token.name = in.required_text("name").value_or("");
-    constexpr std::array<std::pair<std::string_view, Role>, 4> kRoles{
-        {{"viewer", Role::viewer},
-         {"operator", Role::operator_},
-         {"engineer", Role::engineer},
-         {"admin", Role::admin}}};
-    if (in.required_text("role"))
-        token.role = in.choice<Role>("role", kRoles).value_or(Role::viewer);
+    if (in.required_text("role")) {
+        Standing standing = load_role(loading, in, "role").value_or(Standing{Role::viewer, {}});
+        token.role = standing.role;
+        token.own_role = std::move(standing.own);
+    }
     const std::string secret = load_secret(loading, in, elsewhere, token);
     if (web::is_token_hash(secret)) {
         token.hash = secret;

@@ -13,6 +13,7 @@
 
 #include "hints.hpp"
 #include "load_access.hpp"
+#include "load_roles.hpp"
 #include "loader.hpp"
 #include "panelgate/access/line_rules.hpp"
 #include "panelgate/access/settings.hpp"
@@ -39,7 +40,6 @@ constexpr Words<Face, 4> kFaces{{{"modbus_tcp", Face::modbus_tcp},
                                  {"http", Face::http},
                                  {"mqtt", Face::mqtt},
                                  {"serial_master", Face::serial_master}}};
-constexpr std::array<std::string_view, 4> kRoleWords{"viewer", "operator", "engineer", "admin"};
 
 /// The scalars of a list; an empty list is a problem, as it would mean nobody, or everybody.
 std::vector<const Node*> scalars(MapReader& in, std::string_view key, std::string_view example) {
@@ -125,10 +125,11 @@ void load_from(Loading& loading, MapReader& in, Rule& rule) {
 void load_roles(Loading& loading, MapReader& in, Rule& rule) {
     for (const Node* item : scalars(in, "roles", "[viewer, operator]")) {
         rule.roles.push_back(item->scalar);
-        if (std::ranges::find(kRoleWords, item->scalar) == kRoleWords.end())
-            loading.warn(item->mark, "no token has the role " + yaml::quote(item->scalar) +
-                                         ", only a client's certificate can carry it" +
-                                         did_you_mean(item->scalar, kRoleWords, "roles"));
+        if (!is_role(loading.config, item->scalar))
+            loading.warn(item->mark,
+                         "no token has the role " + yaml::quote(item->scalar) +
+                             ", only a client's certificate can carry it" +
+                             did_you_mean(item->scalar, role_words(loading.config), "roles"));
     }
 }
 
@@ -209,6 +210,8 @@ void load_name_of(Loading& loading, MapReader& in, Rule& rule) {
     rule.name = load_name(in, true).value_or("");
     if (rule.name == "default")
         in.problem("name", "a rule cannot be called default: that is what no rule decides");
+    if (is_role(loading.config, rule.name))
+        in.problem("name", "a rule cannot be called as a role: refusals name either");
     if (!rule.name.empty())
         loading.firsts.once(in, "name", "rule " + rule.name,
                             "there are two rules '" + rule.name + '\'');
@@ -327,6 +330,8 @@ void load_rules(Loading& loading, MapReader& root) {
     if (node == nullptr) return refuse_empty(root, "access", "leave it out for no rules");
     MapReader in(*node, loading.problems, "access");
     rules_keys().read(in, loading.config.access);
+    in.sequence("roles", "[{name: setter, rights: [read, write]}]");  // load_own_roles() reads them
+    in.at_most("roles", access::Settings::kMaxRoles, "roles");
     const Node* list = in.sequence("rules", "[" + std::string(kRuleExample) + "]");
     if (in.at_most("rules", access::Settings::kMaxRules, "rules") && list != nullptr) {
         for (const Node& item : list->items) load_rule(loading, item);
@@ -337,6 +342,11 @@ void load_rules(Loading& loading, MapReader& root) {
 
 void apply_rules(Config& config) {
     const auto shared = std::make_shared<const access::Settings>(config.access);
+    const auto give = [&](std::optional<tls::Settings>& tls) {
+        if (tls) tls->own_roles = config.access.roles;
+    };
+    for (tcp_server::Settings& listener : config.modbus_tcp) give(listener.tls);
+    if (config.http) give(config.http->tls);
     for (Line& line : config.lines) {
         std::vector<std::uint8_t> listed;
         for (const Station& station : line.stations) listed.push_back(station.id);

@@ -9,6 +9,7 @@
 
 #include "hints.hpp"
 #include "load_access.hpp"
+#include "load_roles.hpp"
 #include "load_tls.hpp"
 #include "loader.hpp"
 #include "panelgate/config/describe.hpp"
@@ -396,6 +397,10 @@ void load_http(Loading& loading, MapReader& root) {
     MapReader in(*node, loading.problems, "http");
     web::Settings settings;
     load_listen(in, settings);
+    if (auto standing = load_role(loading, in, "anonymous", true)) {
+        settings.anonymous = standing->role;
+        settings.anonymous_own = std::move(standing->own);
+    }
     http_keys().read(in, settings);
     load_hosts(loading, in, settings);
     load_allow(loading, in, settings.allow);

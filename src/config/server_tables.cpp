@@ -150,20 +150,20 @@ const Keys<serial_server::Settings>& master_keys() {
 
 const Keys<web::Settings>& http_keys() {
     using web::Settings;
-    static constexpr Words<Role, 5> kRoles{{{"none", Role::none},
-                                            {"viewer", Role::viewer},
-                                            {"operator", Role::operator_},
-                                            {"engineer", Role::engineer},
-                                            {"admin", Role::admin}}};
     static const auto kKeys =
         Keys<Settings>()
             .other("listen", "ADDR:PORT or [ADDR]:PORT.",
                    [](const Settings& settings) { return settings.name(); })
             .initially("127.0.0.1:8080")
             .change_needs(kListensAnew)
-            .word("anonymous", &Settings::anonymous, kRoles,
-                  "Role without a token: none, viewer (reads), operator (reads and writes), "
-                  "engineer (also raw, broadcast, discover, simulator), admin (also reload).")
+            .other("anonymous",
+                   "Role without a token: none, viewer (reads), operator (reads and writes), "
+                   "engineer (also raw, broadcast, discover, simulator), admin (also reload), or "
+                   "one of access.roles.",
+                   [](const Settings& settings) {
+                       return std::string(settings.anonymous_standing().name());
+                   })
+            .initially("viewer")
             .other("hosts",
                    "Its names in URLs, besides its addresses and localhost; another name "
                    "is answered 421. Without it the machine's name.",
@@ -224,8 +224,8 @@ const Keys<web::Token>& token_keys() {
                    [](const web::Token& token) { return token.name; })
             .other("role",
                    "viewer reads, operator writes, engineer also raw, broadcast, discover and "
-                   "simulator, admin also reload.",
-                   [](const web::Token& token) { return std::string(label(token.role)); })
+                   "simulator, admin also reload; or one of access.roles.",
+                   [](const web::Token& token) { return std::string(token.standing().name()); })
             .other("file",
                    "File that holds the token, or its hash as `panelgate token new` prints it, and "
                    "nothing else.",
@@ -346,10 +346,29 @@ std::string place_text(const access::Place& place) {
 
 const Keys<access::Settings>& rules_keys() {
     static constexpr Words<bool, 2> kDefaults{{{"allow", true}, {"deny", false}}};
-    static const auto kKeys = Keys<access::Settings>()
-                                  .word("default", &access::Settings::allow_by_default, kDefaults,
-                                        "What is done where no rule matches: allow or deny.")
-                                  .other("rules", "Rules, in the order in which they are asked.");
+    static const auto kKeys =
+        Keys<access::Settings>()
+            .word("default", &access::Settings::allow_by_default, kDefaults,
+                  "What is done where no rule matches: allow or deny.")
+            .other("roles", "Roles besides viewer, operator, engineer and admin.")
+            .other("rules", "Rules, in the order in which they are asked.");
+    return kKeys;
+}
+
+const Keys<OwnRole>& own_role_keys() {
+    static const auto kKeys =
+        Keys<OwnRole>()
+            .other("name", "Name of the role, for tokens, anonymous, certificates and rules.",
+                   [](const OwnRole& role) { return role.name; })
+            .other("rights",
+                   "What it may do: read, write, broadcast, raw, discover, simulator, reload. "
+                   "A broadcast is also a write, and raw also a read or a write.",
+                   [](const OwnRole& role) {
+                       std::vector<Right> rights;
+                       for (const Right right : kAllRights)
+                           if (role.rights.has(right)) rights.push_back(right);
+                       return words_text(rights);
+                   });
     return kKeys;
 }
 
@@ -368,8 +387,9 @@ const Keys<access::Rule>& rule_keys() {
             .other("from", "Networks of the clients that it is about. Without it any.",
                    [](const Rule& rule) { return networks_text(rule.from); })
             .other("roles",
-                   "Roles that it is about: viewer, operator, engineer, admin, or a role of a "
-                   "client's certificate. Modbus clients without one are operators.",
+                   "Roles that it is about: viewer, operator, engineer, admin, one of "
+                   "access.roles, or a role of a client's certificate. Modbus clients without one "
+                   "are operators.",
                    [](const Rule& rule) { return names_text(rule.roles); })
             .other("tokens", "Tokens that it is about, by name.",
                    [](const Rule& rule) { return names_text(rule.tokens); })

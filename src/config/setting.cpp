@@ -108,6 +108,8 @@ void show_servers(const SettingWriter& top, const Config& config) {
     if (config.http) show_http(top, *config.http);
     const SettingWriter access = top.below("access");
     rules_keys().show(access, config.access);
+    for (const OwnRole& role : config.access.roles)
+        own_role_keys().show(access.item("roles", role.name), role);
     for (const access::Rule& rule : config.access.rules)
         rule_keys().show(access.item("rules", rule.name), rule);
     if (config.mqtt) {

@@ -79,5 +79,6 @@ std::string size_text(std::size_t bytes);
 /// Of the top-level `access`.
 const Keys<access::Settings>& rules_keys();
 const Keys<access::Rule>& rule_keys();
+const Keys<OwnRole>& own_role_keys();
 
 }  // namespace panelgate::config

@@ -234,14 +234,21 @@ bool lasts_longer(const web::Token& token, const web::Token& than) {
     return than.expires && (!token.expires || *token.expires > *than.expires);
 }
 
+/// True if it may do something that the other may not.
+bool may_more(const Standing& one, const Standing& other) {
+    return std::ranges::any_of(kAllRights,
+                               [&](Right right) { return one.may(right) && !other.may(right); });
+}
+
 void compare_tokens(Lines& all, const web::Settings& running, const web::Settings& next) {
     for (const web::Token& token : next.tokens) {
         const auto was = std::ranges::find(running.tokens, token.hash, &web::Token::hash);
         if (was == running.tokens.end()) {
             all.push_back("http: token " + token.name + " is valid");
-        } else if (token.role > was->role) {
-            all.push_back("http: token " + token.name + ": role " + std::string(label(was->role)) +
-                          " -> " + std::string(label(token.role)));
+        } else if (may_more(token.standing(), was->standing())) {
+            all.push_back("http: token " + token.name + ": role " +
+                          std::string(was->standing().name()) + " -> " +
+                          std::string(token.standing().name()));
         } else if (lasts_longer(token, *was)) {
             all.push_back("http: token " + token.name + ": expires later");
         }
@@ -268,9 +275,11 @@ void compare_http(Lines& all, const Config& running, const Config& next) {
     compare_tls(all, endpoint, running.http->tls, next.http->tls);
     compare_allow(all, endpoint, running.http->allow, next.http->allow);
     compare_hosts(all, *running.http, *next.http);
-    if (next.http->anonymous > running.http->anonymous)
-        all.push_back("http: anonymous " + std::string(label(running.http->anonymous)) + " -> " +
-                      std::string(label(next.http->anonymous)));
+    const Standing was = running.http->anonymous_standing();
+    const Standing anonymous = next.http->anonymous_standing();
+    if (may_more(anonymous, was))
+        all.push_back("http: anonymous " + std::string(was.name()) + " -> " +
+                      std::string(anonymous.name()));
     compare_tokens(all, *running.http, *next.http);
 }
 
@@ -307,6 +316,12 @@ void compare_rules(Lines& all, const access::Settings& running, const access::Se
     const auto find = [](const access::Settings& in, const std::string& name) {
         return std::ranges::find(in.rules, name, &access::Rule::name);
     };
+    for (const OwnRole& role : next.roles) {
+        const auto was = std::ranges::find(running.roles, role.name, &OwnRole::name);
+        const Standing before{Role::none, was == running.roles.end() ? OwnRole{} : *was};
+        if (may_more({Role::none, role}, before))
+            all.push_back("access: role " + role.name + " has more rights");
+    }
     std::vector<std::string> kept;
     for (const access::Rule& rule : running.rules) {
         const auto now = find(next, rule.name);

@@ -71,12 +71,15 @@ std::vector<bus::BusClient*> UnitMap::broadcast_lines(std::uint8_t unit) const {
 
 Caller::Caller(std::string name, WhoRef who) : name_(std::move(name)), who_(std::move(who)) {}
 
-void Caller::certify(std::string subject, std::optional<std::string> role) {
+void Caller::certify(std::string subject, std::optional<std::string> role,
+                     std::span<const OwnRole> own_roles) {
     Who who = *who_;
     who.certificate = std::move(subject);
     by_certificate_ = role.has_value();
     if (role) {
-        who.role = tls::role_named(*role);
+        Standing standing = standing_named(*role, own_roles);
+        who.role = standing.role;
+        who.own_role = std::move(standing.own);
         who.certificate_role = std::move(*role);
     }
     who_ = make_who(std::move(who));

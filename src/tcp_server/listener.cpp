@@ -158,11 +158,14 @@ void Listener::Core::apply_roles(const Settings& before) {
     };
     const bool was = from_certificate(before);
     const bool is = from_certificate(shared_->settings);
-    if (was == is) return;
+    const bool others = was && is && before.tls->own_roles != shared_->settings.tls->own_roles;
+    if (was == is && !others) return;
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // dismiss() erases
     for (const auto& session : sessions)
         if (session->has_other_role(was, is))
             session->dismiss("role_from has changed, and with it what its certificate allows");
+        else if (others && session->has_own_role())
+            session->dismiss("access.roles have changed, and with them what its role allows");
 }
 
 void Listener::Core::review() {

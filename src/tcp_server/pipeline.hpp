@@ -106,7 +106,9 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
     const std::string& client() const { return caller_.name(); }
     /// As Caller::certify().
     void certify(std::string subject, std::optional<std::string> role) {
-        caller_.certify(std::move(subject), std::move(role));
+        std::span<const OwnRole> own;
+        if (shared_->settings.tls) own = shared_->settings.tls->own_roles;
+        caller_.certify(std::move(subject), std::move(role), own);
     }
 
     /// Starts no further request: queued ones are answered Fault::cancelled.

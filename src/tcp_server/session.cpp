@@ -103,6 +103,11 @@ bool Session::has_other_role(bool from_certificate_before, bool from_certificate
     return role(from_certificate_before) != role(from_certificate_now);
 }
 
+bool Session::has_own_role() const {
+    const auto role = stream_.is_secure() ? stream_.peer().role : std::nullopt;
+    return role && tls::role_named(*role) == Role::none;
+}
+
 void Session::close() {
     if (std::exchange(closed_, true)) return;
     const std::shared_ptr<Session> self = shared_from_this();

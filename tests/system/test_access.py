@@ -32,10 +32,10 @@ ILLEGAL = b"\x01"
 
 
 @contextlib.contextmanager
-def plant(rules=RULES):
+def plant(rules=RULES, roles=None):
     with tempfile.TemporaryDirectory() as folder:
         tokens = []
-        for name, role in (("eye", "viewer"), ("lab", "engineer")):
+        for name, role in (roles or {"eye": "viewer", "lab": "engineer"}).items():
             file = pathlib.Path(folder) / name
             file.write_text(f"token-of-{name}-0123456789")
             file.chmod(0o600)
@@ -236,6 +236,59 @@ class Mqtt(unittest.TestCase):
                 self.assertTrue(listener.wait_for(f"{topic}/level/set/result")["ok"])
                 self.assertEqual(listener.of(f"{topic}/ramp"), [])
                 self.assertIn('rule="mode-is-fixed"} 1', program.get("/metrics")[1])
+
+
+OWN_ROLES = """{roles: [{name: setter, rights: [read, write]}, {name: caller, rights: [read, raw]}, {name: keeper, rights: [reload]}],
+  rules: [{name: setters-leave-the-oven, deny: [write], roles: [setter], stations: [oven]}]}"""
+
+
+class OwnRoles(unittest.TestCase):
+    def test_has_what_it_lists_and_no_more(self):
+        broadcast = {"table": "holding-registers", "address": 100, "values": [1]}
+        asked = (("GET", "/api/v1/stations/press/devices/UW100", None, "setter caller"),
+                 ("PUT", "/api/v1/stations/press/devices/UW100", {"values": [1]}, "setter"),
+                 ("PUT", "/api/v1/stations/oven/devices/GDT100", {"values": [1]}, ""),
+                 ("POST", "/api/v1/lines/floor1/raw", {"station": 31, "pdu": "0300640001"}, "caller"),
+                 ("POST", "/api/v1/lines/floor1/raw", {"station": 31, "pdu": "1000640001020001"}, ""),
+                 ("POST", "/api/v1/lines/floor1/broadcast", broadcast, ""),
+                 ("POST", "/api/v1/lines/floor1/discover", {}, ""),
+                 ("PUT", "/api/v1/simulator/press", {"dead": 0}, ""),
+                 ("POST", "/api/v1/reload", None, "keeper"))
+        with plant(OWN_ROLES, roles={"setter": "setter", "caller": "caller", "keeper": "keeper"}) as program:
+            for verb, path, body, who in asked:
+                for token in ("setter", "caller", "keeper"):
+                    status, text = ask(program, verb, path, token, body)
+                    self.assertEqual(status, 200 if token in who.split() else 403, (verb, path, token, text))
+            status, text = ask(program, "PUT", "/api/v1/stations/oven/devices/GDT100", "setter", {"values": [1]})
+            self.assertEqual(json.loads(text)["rule"], "setters-leave-the-oven")
+            status, text = ask(program, "POST", "/api/v1/lines/floor1/raw", "caller", {"station": 31, "pdu": "1000640001020001"})
+            self.assertEqual(json.loads(text)["rule"], "caller")
+            self.assertIn('panelgate_access_denied_total{rule="caller"} 2', ask(program, "GET", "/metrics")[1])
+            status, text = ask(program, "POST", "/api/v1/lines/floor1/broadcast", "setter", broadcast)
+            self.assertEqual(json.loads(text)["detail"], "this needs the right broadcast, which the role 'setter' does not have")
+            said = json.loads(ask(program, "GET", "/api/v1/configuration", "setter")[1])
+            self.assertEqual((said["role"], said["rights"]), ("setter", ["read", "write"]))
+
+    def test_check_names_what_is_wrong_and_explains(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            def check(access, *more, http=config.FREE_PORT):
+                file.write_text(config.gateway(config.line(stations=STATIONS.strip()), access=access, http=http))
+                return harness.run("check", "-c", file, *more)
+            for access, said in (("{roles: [{name: setter, rights: [red]}]}", "there is no right 'red'; did you mean 'read'?"),
+                                 ("{roles: [{name: setter}]}", "a role needs rights, such as rights: [read, write]"),
+                                 ("{roles: [{name: viewer, rights: [read]}]}", "the role 'viewer' is there already"),
+                                 ("{roles: [{name: a, rights: [read]}, {name: a, rights: [read]}]}", "there are two roles 'a'"),
+                                 ("{roles: [{name: a, rights: [read]}], rules: [{name: a, deny: [read]}]}", "cannot be called as a role")):
+                done = check(access)
+                self.assertEqual((done.returncode, said in done.stderr), (78, True), (access, done.stderr))
+            done = check("{roles: [{name: setter, rights: [read]}]}", http=config.FREE_PORT + ", anonymous: seter")
+            self.assertIn("anonymous must be none, viewer, operator, engineer, admin or setter, not 'seter'; did you mean 'setter'?",
+                          done.stderr)
+            for question, code in (("role=setter read press/UW102", 0), ("role=setter write press/UW102", 1),
+                                   ("role=setter face=modbus_tcp broadcast press/UW102", 1)):
+                done = check("{roles: [{name: setter, rights: [read]}]}", "--explain", question)
+                self.assertEqual(done.returncode, code, (question, done.stdout, done.stderr))
 
 
 class Explain(unittest.TestCase):

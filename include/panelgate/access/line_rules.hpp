@@ -21,10 +21,14 @@ inline constexpr std::string_view kDefaultRule = "default";
 
 struct Verdict {
     bool allowed = true;
-    const Rule* rule = nullptr;  ///< that decided; null: the default
+    const Rule* rule = nullptr;  ///< that decided; null: the default, or a role
     Act act = Act::read;         ///< what was refused, or judged last
+    std::string_view role{};     ///< of who asked, where it lacks the right to this act
 
-    std::string_view rule_name() const { return rule == nullptr ? kDefaultRule : rule->name; }
+    std::string_view rule_name() const {
+        if (!role.empty()) return role;
+        return rule == nullptr ? kDefaultRule : rule->name;
+    }
 };
 
 /// The rules as one line's stations meet them. Copies share nothing; single-threaded: judging fills
@@ -62,9 +66,11 @@ class LineRules {
     bool reads_all(const WhoRef& who, std::uint8_t station) const;
     /// True if both decide alike on any line.
     bool says_the_same(const LineRules& other) const {
-        return is_open() ? other.is_open() : other.settings_ && *settings_ == *other.settings_;
+        if (settings_ && other.settings_) return *settings_ == *other.settings_;
+        return is_open() && other.is_open();
     }
-    /// What may refuse: the names of all rules that deny, then the default. Empty if nothing does.
+    /// What may refuse: own roles, the names of all rules that deny, then the default. Empty if
+    /// nothing does.
     std::vector<std::string> denying_names() const;
     /// True if nothing is ever refused.
     bool is_open() const { return settings_ == nullptr || settings_->is_open(); }

@@ -72,9 +72,12 @@ struct Rule {
 /// Who may do what: the first rule that matches an item decides. Pure data.
 struct Settings {
     static constexpr std::size_t kMaxRules = 1000;
+    static constexpr std::size_t kMaxRoles = 64;
 
     bool allow_by_default = true;  ///< where no rule matches
     std::vector<Rule> rules;
+    /// Roles besides the default ones. What one of them lacks is refused before any rule.
+    std::vector<OwnRole> roles{};
 
     /// True if nothing is ever refused.
     bool is_open() const { return allow_by_default && rules.empty(); }

@@ -2,8 +2,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
+
+#include "panelgate/base/role.hpp"
 
 namespace panelgate {
 
@@ -18,17 +21,6 @@ enum class Face : std::uint8_t {
 };
 /// Returns "modbus_tcp", "udp", "serial_master", "http", "mqtt", "gateway": stable identifiers.
 std::string_view label(Face face);
-
-/// What somebody may do, least first; each includes those before it.
-enum class Role : std::uint8_t {
-    none,
-    viewer,     ///< reads
-    operator_,  ///< writes
-    engineer,   ///< raw requests, broadcasts, discoveries, simulated faults
-    admin,      ///< reload and rollback
-};
-/// Returns its name in the configuration.
-std::string_view label(Role role);
 
 /// Who asks: set once where a request comes in, and carried along with it. Immutable once made.
 struct Who {
@@ -47,7 +39,12 @@ struct Who {
     /// The same for all clients that must share one client's turns (P9), from host_number(). Not an
     /// identity: 0 is a host of its own.
     std::uint64_t host = 0;
+    std::optional<OwnRole> own_role{};  ///< the role is of the configuration; `role` is its least
 
+    /// The name of the role.
+    std::string_view role_name() const {
+        return own_role ? std::string_view(own_role->name) : label(role);
+    }
     friend bool operator==(const Who&, const Who&) = default;
 };
 /// Shared by all requests of a client; null only where nobody has said who asks.

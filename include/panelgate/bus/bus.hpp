@@ -39,15 +39,18 @@ struct TransactionEvent {
 };
 /// A write by any face, once, when it has ended: what an audit records. Valid for the call only.
 struct WriteEnd {
-    std::uint8_t station = 0;  ///< 0: a broadcast
-    ByteView pdu{};  ///< as asked; what was refused before it was submitted may be anything
-    std::optional<modbus::Span> items{};  ///< that it writes, if it says so
     WhoRef who{};
-    Outcome outcome = Outcome::ok;
+    Bytes pdu{};  ///< as asked; what was refused before it was submitted may be anything
+    std::optional<modbus::Span> items{};  ///< that it writes, if it says so
+    bool logged = true;                   ///< false: the gateway's own (relays), only for the audit
     bool transmitted = false;
     arbiter::Transaction transaction = 0;     ///< the last one made for it; 0: none
     std::optional<std::uint8_t> exception{};  ///< the panel's
-    std::string_view rule{};                  ///< what refused it; "" nothing did
+    /// What refused it: a rule of `access` by its name, or the label of another Rule; "" nothing.
+    std::string rule{};
+    bool denied = false;       ///< by a rule of `access`
+    std::uint8_t station = 0;  ///< 0: a broadcast
+    Outcome outcome = Outcome::ok;
 };
 
 /// What a bus reports to its observer.

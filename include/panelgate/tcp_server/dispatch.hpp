@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -76,9 +77,12 @@ class Caller {
     std::uint64_t host() const { return who_->host; }
     /// What its certificate says. `role` is the one in it, "" none, which is the least; nothing
     /// where its listener does not go by that. Call it before the first request.
-    void certify(std::string subject, std::optional<std::string> role);
-    /// By its certificate: only operators and above write.
-    bool reads_only() const { return by_certificate_ && who_->role < Role::operator_; }
+    void certify(std::string subject, std::optional<std::string> role,
+                 std::span<const OwnRole> own_roles = {});
+    /// By its certificate: only operators and above write, and own roles with that right.
+    bool reads_only() const {
+        return by_certificate_ && !Standing{who_->role, who_->own_role}.may(Right::write);
+    }
     /// Passes the request to a bus for one of its stations; station 0: broadcast.
     void transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,
                   bus::AnswerHandler handler);

@@ -5,7 +5,9 @@
 #include <memory>
 #include <string>
 #include <tuple>
+#include <vector>
 
+#include "panelgate/base/role.hpp"
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::tls {
@@ -38,6 +40,7 @@ struct Settings {
     std::size_t max_handshakes = 128;  ///< at the same time; beyond it the oldest gives way
     std::size_t max_handshakes_per_address = 16;
     Material material{};
+    std::vector<OwnRole> own_roles{};  ///< that a client's certificate may name
     /// Made of all this by whoever read the files, which takes milliseconds; null: not yet.
     std::shared_ptr<const Context> made{};
 
@@ -45,7 +48,8 @@ struct Settings {
         const auto all = [](const Settings& of) {
             return std::tie(of.certificate, of.key, of.ca, of.crl, of.client,
                             of.role_from_certificate, of.lowest, of.handshake_timeout,
-                            of.max_handshakes, of.max_handshakes_per_address, of.material);
+                            of.max_handshakes, of.max_handshakes_per_address, of.material,
+                            of.own_roles);
         };
         return all(one) == all(other);
     }

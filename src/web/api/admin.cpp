@@ -163,10 +163,19 @@ Handling post_reload(HttpRequest request, const Api* api) {
 
 namespace {
 
-std::string configuration_text(const Api& api, Role role, const std::string& configuration) {
+json::array rights_list(const Who& who) {
+    json::array list;
+    const Standing standing{who.role, who.own_role};
+    for (const Right right : kAllRights)
+        if (standing.may(right)) list.emplace_back(label(right));
+    return list;
+}
+
+std::string configuration_text(const Api& api, const Who& who, const std::string& configuration) {
     return "{\"version\":" + json_text(boost::json::value(api.providers.version)) +
-           ",\"role\":" + json_text(boost::json::value(label(role))) +
-           ",\"configuration\":" + configuration + ",\"rest\":" + json_text(offered()) + "}\n";
+           ",\"role\":" + json_text(boost::json::value(who.role_name())) +
+           ",\"rights\":" + json_text(rights_list(who)) + ",\"configuration\":" + configuration +
+           ",\"rest\":" + json_text(offered()) + "}\n";
 }
 
 /// The configuration of the stations that may be seen.
@@ -207,12 +216,14 @@ Handling get_configuration(HttpRequest request, const Api* api) {
         co_return to_response(problem(404, "this program shows no configuration"));
     const Sight sight(*api->directory, request.caller->who());
     if (!sight.everything())
-        co_return text_answer(configuration_text(
-            *api, request.role, seen_configuration(*api->providers.configuration, sight)));
-    std::shared_ptr<KeptAnswer>& kept = (*api->configuration)[request.role];
+        co_return text_answer(
+            configuration_text(*api, *request.caller->who(),
+                               seen_configuration(*api->providers.configuration, sight)));
+    const std::string role(request.caller->who()->role_name());
+    std::shared_ptr<KeptAnswer>& kept = (*api->configuration)[role];
     if (!kept) {
         kept = std::make_shared<KeptAnswer>(
-            configuration_text(*api, request.role, *api->providers.configuration),
+            configuration_text(*api, *request.caller->who(), *api->providers.configuration),
             "application/json");
     }
     Handling giving = KeptAnswer::give(kept, std::move(request));

@@ -87,6 +87,16 @@ constexpr Row kRows[] = {
     {"PUT", "/api/v1/stations/{}/{}/{}", put_table, kChange, kWrites},
 };
 
+/// What a role of the configuration has to have for it.
+Right right_for(const Row& row) {
+    if (row.needed == kSee) return Right::read;
+    if (row.needed == kChange) return Right::write;
+    if (row.needed == kAdmin) return Right::reload;
+    if (row.pattern.ends_with("/raw")) return Right::raw;
+    if (row.pattern.ends_with("/broadcast")) return Right::broadcast;
+    return row.pattern.ends_with("/discover") ? Right::discover : Right::simulator;
+}
+
 std::vector<std::string_view> words_of(std::string_view text) {
     std::vector<std::string_view> words;
     while (!text.empty()) {
@@ -105,7 +115,8 @@ std::vector<Route> routes(std::shared_ptr<const Api> api) {
         const auto call = [api, &row](HttpRequest request) {
             return conduct(std::move(request), api.get(), row.handler, row.policy);
         };
-        made.push_back({row.verb, row.pattern, row.needed, call, words_of(row.queries), row.probe});
+        made.push_back({row.verb, row.pattern, row.needed, call, words_of(row.queries), row.probe,
+                        right_for(row)});
     }
     return made;
 }
@@ -115,6 +126,7 @@ boost::json::array offered() {
     for (const Row& row : kRows) {
         list.push_back(boost::json::object{
             {"method", row.verb}, {"path", row.pattern}, {"role", label(row.needed)}});
+        if (row.needed != Role::none) list.back().as_object()["right"] = label(right_for(row));
     }
     return list;
 }

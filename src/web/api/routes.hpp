@@ -23,7 +23,7 @@ struct Api {
     /// What is served now: for what outlives a reload. Never null.
     std::shared_ptr<const std::shared_ptr<const Directory>> current;
     /// The answers of get_configuration(), by the client's role. Never null.
-    std::shared_ptr<std::map<Role, std::shared_ptr<KeptAnswer>>> configuration;
+    std::shared_ptr<std::map<std::string, std::shared_ptr<KeptAnswer>>> configuration;
 };
 using Handler = Handling (*)(HttpRequest request, const Api* api);
 

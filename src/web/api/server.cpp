@@ -28,7 +28,7 @@ std::shared_ptr<const Site> Server::site_of(Settings settings,
     api->keeps = std::move(directory);
     api->providers = providers_;
     api->keys = keys_;
-    api->configuration = std::make_shared<std::map<Role, std::shared_ptr<KeptAnswer>>>();
+    api->configuration = std::make_shared<std::map<std::string, std::shared_ptr<KeptAnswer>>>();
     auto site = std::make_shared<Site>();
     site->settings = std::move(settings);
     site->product = "panelgate/" + providers_.version;

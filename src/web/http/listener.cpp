@@ -94,12 +94,16 @@ void HttpListener::apply_roles(const Settings& before) {
         return settings.tls && settings.tls->role_from_certificate;
     };
     const Settings& now = shared_->site->settings;
-    if (from_certificate(before) == from_certificate(now)) return;
+    const bool was = from_certificate(before);
+    const bool is = from_certificate(now);
+    const bool others = was && is && before.tls->own_roles != now.tls->own_roles;
+    if (was == is && !others) return;
     const auto sessions = sessions_;
     for (const auto& [id, session] : sessions)
         if (session->stream().peer().role)
             dismiss(now.name(), *session,
-                    "role_from has changed, and with it what its certificate allows",
+                    others ? "access.roles have changed, and with them what its role allows"
+                           : "role_from has changed, and with it what its certificate allows",
                     now.request_timeout);
 }
 

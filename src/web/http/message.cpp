@@ -8,23 +8,26 @@
 
 namespace panelgate::web {
 
-void Caller::identify(std::string token, Role role, std::string listener) {
-    if (who_ && who_->token == token && who_->role == role && who_->listener == listener) return;
+void Caller::identify(std::string token, Standing standing, std::string listener) {
+    if (who_ && who_->token == token && who_->listener == listener &&
+        Standing{who_->role, who_->own_role} == standing)
+        return;
     Who who = who_ ? *who_ : Who{.face = Face::http, .address = address_};
     who.name = "http";
     if (!address_.empty()) who.name += ' ' + address_;
     if (!token.empty()) who.name += " token " + token;
     who.token = std::move(token);
-    who.role = role;
+    who.role = standing.role;
+    who.own_role = std::move(standing.own);
     who.listener = std::move(listener);
     who_ = make_who(std::move(who));
 }
 
-void Caller::certify(std::string subject, std::string word, std::optional<Role> role) {
+void Caller::certify(std::string subject, std::string word, std::optional<Standing> standing) {
     Who who = *who_;
     who.certificate = std::move(subject);
     who.certificate_role = std::move(word);
-    certificate_role_ = role;
+    certificate_role_ = std::move(standing);
     who_ = make_who(std::move(who));
 }
 

@@ -161,19 +161,35 @@ bool is_foreign_form(const HttpRequest& request) {
 
 }  // namespace
 
+namespace {
+
+/// Default roles have what the least one has that is needed; others have what they list.
+bool suffices(const Standing& standing, Role needed, Right right) {
+    return standing.own ? standing.may(right) : standing.role >= needed;
+}
+
+Problem insufficient(const Standing& standing, Role needed, Right right) {
+    if (!standing.own) return problem(403, "this needs the role " + std::string(label(needed)));
+    return problem(403, "this needs the right " + std::string(label(right)) + ", which the role '" +
+                            standing.own->name + "' does not have");
+}
+
+}  // namespace
+
 std::optional<Problem> check_access(const HttpRequest& request, Role needed,
-                                    const Settings& settings) {
+                                    const Settings& settings, Right right) {
     if (needed == Role::none) return std::nullopt;
     if (is_foreign_form(request)) return problem(415, "send the body as application/json");
     if (header(request, "authorization").empty()) {
-        const Role role = role_of(request, settings);
-        if (role >= needed) return std::nullopt;
+        const Standing standing = standing_of(request, settings);
+        if (suffices(standing, needed, right)) return std::nullopt;
         // Who has shown a role is known: another role would help.
         const bool certified = request.caller && request.caller->certificate_role();
-        if (certified && role != Role::none)
+        if (certified && standing.own) return insufficient(standing, needed, right);
+        if (certified && standing.role != Role::none)
             return problem(403, "this needs the role " + std::string(label(needed)) +
                                     ", and the client's certificate has " +
-                                    std::string(label(role)));
+                                    std::string(label(standing.role)));
         return unauthorized("this needs a token");
     }
     // Do not echo the value: without a scheme it may be the token.
@@ -183,8 +199,8 @@ std::optional<Problem> check_access(const HttpRequest& request, Role needed,
     if (token == nullptr) return unauthorized("this token is not known");
     if (has_expired(*token, request))
         return unauthorized("this token has expired, on " + rfc3339(*token->expires));
-    if (token->role < needed)
-        return problem(403, "this needs the role " + std::string(label(needed)));
+    if (!suffices(token->standing(), needed, right))
+        return insufficient(token->standing(), needed, right);
     return std::nullopt;
 }
 
@@ -201,14 +217,16 @@ std::optional<Problem> check_encoding(const HttpRequest& request) {
     return made;
 }
 
-Role role_of(const HttpRequest& request, const Settings& settings) {
+Standing standing_of(const HttpRequest& request, const Settings& settings) {
     if (header(request, "authorization").empty()) {
         const bool certified = request.caller && request.caller->certificate_role();
-        return std::max(settings.anonymous,
-                        certified ? *request.caller->certificate_role() : Role::none);
+        const Standing anonymous = settings.anonymous_standing();
+        if (!certified || request.caller->certificate_role()->role < anonymous.role)
+            return anonymous;
+        return *request.caller->certificate_role();
     }
     const Token* token = valid_token_of(request, settings);
-    return token == nullptr ? Role::none : token->role;
+    return token == nullptr ? Standing{} : token->standing();
 }
 
 std::string token_name(const HttpRequest& request, const Settings& settings) {
@@ -327,11 +345,12 @@ void count_refused(const HttpRequest& request, const Problem& why) {
 }
 
 /// check_access() with the throttling of token guesses.
-asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, Role needed,
+asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, const Route* route,
                                               Shared* shared) {
     const Settings& settings = shared->site->settings;
+    const Role needed = route->needed;
     if (needed == Role::none || !carries_token(*request))
-        co_return check_access(*request, needed, settings);
+        co_return check_access(*request, needed, settings, route->right);
     const std::string& address = request->caller->address();
     const Duration turn = shared->logins.turn(shared->site->now(), address);
     if (turn > Duration::zero()) shared->places.suspect(request->caller->id());
@@ -340,7 +359,7 @@ asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, Role n
     // Hanging up must reveal nothing about the token.
     if (request->caller->has_left()) co_return std::nullopt;
     shared->places.busy(request->caller->id());
-    const auto refused = check_access(*request, needed, settings);
+    const auto refused = check_access(*request, needed, settings, route->right);
     // With a token, only an unknown one gives 401.
     const bool failed = refused && refused->status == 401;
     const Duration hold = shared->logins.hold(shared->site->now(), address);
@@ -398,10 +417,11 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     if (request.method == "OPTIONS") co_return options(found, request, *site);
     if (found.route == nullptr) co_return to_response(not_found(found));
     if (site->wall) request.at = site->wall();
-    const auto refused = co_await admit(&request, found.route->needed, shared);
+    const auto refused = co_await admit(&request, found.route, shared);
     if (request.caller->has_left()) co_return HttpResponse();
-    request.role = role_of(request, site->settings);
-    request.caller->identify(token_name(request, site->settings), request.role,
+    Standing standing = standing_of(request, site->settings);
+    request.role = standing.role;
+    request.caller->identify(token_name(request, site->settings), std::move(standing),
                              site->settings.name());
     record_use(*request.caller, *shared);
     const Witness witness(request, *site);

@@ -13,8 +13,9 @@ namespace panelgate::web {
 /// Checks whether the request has the role. 401 for a wrong token, or for none where one would
 /// help; 403 for an insufficient role. A browser's request (Origin) that changes something must be
 /// application/json (415), which a foreign page cannot send unasked.
+/// `right`: what a role of the configuration has to have.
 std::optional<Problem> check_access(const HttpRequest& request, Role needed,
-                                    const Settings& settings);
+                                    const Settings& settings, Right right = Right::read);
 
 /// True if it carries a token, right or wrong; any other Authorization is no guess.
 bool carries_token(const HttpRequest& request);
@@ -24,7 +25,7 @@ std::optional<Problem> check_encoding(const HttpRequest& request);
 
 /// Returns the role of its token; without one that of its certificate or the anonymous one,
 /// whichever is more; none for an unknown token.
-Role role_of(const HttpRequest& request, const Settings& settings);
+Standing standing_of(const HttpRequest& request, const Settings& settings);
 
 /// Returns the name of its token, "" without a known one.
 std::string token_name(const HttpRequest& request, const Settings& settings);

@@ -179,9 +179,9 @@ void HttpSession::take_certificate() {
     const tls::Peer& peer = stream_.peer();
     const auto& tls = shared_->site->settings.tls;
     const bool counts = tls && tls->role_from_certificate && peer.role;
-    std::optional<Role> role;
-    if (counts) role = tls::role_named(*peer.role);
-    caller_->certify(peer.subject, counts ? *peer.role : "", role);
+    std::optional<Standing> standing;
+    if (counts) standing = standing_named(*peer.role, tls->own_roles);
+    caller_->certify(peer.subject, counts ? *peer.role : "", std::move(standing));
 }
 
 asio::awaitable<bool> HttpSession::serve_one() {

@@ -4,7 +4,7 @@ import {EventText} from './event_text.js';
 let token = null;
 try { token = sessionStorage.getItem('panelgate.token'); } catch { /* private window */ }
 
-export const gateway = {configuration: null, role: 'viewer'};
+export const gateway = {configuration: null, role: 'viewer', rights: ['read']};
 
 /** An answer that is none: RFC 9457 with its members, or a gateway that does not answer. */
 export class Refused extends Error {
@@ -97,17 +97,18 @@ export function offers(pattern) {
     return gateway.configuration?.rest.some((route) => `${route.method} ${route.path}` === pattern) ?? false;
 }
 
-const ROLES = ['none', 'viewer', 'operator', 'engineer', 'admin'];
-const may = (role) => ROLES.indexOf(gateway.role) >= ROLES.indexOf(role);
-export const mayWrite = () => may('operator');
-/** May discover stations and set simulated faults. */
-export const mayEngineer = () => may('engineer');
+const may = (right) => gateway.rights.includes(right);
+export const mayWrite = () => may('write');
+export const mayDiscover = () => may('discover');
+/** May set faults of simulated panels. */
+export const maySimulate = () => may('simulator');
 
 /** Learns what is configured, and what we may do. */
 export async function introduce() {
-    const {configuration, rest, role, version} = await get(path('configuration'));
+    const {configuration, rest, rights, role, version} = await get(path('configuration'));
     gateway.configuration = {...configuration, rest, version};
     gateway.role = role;
+    gateway.rights = rights;
     gateway.build = offers('GET /api/v1/version') ? await get(path('version')) : null;
 }
 

@@ -1,5 +1,5 @@
 // Looks for stations that nobody has listed, on a line that runs.
-import {gateway, get, mayEngineer, path, post, remove} from './api.js';
+import {gateway, get, mayDiscover, path, post, remove} from './api.js';
 import {refusal} from './confirm.js';
 import {choice, h, replace, table, text} from './dom.js';
 import {duration, t} from './language.js';
@@ -42,7 +42,7 @@ class Discovery {
     }
 
     #form() {
-        if (!mayEngineer()) {
+        if (!mayDiscover()) {
             return h('div', null, h('p', null, t('role.engineer.needed')), h('button', {type: 'button', onclick: askToken}, t('token.enter')));
         }
         return h('form', {class: 'request three', onsubmit: (event) => { event.preventDefault(); this.#look(); }},

@@ -48,6 +48,27 @@ std::string refused(const Settings& settings, const WhoRef& who, std::uint8_t st
     return verdict.allowed ? "" : std::string(verdict.rule_name());
 }
 
+TEST(LineRules, WhatAnOwnRoleLacksIsRefusedUnderItsName) {
+    OwnRole setter{.name = "setter"};
+    setter.rights.add(Right::read);
+    setter.rights.add(Right::write);
+    const WhoRef who = make_who({.role = Role::operator_, .own_role = setter});
+    Settings settings;
+    settings.roles = {setter};
+    EXPECT_EQ(refused(settings, who, 20, "06 0064 0001"_hex), "");
+    EXPECT_EQ(refused(settings, who, 0, "06 0064 0001"_hex), "setter") << "no broadcasts";
+    EXPECT_EQ(refused(settings, who, 20, "03 0064 0001"_hex, true), "setter") << "nothing raw";
+    EXPECT_EQ(refused(contract(), who, 20, "06 0000 0001"_hex), "") << "it is no operator";
+    const LineRules rules(std::make_shared<const Settings>(settings), "floor1", {5, 20});
+    EXPECT_EQ(rules.denying_names(), std::vector<std::string>{"setter"});
+    OwnRole blind{.name = "blind"};
+    blind.rights.add(Right::write);
+    const WhoRef writer = make_who({.role = Role::operator_, .own_role = blind});
+    EXPECT_FALSE(rules.may_some(writer, 20, Act::read));
+    EXPECT_FALSE(rules.may_read_some(writer));
+    EXPECT_EQ(refused(settings, writer, 20, "17 0000 0001 0064 0001 02 0001"_hex), "blind");
+}
+
 TEST(LineRules, WithoutRulesEverybodyMayDoEverything) {
     EXPECT_EQ(refused({}, kScada, 20, "06 0064 0001"_hex), "");
     EXPECT_EQ(refused({}, nullptr, 0, "06 0064 0001"_hex, true), "");

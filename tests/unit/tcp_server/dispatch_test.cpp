@@ -274,5 +274,17 @@ TEST(Caller, ReadsOnlyUnlessItsCertificateSaysMore) {
     EXPECT_EQ(certified(std::nullopt).who()->role, Role::operator_);
 }
 
+TEST(Caller, HasTheOwnRoleThatItsCertificateNames) {
+    std::vector<OwnRole> roles{{"setter", {}}, {"keeper", {}}};
+    roles[0].rights.add(Right::write);
+    roles[1].rights.add(Right::reload);
+    Caller caller("10.0.0.7:1", make_who({.role = Role::operator_}));
+    caller.certify("CN=panel", "setter", roles);
+    EXPECT_EQ(caller.who()->role_name(), "setter");
+    EXPECT_FALSE(caller.reads_only());
+    caller.certify("CN=panel", "keeper", roles);
+    EXPECT_TRUE(caller.reads_only());
+}
+
 }  // namespace
 }  // namespace panelgate::tcp_server::dispatch_test

@@ -25,7 +25,7 @@ class Caller {
   public:
     /// `id` is unique to this connection; `address` has no port, "" if unknown.
     Caller(std::uint64_t id, std::string address) : id_(id), address_(std::move(address)) {
-        identify({}, Role::none, {});
+        identify({}, {}, {});
     }
 
     std::uint64_t id() const { return id_; }
@@ -36,10 +36,10 @@ class Caller {
     const std::string& token() const { return who_->token; }
     /// Sets what the current request has shown: the name of its token ("": none), its role, and
     /// where it came in.
-    void identify(std::string token, Role role, std::string listener);
-    /// What its certificate says; `role`: the one in it, where the listener goes by that.
-    void certify(std::string subject, std::string word, std::optional<Role> role);
-    const std::optional<Role>& certificate_role() const { return certificate_role_; }
+    void identify(std::string token, Standing standing, std::string listener);
+    /// What its certificate says; `standing`: by the role in it, where the listener goes by that.
+    void certify(std::string subject, std::string word, std::optional<Standing> standing);
+    const std::optional<Standing>& certificate_role() const { return certificate_role_; }
     /// Asks on behalf of another caller.
     void acts_for(const Caller& client) { who_ = client.who_; }
     /// True once the connection is over: no reply is wanted, and the site's objects may be gone.
@@ -83,7 +83,7 @@ class Caller {
     std::uint64_t id_;
     std::string address_;
     WhoRef who_;
-    std::optional<Role> certificate_role_{};
+    std::optional<Standing> certificate_role_{};
     bool left_ = false;
     bool hung_up_ = false;
     bool has_effect_ = false;
@@ -139,6 +139,7 @@ struct Route {
     std::function<Handling(HttpRequest)> handler;
     std::vector<std::string_view> queries{};  ///< supported; any other is refused
     bool probe = false;  ///< answered for any host name and query, even when all else is barred
+    Right right = Right::read;  ///< that an own role has to have; none is needed where `needed` is
 };
 
 /// What a client changed or was refused: for an audit. Valid for the call only.

@@ -21,6 +21,9 @@ struct Token {
     std::string file{};
     std::size_t characters = 0;         ///< of the token; 0: its file holds the hash
     std::optional<WallTime> expires{};  ///< from then on it is not known any more
+    std::optional<OwnRole> own_role{};  ///< of the configuration; `role` is the least like it
+
+    Standing standing() const { return {role, own_role}; }
     friend bool operator==(const Token&, const Token&) = default;
 };
 
@@ -77,6 +80,9 @@ struct Settings {
     Duration half_close_grace = 2s;
     std::optional<tls::Settings> tls{};  ///< HTTPS; none: plain
 
+    std::optional<OwnRole> anonymous_own{};  ///< as Token::own_role
+
+    Standing anonymous_standing() const { return {anonymous, anonymous_own}; }
     std::string scheme() const { return tls ? "https://" : "http://"; }
     std::string name() const { return endpoint_text(address, port); }
     /// True if `other` differs only in what can change without reopening the listener.

@@ -92,10 +92,10 @@ TEST(Access, OfAnotherSchemeSaysWhichIsMeantAndRepeatsNothing) {
 
 TEST(Access, ReturnsTheRoleOfTheClient) {
     const Settings settings = with_tokens(Role::viewer);
-    EXPECT_EQ(role_of(asking(""), settings), Role::viewer);
-    EXPECT_EQ(role_of(asking("Bearer let-me"), settings), Role::operator_);
-    EXPECT_EQ(role_of(asking("Bearer see-me"), settings), Role::viewer);
-    EXPECT_EQ(role_of(asking("Bearer wrong"), settings), Role::none);
+    EXPECT_EQ(standing_of(asking(""), settings).role, Role::viewer);
+    EXPECT_EQ(standing_of(asking("Bearer let-me"), settings).role, Role::operator_);
+    EXPECT_EQ(standing_of(asking("Bearer see-me"), settings).role, Role::viewer);
+    EXPECT_EQ(standing_of(asking("Bearer wrong"), settings).role, Role::none);
 }
 
 TEST(Access, TakesABodyOnlyAsItIs) {
@@ -286,13 +286,13 @@ TEST(Tokens, AreNotKnownAfterTheirLastDay) {
     HttpRequest request = asking("Bearer let-me");
     request.at = *parse_expiry("2027-12-31T23:59:59Z");
     EXPECT_FALSE(check_access(request, Role::operator_, settings));
-    EXPECT_EQ(role_of(request, settings), Role::operator_);
+    EXPECT_EQ(standing_of(request, settings).role, Role::operator_);
     EXPECT_EQ(token_name(request, settings), "ops");
     request.at = *parse_expiry("2028-01-01T00:00:00Z");
     const auto refused = check_access(request, Role::operator_, settings);
     ASSERT_TRUE(refused);
     EXPECT_EQ(refused->status, 401U);
-    EXPECT_EQ(role_of(request, settings), Role::none);
+    EXPECT_EQ(standing_of(request, settings).role, Role::none);
     EXPECT_EQ(token_name(request, settings), "");
 }
 

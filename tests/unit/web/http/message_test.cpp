@@ -132,9 +132,9 @@ TEST(Caller, ThatHangsUpHasNotLeft) {
 TEST(Caller, IsCalledByItsAddressAndTheTokenOfItsLastRequest) {
     Caller caller(7, "10.0.0.9");
     EXPECT_EQ(caller.name(), "http 10.0.0.9");
-    caller.identify("ops", Role::operator_, "[::]:80");
+    caller.identify("ops", {Role::operator_, {}}, "[::]:80");
     EXPECT_EQ(caller.name(), "http 10.0.0.9 token ops");
-    caller.identify("", Role::viewer, "[::]:80");
+    caller.identify("", {Role::viewer, {}}, "[::]:80");
     EXPECT_EQ(caller.name(), "http 10.0.0.9");
     EXPECT_EQ(Caller(8, "").name(), "http");
 }
