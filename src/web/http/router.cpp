@@ -372,6 +372,14 @@ asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, const 
     co_return refused;
 }
 
+/// Who makes the request, by what it has shown.
+void identify(HttpRequest& request, const Site& site) {
+    Standing standing = standing_of(request, site.settings);
+    request.role = standing.role;
+    request.caller->identify(token_name(request, site.settings), std::move(standing),
+                             site.settings.name());
+}
+
 /// What an audit needs of a request that its handler takes away.
 class Witness {
   public:
@@ -419,10 +427,7 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     if (site->wall) request.at = site->wall();
     const auto refused = co_await admit(&request, found.route, shared);
     if (request.caller->has_left()) co_return HttpResponse();
-    Standing standing = standing_of(request, site->settings);
-    request.role = standing.role;
-    request.caller->identify(token_name(request, site->settings), std::move(standing),
-                             site->settings.name());
+    identify(request, *site);
     record_use(*request.caller, *shared);
     const Witness witness(request, *site);
     if (refused) {
