@@ -72,7 +72,7 @@ void Checker::on_client(arbiter::Client id, const ClientPlan& plan) {
     const auto can_fail = [&](std::uint8_t station) {
         const auto panel = std::ranges::find(plan_.panels, station, &PanelPlan::id);
         return panel == plan_.panels.end() || panel->dead || panel->flapping > Duration::zero() ||
-               panel->reboots > Duration::zero();
+               panel->reboots > Duration::zero() || panel->never_right();
     };
     Client& client = clients_[id];
     client.healthy = !plan.scans && std::ranges::none_of(plan.stations, can_fail);

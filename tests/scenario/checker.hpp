@@ -110,6 +110,7 @@ class Checker : public Witness {
     // What may be sent when (checker_wire.cpp)
     void check_moment(TimePoint now);
     void check_idling(TimePoint now);
+    bool looks_late(std::uint8_t station) const;
     void check_write_sent(std::uint8_t station, ByteView pdu);
     void check_again(std::uint8_t station, ByteView pdu, FrameKind what);
     void check_crc(const Bytes& adu);

@@ -206,9 +206,20 @@ void Checker::check_idling(TimePoint now) {
     Duration most = slack;
     if (!attempt_.answered) most += settings_.unlisted.response_timeout;
     if (attempt_.station == kBroadcast) most += settings_.broadcast_turnaround;
+    // A reply of another length is, byte for byte, the late one to an earlier request of that
+    // length that had no answer: nobody on the wire can tell. Behind a station that is late the
+    // line rests for another timeout and a quarter.
+    if (!attempt_.answered && looks_late(attempt_.station))
+        most += settings_.unlisted.response_timeout * 5 / 4;
     if (calm_ && idle > most)
         fail("P5: the line was silent for " + std::to_string(idle / 1ms) +
              " ms while a request waited");
+}
+
+/// It says replies of other lengths than were asked for.
+bool Checker::looks_late(std::uint8_t station) const {
+    const auto panel = std::ranges::find(plan_.panels, station, &PanelPlan::id);
+    return panel != plan_.panels.end() && panel->padded_inside > 0;
 }
 
 /// Since when, but not before `since`, a request has waited that nothing keeps from going: it has

@@ -175,6 +175,24 @@ TEST(Scenario, SeedsInWhichAnOddPanelOnceBrokeAPromiseKeepThemAll) {
     }
 }
 
+/// ... and with an odd panel: an exception equal to an earlier one ended nothing, and those of
+/// another function taught a lateness; a reply of another length is that to an earlier request, for
+/// anybody on the wire.
+TEST(Scenario, SeedsInWhichThePanelAnsweredWronglyKeepThemAll) {
+    struct Known {
+        Oddity oddity;
+        std::uint64_t seed;
+    };
+    constexpr Known kKnown[] = {{Oddity::wrong_function, 4},  {Oddity::wrong_function, 5},
+                                {Oddity::wrong_function, 10}, {Oddity::wrong_function, 76},
+                                {Oddity::padded_inside, 18},  {Oddity::padded_inside, 65}};
+    for (const Known& known : kKnown) {
+        Outcome with;
+        EXPECT_EQ(compare(known.oddity, known.seed, with), "")
+            << replay(label(known.oddity), known.seed);
+    }
+}
+
 class OneOddPanel : public testing::TestWithParam<Oddity> {};
 
 /// P4, P9: all others are answered, and not much later than without it.

@@ -307,9 +307,11 @@ class DuplicateGuard {
         if (denied_ >= kDenials && earlier != TimePoint{}) learn(at, at - earlier);
     }
     /// With nothing outstanding, one request got this reply at `first` and again now: one of them
-    /// is a duplicate, of the other or of an earlier reply.
+    /// is a duplicate: of the other, if that is how late this station's duplicates come, else
+    /// perhaps of an earlier reply.
     void on_repeated_reply(TimePoint now, TimePoint first, ByteView reply) {
         if (now - first > timing::kLatestRepetition) return;
+        if (known() && now - first <= settle_time()) return learn(now, now - first);
         const TimePoint earlier = earlier_reply_at(first, reply);
         learn(now,
               std::max(now - first, earlier == TimePoint{} ? Duration::zero() : first - earlier));
