@@ -191,14 +191,16 @@ void Checker::check_idling(TimePoint now) {
     constexpr std::size_t kReply = 45;
     const Duration slack = 100ms + frame_time(settings_.serial, kReply);
     // An answer that repeats another one may be held back for as long as its station needs: it
-    // could be a copy of that, with its own still to come (P1). So may a station's very first that
+    // could be a copy of that, with its own still to come (P1). Values are not handed on then, but
+    // asked for once more. So may a station's very first that
     // equals its request, for a timeout: it could be the echo (P8).
     const bool is_echo = attempt_.first && told_ < heard_until_;
     const Duration needs = is_echo ? settings_of(attempt_.station).response_timeout
                                    : watch_.own_slowest(attempt_.station);
     const TimePoint held = heard_until_ + needs + 20ms;
+    const bool in_doubt = attempt_.answered && told_ <= attempt_.sent;
     const TimePoint over =
-        std::max({sent_until_, heard_until_, is_echo ? held : std::min(told_, held)});
+        std::max({sent_until_, heard_until_, is_echo || in_doubt ? held : std::min(told_, held)});
     const auto waited = good_work_since(over);
     if (!waited || now <= *waited + slack) return;
     const Duration idle = now - *waited;
