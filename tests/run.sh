@@ -19,6 +19,7 @@ mkdir -p "$logs"
 # The tests wait more than they compute.
 jobs=$(($(nproc) + 1))
 summary=()
+failed_logs=()
 failed=0
 
 # step NAME COMMAND...: runs it with its output in a log; shows the log's end when it fails.
@@ -35,6 +36,7 @@ step() {
     summary+=("$(printf '%-28s %s%s, %s s' "$name" "$verdict" "$count" "$seconds")")
     [ $verdict = ok ] && return
     failed=1
+    failed_logs+=("$log")
     tail -n 60 "$log"
     echo "   (all of it: $log)"
 }
@@ -67,6 +69,9 @@ finish() {
         echo "Everything passed. Next: deploy/demo.sh, or one test: ctest --preset release -R NAME"
     else
         echo "Something FAILED, see above. One test alone: ctest --preset release -R NAME"
+        # What failed comes last as well: a CI keeps the end of a long output.
+        grep -hE '^(FAIL|ERROR): |^[A-Za-z_.]*(Error|Exception): |\[  FAILED  \] .*\(|: Failure$|\*\*\*(Failed|Timeout)' \
+            "${failed_logs[@]}" | head -n 30 | cut -c1-300 || true
     fi
     exit $failed
 }

@@ -71,6 +71,7 @@ class Adder {
                             "or 127.0.0.1:8080");
         command->add_option("--token-file", typed->at.token_file,
                             "a file whose first line is a token");
+        command->add_option("--ca", typed->at.ca, kCa);
         command->footer(kExitCodes);
         return command;
     }
@@ -93,13 +94,17 @@ class Adder {
     ExitCode& code_;
 };
 
+void add_format(CLI::App* command, const std::shared_ptr<Typed>& typed) {
+    command->add_option("--format", typed->format, "text or json")
+        ->check(CLI::IsMember({"text", "json"}));
+}
+
 void add_read(Adder& adder) {
     const auto typed = std::make_shared<Typed>();
     CLI::App* command = adder.add("read", "read a value of a panel", typed);
     adder.add_place(command, typed);
     command->add_option("--count", typed->count, "how many values")->check(from_1_to(65536));
-    command->add_option("--format", typed->format, "text or json")
-        ->check(CLI::IsMember({"text", "json"}));
+    add_format(command, typed);
     command->footer(
         "Exit codes: 0 it is read; 1 the gateway refuses, the panel does not answer, or a point "
         "has no current value; 64 usage; 66 the token file cannot be read; 69 no gateway answers.");
@@ -154,10 +159,11 @@ void add_status(Adder& adder) {
     const auto typed = std::make_shared<Typed>();
     CLI::App* command =
         adder.add("status", "say how lines and stations are, and what is not well", typed);
+    add_format(command, typed);
     command->footer(
         "Exit codes: 0 all is well; 1 a line, a station, a relay or a listener is not, or there "
         "are findings; 64 usage; 66 the token file cannot be read; 69 no gateway answers.");
-    adder.on_call(command, [typed] { return status(typed->at); });
+    adder.on_call(command, [typed] { return status(typed->at, typed->format == "json"); });
     const auto shown = std::make_shared<Typed>();
     command = adder.add("top", "show load, clients and slow panels, each second anew", shown);
     command->add_flag("--once", shown->once, "one look, as on a pipe");

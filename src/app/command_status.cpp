@@ -90,13 +90,13 @@ std::string for_the_screen(const std::string& text) {
 
 }  // namespace
 
-ExitCode status(const GatewayOptions& at) {
+ExitCode status(const GatewayOptions& at, bool json) {
     ExitCode code = kFine;
     const auto gateway = GatewayClient::make(at, code);
     if (!gateway) return code;
     const auto overview = look(*gateway, code);
     if (!overview) return code;
-    std::cout << cli::status_text(*overview, is_coloured());
+    std::cout << (json ? cli::status_json(*overview) : cli::status_text(*overview, is_coloured()));
     return cli::troubles(*overview).empty() ? kFine : kNotReady;
 }
 

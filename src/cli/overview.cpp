@@ -1,6 +1,9 @@
 #include "panelgate/cli/overview.hpp"
 
 #include <algorithm>
+#include <boost/json/array.hpp>
+#include <boost/json/serialize.hpp>
+#include <boost/json/value.hpp>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -175,6 +178,21 @@ std::string status_text(const Overview& overview, bool coloured) {
     text += painted("not all is well:", Colour::bad, coloured) + '\n';
     for (const std::string& one : list) text += "  " + one + '\n';
     return text;
+}
+
+std::string status_json(const Overview& overview) {
+    const auto list_in = [](const json::object& answer, std::string_view name) {
+        const json::value* found = answer.if_contains(name);
+        return found != nullptr ? *found : json::value(json::array());
+    };
+    const std::vector<std::string> list = troubles(overview);
+    const json::object all{{"url", overview.url},
+                           {"ready", overview.not_ready.empty()},
+                           {"troubles", json::array(list.begin(), list.end())},
+                           {"lines", json::array(overview.lines.begin(), overview.lines.end())},
+                           {"stations", list_in(overview.stations, "stations")},
+                           {"relays", list_in(overview.relays, "relays")}};
+    return json::serialize(all) + '\n';
 }
 
 namespace {

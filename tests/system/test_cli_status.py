@@ -47,6 +47,10 @@ class State(unittest.TestCase):
             told = self.ask("status")
             self.assertEqual(told.returncode, REFUSED, told.stdout)
             self.assertRegex(told.stdout, r"not all is well:\n  mixer is offline, its last answer is")
+            listed = self.ask("status", "--format", "json")
+            self.assertEqual(listed.returncode, REFUSED, listed.stdout)
+            states = {each["name"]: each["state"] for each in json.loads(listed.stdout)["stations"]}
+            self.assertEqual(states["mixer"], "offline")
             errors = self.ask("trace", "--errors", "--station", "mixer").stdout
             self.assertRegex(errors, r"(?m)^\S+Z +mixer +\w+ +timeout ")
             self.assertNotIn(" ok ", errors)

@@ -40,6 +40,9 @@ struct Overview {
 std::vector<std::string> troubles(const Overview& overview);
 /// Tables of lines and stations, findings with their advice, and what is not well.
 std::string status_text(const Overview& overview, bool coloured);
+/// The same for programs: one object of JSON with `url`, `ready`, `troubles`, and what REST says of
+/// all lines, stations and relays.
+std::string status_json(const Overview& overview);
 /// Lines with their utilisation, clients by their share, slowest panels. `seconds` that the figures
 /// are of; 0: of all the time.
 std::string top_text(const Overview& overview, double seconds, bool coloured);

@@ -1,4 +1,4 @@
-"""What the audit costs: CPU of a write with it and without, the same clients on the same line, in turn.
+"""What the audit costs: CPU of a write with it and without, the same process, clients and line, in turn.
 Unpaced the difference is measured best; what share it is on a paced line follows from CPU a transaction
 there."""
 import pathlib
@@ -7,6 +7,7 @@ import threading
 import time
 
 from measures import figures, rig
+import config  # noqa: E402  (rig puts tests/system into the path)
 from measures.figures import Bar, Row
 
 CPU = "CPU us a write"
@@ -36,39 +37,58 @@ class Writing(threading.Thread):
         self.client.close()
 
 
-def cpu_us(program, seconds):
-    """CPU of a write, in us, and how many there were."""
-    ending = threading.Event()
-    clients = [Writing(program.port, 1 + i, ending) for i in range(CLIENTS)]
-    time.sleep(0.5)
-    before, used = sum(client.done for client in clients), rig.cpu_seconds(program.pid)
-    time.sleep(seconds)
-    done, used = sum(client.done for client in clients) - before, rig.cpu_seconds(program.pid) - used
-    ending.set()
-    for client in clients:
-        client.join()
-    return 1e6 * used / done, done
+class Load:
+    """Clients that write without pause; what a write costs the program is asked for again and again."""
+
+    def __init__(self, program):
+        self._pid, self._ending = program.pid, threading.Event()
+        self._clients = [Writing(program.port, 1 + i, self._ending) for i in range(CLIENTS)]
+
+    def cpu_us(self, seconds):
+        """CPU of a write, in us, and how many there were."""
+        before, used = sum(client.done for client in self._clients), rig.cpu_seconds(self._pid)
+        time.sleep(seconds)
+        done = sum(client.done for client in self._clients) - before
+        return 1e6 * (rig.cpu_seconds(self._pid) - used) / done, done
+
+    def end(self):
+        self._ending.set()
+        for client in self._clients:
+            client.join()
+
+
+def reload(program, text):
+    """Another configuration for the same process: so nothing but the audit differs."""
+    program.file.write_text(text)
+    status, verdict = program.rest("POST", "/api/v1/reload")
+    assert (status, verdict["outcome"]) == (200, "applied"), verdict
 
 
 def measure_line(run, line, case, turns, seconds):
     for subject in run.gateways:
         costs = {False: [], True: []}
-        for _ in range(turns):
-            for audited in (False, True):
-                with tempfile.TemporaryDirectory() as folder:
-                    more = {"audit": f"{{file: {pathlib.Path(folder) / 'audit.jsonl'}}}"} if audited else {}
-                    with subject.serving(line.link, line.baud, **more) as program:
-                        cost, writes = cpu_us(program, seconds)
+        reloaded = subject.but(http=config.ADMIN)
+        with tempfile.TemporaryDirectory() as folder, reloaded.serving(line.link, line.baud) as program:
+            texts = [program.file.read_text()]
+            texts.append(f"{texts[0]}\naudit: {{file: {pathlib.Path(folder) / 'audit.jsonl'}}}\n")
+            load = Load(program)
+            for turn in range(2 * turns):
+                audited = turn % 2 == 0  # the first reload switches it on
+                reload(program, texts[audited])
+                load.cpu_us(1)  # what the reload costs
+                cost, writes = load.cpu_us(seconds)
                 costs[audited].append(cost)
                 words = "with the audit" if audited else "without"
                 yield Row(CPU, f"{case}, {words}", subject.name, cost, "us", {"writes": writes})
-        without, with_it = (figures.quantile(costs[audited], 0.5) for audited in (False, True))
-        yield Row(SHARE, case, subject.name, with_it / without - 1, "")
+            load.end()
+        # Neighbours in time are compared: a busy machine's other programs come and go.
+        shares = [with_it / without - 1 for with_it, without in zip(costs[True], costs[False])]
+        yield Row(SHARE, case, subject.name, figures.quantile(shares, 0.5), "", {"turns": turns})
 
 
 def measure(run):
-    turns, seconds = (2, 3) if run.quick else (5, 5)
+    turns, seconds = (4, 2) if run.quick else (12, 4)
     with rig.TcpLine(run.tools) as line:
         yield from measure_line(run, line, UNPACED, turns, seconds)
     with tempfile.TemporaryDirectory() as folder, rig.LoggedLine(run.tools, folder, 115200) as line:
-        yield from measure_line(run, line, PACED, turns, 3 * seconds)
+        yield from measure_line(run, line, PACED, turns, 2 * seconds)

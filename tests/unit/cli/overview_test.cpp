@@ -88,6 +88,17 @@ TEST(StatusText, IsTwoTablesAndAVerdict) {
     EXPECT_THAT(status_text(listening, false), HasSubstr("floor1  up, listening  52.5 %"));
 }
 
+TEST(StatusJson, HasTheSameForPrograms) {
+    Overview overview = well();
+    overview.not_ready = "modbus_tcp 10.0.0.1:502 does not listen";
+    const boost::json::object made = boost::json::parse(status_json(overview)).as_object();
+    EXPECT_EQ(made.at("ready"), boost::json::value(false));
+    EXPECT_EQ(made.at("troubles").as_array().size(), 1U);
+    EXPECT_EQ(made.at("lines").at(0).at("name"), boost::json::value("floor1"));
+    EXPECT_EQ(made.at("stations").as_array().size(), 2U);
+    EXPECT_TRUE(made.at("relays").is_array());
+}
+
 TEST(StatusText, NamesWhatIsNotWell) {
     Overview overview = well();
     overview.not_ready = "modbus_tcp 10.0.0.1:502 does not listen";
