@@ -69,9 +69,7 @@ class Walk {
   private:
     const yaml::KeyShape* key_named(std::string_view name) const {
         const std::string path = (key_ == nullptr ? "" : key_->path + '/') + std::string(name);
-        const std::vector<yaml::KeyShape>& keys = config::describe().keys;
-        const auto found = std::ranges::find(keys, path, &yaml::KeyShape::path);
-        return found == keys.end() ? nullptr : &*found;
+        return config::describe().find(path);
     }
     std::string_view next() const { return std::string_view(left_).substr(0, left_.find('/')); }
     void take(std::size_t size) { left_.erase(0, std::min(size + 1, left_.size())); }
@@ -124,12 +122,11 @@ ExitCode explain(const std::vector<Setting>& all, const std::string& typed) {
     }
     if (walk.is_key()) {
         const config::Described& keys = config::describe();
-        const yaml::KeyShape* shape = keys.find(path);
         const auto at = std::ranges::find(
             all, path, [](const Setting& setting) { return path_typed(setting.path); });
-        const bool idle = shape != nullptr && at != all.end() && !at->applies;
+        const bool idle = at != all.end() && !at->applies;
         std::cerr << "panelgate: " << typed << " is not set"
-                  << (idle ? ": " + keys.condition_of(shape->path) : "") << '\n';
+                  << (idle ? ": " + keys.condition_of(keys.of(*at)->path) : "") << '\n';
         return kNotSet;
     }
     std::vector<std::string_view> paths;
@@ -152,7 +149,7 @@ std::string printable(const std::string& value) {
 /// As it is typed in a file: a text may need quotes.
 std::string listed_value(const Setting& setting) {
     using Kind = yaml::KeyShape::Kind;
-    const yaml::KeyShape* key = config::describe().find(setting.path);
+    const yaml::KeyShape* key = config::describe().of(setting);
     const bool is_text = key != nullptr && (key->kind == Kind::text || key->kind == Kind::map);
     return printable(is_text ? yaml::written(setting.value) : setting.value);
 }

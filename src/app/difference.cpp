@@ -229,8 +229,9 @@ std::vector<Change> differences(const config::Config& before, const config::Conf
         if (is_within(all, path) || follows(all, difference)) continue;
         changes.push_back(change_of(path, difference));
         if (is_one_sided(difference)) continue;
-        const std::string_view needs = keys.change_of(path);
-        if (!needs.empty() && !is_taken_over(before, after, path)) changes.back().needs = needs;
+        const yaml::KeyShape* key = keys.of(*difference.after);
+        if (key != nullptr && !is_taken_over(before, after, path))
+            changes.back().needs = key->change;
     }
     add_profiles(before, after, changes);
     // Settings have names, not places.

@@ -1,10 +1,7 @@
 #include "rights_text.hpp"
 
 #include <algorithm>
-#include <boost/json/array.hpp>
-#include <boost/json/value.hpp>
 #include <cstddef>
-#include <iterator>
 #include <utility>
 
 #include "panelgate/access/line_rules.hpp"
@@ -12,44 +9,10 @@
 
 namespace panelgate::app {
 
-namespace json = boost::json;
-
 namespace {
 
 using access::Act;
 using access::Rule;
-
-constexpr Act kActs[] = {Act::read, Act::write, Act::broadcast, Act::raw};
-
-template <class List, class Word>
-void add(json::object& to, const char* key, const List& list, const Word& word) {
-    if (list.empty()) return;
-    json::array all;
-    for (const auto& one : list) all.emplace_back(word(one));
-    to[key] = std::move(all);
-}
-
-json::object rule_json(const Rule& rule) {
-    const auto same = [](const auto& one) { return json::value(one); };
-    json::object made{{"name", rule.name}};
-    std::vector<Act> acts;
-    std::ranges::copy_if(kActs, std::back_inserter(acts),
-                         [&](Act act) { return rule.acts.has(act); });
-    add(made, rule.allow ? "allow" : "deny", acts, [](Act act) { return json::value(label(act)); });
-    add(made, "from", rule.from, [](const Network& network) {
-        return json::value(network.address + '/' + std::to_string(network.prefix));
-    });
-    add(made, "roles", rule.roles, same);
-    add(made, "tokens", rule.tokens, same);
-    add(made, "faces", rule.faces, [](Face face) { return json::value(label(face)); });
-    add(made, "listeners", rule.listeners, same);
-    add(made, "stations", rule.stations, [](const access::Place& place) {
-        return json::value(place.first + '/' + std::to_string(place.second));
-    });
-    add(made, "functions", rule.functions, same);
-    if (rule.has_range()) made["range"] = rule.range;
-    return made;
-}
 
 /// A way in, and who comes by it.
 struct Door {
@@ -163,13 +126,6 @@ std::string row(const Reach& reach) {
 }
 
 }  // namespace
-
-json::object access_json(const config::Config& config) {
-    json::array rules;
-    for (const Rule& rule : config.access.rules) rules.push_back(rule_json(rule));
-    return {{"default", config.access.allow_by_default ? "allow" : "deny"},
-            {"rules", std::move(rules)}};
-}
 
 std::string rights_matrix(const config::Config& config) {
     if (config.access.is_open()) return "";

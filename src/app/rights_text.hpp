@@ -1,6 +1,5 @@
 #pragma once
 
-#include <boost/json/object.hpp>
 #include <string>
 #include <vector>
 
@@ -8,8 +7,6 @@
 
 namespace panelgate::app {
 
-/// The rules of `access` as JSON.
-boost::json::object access_json(const config::Config& config);
 /// Who may write where, a row for each way in; "" without rules.
 std::string rights_matrix(const config::Config& config);
 /// Warns of ways in by which somebody may write although rules deny it to others: no rule is about

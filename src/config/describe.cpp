@@ -1,12 +1,14 @@
 #include "panelgate/config/describe.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "panelgate/config/config.hpp"
+#include "panelgate/config/setting.hpp"
 #include "panelgate/tls/issue.hpp"
 #include "panelgate/yaml/document.hpp"
 
@@ -51,7 +53,7 @@ http: {listen: "127.0.0.1:8080", hosts: [gateway.plant.example], allow: [127.0.0
              ca: /etc/panelgate/tls/ca.crt, client: optional, crl: /etc/panelgate/tls/crl.pem,
              role_from: certificate}}
 relays: [{from: press/UW100, to: press/UW200, count: 8, every: 1s}]
-mqtt: {broker: "mqtt://broker.plant:1883"}
+mqtt: {broker: "mqtts://broker.plant:8883", tls: {ca: /etc/panelgate/tls/ca.crt}}
 access:
   default: allow
   rules:
@@ -127,6 +129,8 @@ Described describe_specimen() {
     Described described{description.keys(), description.rules()};
     add_examples(yaml::parse(kSpecimen, problems), "", described.keys);
     inherit_changes(described.keys);
+    for (std::size_t i = 0; i < described.keys.size(); ++i)
+        described.places.emplace(described.keys[i].path, i);
     return described;
 }
 
@@ -137,26 +141,16 @@ const Described& describe() {
     return kDescribed;
 }
 
-const yaml::KeyShape* Described::find(std::string_view setting) const {
-    const yaml::KeyShape* key = nullptr;
-    bool names = false;  // the next part is the name of a list's entry
-    while (!setting.empty()) {
-        const std::size_t end = std::min(setting.find('/'), setting.size());
-        const std::string part(setting.substr(0, end));
-        setting.remove_prefix(std::min(end + 1, setting.size()));
-        if (std::exchange(names, false)) continue;
-        const std::string path = key == nullptr ? part : key->path + '/' + part;
-        const auto found = std::ranges::find(keys, path, &yaml::KeyShape::path);
-        if (found == keys.end()) continue;
-        key = &*found;
-        names = key->kind == yaml::KeyShape::Kind::list;
-    }
-    return key;
+const yaml::KeyShape* Described::find(std::string_view path) const {
+    const auto place = places.find(path);
+    return place == places.end() ? nullptr : &keys[place->second];
 }
 
-std::string_view Described::change_of(std::string_view setting) const {
-    const yaml::KeyShape* key = find(setting);
-    return key == nullptr ? std::string_view() : key->change;
+const yaml::KeyShape* Described::of(const Setting& setting) const {
+    const std::string& map = setting.map->keys;
+    const std::string path = (map.empty() ? "" : map + '/') + std::string(setting.key());
+    const yaml::KeyShape* key = find(path);
+    return key == nullptr ? find(map) : key;
 }
 
 std::string Described::condition_of(std::string_view key) const {
@@ -166,9 +160,7 @@ std::string Described::condition_of(std::string_view key) const {
             return std::ranges::find(rule.words, word) != rule.words.end();
         };
         std::vector<std::string> others;
-        const auto other =
-            std::ranges::find(keys, rule.map + '/' + rule.other, &yaml::KeyShape::path);
-        if (other != keys.end()) others = other->words;
+        if (const yaml::KeyShape* other = find(rule.map + '/' + rule.other)) others = other->words;
         std::erase_if(others, is_allowed);
         const bool shorter = rule.absent_will_do && others.size() < rule.words.size();
         std::string words;

@@ -1,9 +1,11 @@
 #include "panelgate/config/setting.hpp"
 
 #include <algorithm>
-#include <ranges>
-#include <span>
+#include <iterator>
 #include <string>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
 
 #include "load_tls.hpp"
 #include "panelgate/config/describe.hpp"
@@ -115,33 +117,17 @@ void show_servers(const SettingWriter& top, const Config& config) {
     }
 }
 
-/// The value of a key of the same map, which is shown before.
-const Setting* neighbour(std::span<const Setting> before, const std::string& path) {
-    const auto back = std::ranges::find(before | std::views::reverse, path, &Setting::path);
-    return back == std::ranges::rend(before) ? nullptr : &*back;
-}
-
-/// Finds what a file cannot have beside the values of its neighbours. The settings of a map follow
-/// each other.
+/// Finds what a file cannot have beside the values of its neighbours, which are shown before it.
 void find_idle(std::vector<Setting>& all) {
-    const Described& keys = describe();
-    std::string map;
-    const yaml::KeyShape* shape = nullptr;
-    for (std::size_t i = 0; i < all.size(); ++i) {
-        const std::size_t cut = all[i].path.rfind('/');
-        if (cut == all[i].path.npos) continue;
-        if (all[i].path.compare(0, cut, map) != 0 || map.size() != cut) {
-            map = all[i].path.substr(0, cut);
-            shape = keys.find(map);
-        }
-        const std::string_view key = std::string_view(all[i].path).substr(cut + 1);
-        for (const yaml::KeyRule& rule : keys.rules) {
-            if (rule.needs || shape == nullptr || rule.key != key || rule.map != shape->path)
-                continue;
-            const Setting* other = neighbour(std::span(all).first(i), map + '/' + rule.other);
-            all[i].applies =
-                all[i].applies && (other == nullptr ||
-                                   std::ranges::find(rule.words, other->value) != rule.words.end());
+    std::unordered_map<std::string_view, std::string_view> values;
+    for (Setting& setting : all) {
+        values.emplace(setting.path, setting.value);
+        for (const yaml::KeyRule& rule : describe().rules) {
+            if (rule.needs || rule.key != setting.key() || rule.map != setting.map->keys) continue;
+            const auto other = values.find(setting.map->path + '/' + rule.other);
+            setting.applies = setting.applies &&
+                              (other == values.end() ||
+                               std::ranges::find(rule.words, other->second) != rule.words.end());
         }
     }
 }
@@ -153,18 +139,30 @@ std::string Distinct::name(const std::string& known_by) {
     return count == 1 ? known_by : known_by + " (" + std::to_string(count) + ')';
 }
 
+void each_part(const Config& config, const std::function<void(std::vector<Setting>)>& take) {
+    const auto part = [&take](const auto& show) {
+        std::vector<Setting> settings;
+        show(SettingWriter(settings));
+        find_idle(settings);
+        take(std::move(settings));
+    };
+    part([&](const SettingWriter& top) { root_keys().show(top, config); });
+    for (const Line& line : config.lines)
+        part([&](const SettingWriter& top) { show_line(top, line); });
+    part([&](const SettingWriter& top) {
+        show_servers(top, config);
+        for (const points::Relay& relay : config.relays)
+            relay_keys().show(top.item("relays", relay.name()), relay);
+        log_keys().show(top.below("log"), config.log);
+        realtime_keys().show(top.below("realtime"), config.realtime);
+        if (config.audit) audit_keys().show(top.below("audit"), *config.audit);
+    });
+}
+
 std::vector<Setting> all_settings(const Config& config) {
     std::vector<Setting> all;
-    const SettingWriter top(all, "");
-    root_keys().show(top, config);
-    for (const Line& line : config.lines) show_line(top, line);
-    show_servers(top, config);
-    for (const points::Relay& relay : config.relays)
-        relay_keys().show(top.item("relays", relay.name()), relay);
-    log_keys().show(top.below("log"), config.log);
-    realtime_keys().show(top.below("realtime"), config.realtime);
-    if (config.audit) audit_keys().show(top.below("audit"), *config.audit);
-    find_idle(all);
+    each_part(config,
+              [&](std::vector<Setting> part) { std::ranges::move(part, std::back_inserter(all)); });
     return all;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -9,42 +10,53 @@
 
 namespace panelgate::config {
 
-/// Appends settings below a path to a list, which it does not own.
+/// Appends the settings of a map to a list, which it does not own.
 class SettingWriter {
   public:
-    SettingWriter(std::vector<Setting>& settings, std::string path)
-        : settings_(&settings), path_(std::move(path)) {}
+    explicit SettingWriter(std::vector<Setting>& settings)
+        : settings_(&settings), map_(std::make_shared<const SettingMap>()) {}
 
-    void put(std::string_view key, std::string value) const { add(key, std::move(value), ""); }
+    void put(std::string_view key, std::string value) const { add(key, std::move(value)); }
     /// Inherited from the same key of `owner` unless given itself.
     void put(std::string_view key, std::string value, const SettingWriter& owner) const {
-        add(key, std::move(value), owner.at(key));
+        add(key, std::move(value)).otherwise = joined(owner.map_->path, key);
     }
     void put_secret(std::string_view key, std::string value) const {
-        settings_->push_back({at(key), std::move(value), true, {}, true});
+        add(key, std::move(value)).secret = true;
     }
 
     /// A writer for a map of keys; the map itself is no setting.
-    SettingWriter below(std::string_view key) const { return {*settings_, at(key)}; }
-    /// A writer for an entry that may exist or not, such as one of a list; adds the entry itself.
-    SettingWriter item(std::string_view key) const {
-        settings_->push_back({at(key), "", false, {}, true});
-        return below(key);
+    SettingWriter below(std::string_view key) const {
+        return {*settings_, SettingMap{joined(map_->path, key), joined(map_->keys, key), map_}};
     }
+    /// A writer for a map that may exist or not; adds the map itself.
+    SettingWriter item(std::string_view key) const { return below(key).with_entry(); }
+    /// The same for an entry of a list.
     SettingWriter item(std::string_view list, std::string_view name) const {
-        return below(list).item(name);
+        const SettingWriter all = below(list);
+        return SettingWriter(*settings_,
+                             SettingMap{joined(all.map_->path, name), all.map_->keys, map_, true})
+            .with_entry();
     }
 
   private:
-    std::string at(std::string_view key) const {
-        return path_.empty() ? std::string(key) : path_ + '/' + std::string(key);
+    SettingWriter(std::vector<Setting>& settings, SettingMap map)
+        : settings_(&settings), map_(std::make_shared<const SettingMap>(std::move(map))) {}
+
+    static std::string joined(const std::string& path, std::string_view key) {
+        return path.empty() ? std::string(key) : path + '/' + std::string(key);
     }
-    void add(std::string_view key, std::string value, std::string otherwise) const {
-        settings_->push_back({at(key), std::move(value), false, std::move(otherwise), true});
+    SettingWriter with_entry() const {
+        settings_->push_back({map_->path, "", false, {}, true, map_});
+        return *this;
+    }
+    Setting& add(std::string_view key, std::string value) const {
+        return settings_->emplace_back(
+            Setting{joined(map_->path, key), std::move(value), false, {}, true, map_});
     }
 
     std::vector<Setting>* settings_;
-    std::string path_;
+    std::shared_ptr<const SettingMap> map_;
 };
 
 }  // namespace panelgate::config

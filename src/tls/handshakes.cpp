@@ -1,5 +1,6 @@
 #include "panelgate/tls/handshakes.hpp"
 
+#include <sched.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
@@ -14,13 +15,17 @@
 #include <cctype>
 #include <cerrno>
 #include <map>
+#include <optional>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "engine.hpp"
+#include "pace.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tls/stream.hpp"
+#include "proof.hpp"
 
 namespace panelgate::tls {
 namespace {
@@ -35,9 +40,12 @@ constexpr std::size_t kMostInput = 128 * 1024;
 constexpr int kNice = 10;
 constexpr std::uint8_t kHandshakeRecord = 22;  // RFC 8446 5.1
 
-/// Of the calling thread: the loop, whose time is the lines', goes first.
+/// Of the calling thread: the loop, whose time is the lines', goes first, and is never preempted by
+/// this one (sched(7), SCHED_BATCH).
 void be_nice() {
     thread_local const bool kDone = [] {
+        const sched_param none{};
+        ::sched_setscheduler(0, SCHED_BATCH, &none);
         ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), kNice);
         return true;
     }();
@@ -78,8 +86,10 @@ class Handshakes::Conversation : public std::enable_shared_from_this<Conversatio
           all_(std::move(all)),
           owner_(std::move(owner)),
           stream_(stream),
-          engine_(std::make_shared<Engine>(all_->context_)),
+          context_(all_->context_),
+          engine_(std::make_shared<Engine>(context_)),
           deadline_(stream.get_executor()),
+          turn_(stream.get_executor()),
           done_(std::move(done)) {
         all_->running_.push_back(this);
     }
@@ -103,15 +113,21 @@ class Handshakes::Conversation : public std::enable_shared_from_this<Conversatio
   private:
     void listen();
     void on_readable();
+    void wait_for_turn();
     void compute();
     void send(Engine::Progress progress);
     void judge(Engine::Progress progress);
+    void judge_again();
+    void let_in();
 
     std::shared_ptr<Handshakes> all_;
     std::shared_ptr<void> owner_;
     Stream& stream_;
+    std::shared_ptr<const Context> context_;
     std::shared_ptr<Engine> engine_;
     asio::steady_timer deadline_;
+    asio::steady_timer turn_;
+    bool waits_for_turn_ = false;
     std::function<void(bool)> done_;  ///< null: over
     std::size_t received_ = 0;
 };
@@ -135,12 +151,25 @@ void Handshakes::Conversation::on_readable() {
         return finish(Outcome::broken, std::string("the client left ") + when);
     }
     const ByteView bytes(chunk.data(), static_cast<std::size_t>(size));
-    if (received_ == 0 && bytes[0] != kHandshakeRecord)
-        return finish(Outcome::plain, spoken(bytes));
+    const bool is_first = received_ == 0;
+    if (is_first && bytes[0] != kHandshakeRecord) return finish(Outcome::plain, spoken(bytes));
     received_ += bytes.size();
     if (received_ > kMostInput) return finish(Outcome::broken, "the client sent too much");
     engine_->input.append(bytes.begin(), bytes.end());
-    compute();
+    is_first ? wait_for_turn() : compute();
+}
+
+void Handshakes::Conversation::wait_for_turn() {
+    turn_.expires_after(Duration::zero());
+    const Duration pause = all_->pace_->wait(turn_.expiry(), address);
+    if (pause == Duration::zero()) return compute();
+    waits_for_turn_ = true;
+    turn_.expires_after(pause);
+    turn_.async_wait([self = shared_from_this()](const error_code&) {
+        if (!self->done_) return;
+        self->waits_for_turn_ = false;
+        self->compute();
+    });
 }
 
 /// The engine is the thread's until it is done; the socket stays here.
@@ -174,12 +203,29 @@ void Handshakes::Conversation::judge(Engine::Progress progress) {
         case Engine::Progress::needs_input:
             return listen();
         case Engine::Progress::done:
-            engine_->output = std::string();
-            stream_.secure(engine_);
-            return finish(Outcome::done, "");
+            return context_ == all_->context_ ? let_in() : judge_again();
         case Engine::Progress::failed:
             return finish(engine_->outcome(), engine_->why());
     }
+}
+
+/// It began by former rules.
+void Handshakes::Conversation::judge_again() {
+    context_ = all_->context_;
+    auto refusal = std::make_shared<std::optional<Refusal>>();
+    all_->worker_.run([proof = std::make_shared<const Proof>(engine_->native()), context = context_,
+                       refusal] { *refusal = proof->refusal_by(*context); },
+                      [self = shared_from_this(), refusal] {
+                          if (!self->done_) return;
+                          if (*refusal) return self->finish((*refusal)->outcome, (*refusal)->why);
+                          self->judge(Engine::Progress::done);
+                      });
+}
+
+void Handshakes::Conversation::let_in() {
+    engine_->output = std::string();
+    stream_.secure(engine_);
+    finish(Outcome::done, "");
 }
 
 void Handshakes::Conversation::finish(Outcome outcome, const std::string& why) {
@@ -187,6 +233,8 @@ void Handshakes::Conversation::finish(Outcome outcome, const std::string& why) {
     if (!done) return;
     const auto self = shared_from_this();
     deadline_.cancel();
+    turn_.cancel();
+    if (waits_for_turn_) all_->pace_->give_back(address);
     const std::shared_ptr<void> owner = std::exchange(owner_, nullptr);
     all_->end(*this, outcome, why);
     done(outcome == Outcome::done);
@@ -196,21 +244,52 @@ Handshakes::Handshakes(asio::any_io_executor executor, std::string name, Setting
     : name_(std::move(name)),
       settings_(std::move(settings)),
       context_(context_of(settings_)),
+      pace_(std::make_unique<Pace>(settings_.handshakes_per_second_per_address,
+                                   settings_.handshakes_per_second)),
       worker_(std::move(executor)) {}
 
 Handshakes::~Handshakes() = default;
 
-void Handshakes::apply(const Settings& settings) try {
-    if (settings == settings_) return;
-    apply(settings, context_of(settings));
+bool Handshakes::apply(const Settings& settings) try {
+    if (settings == settings_) return false;
+    return apply(settings, context_of(settings));
 } catch (const Unusable& why) {
     rt::log(rt::LogLevel::error, "certificate not renewed",
             {{"listener", name_}, {"reason", why.what()}});
+    return false;
 }
 
-void Handshakes::apply(const Settings& settings, std::shared_ptr<const Context> context) {
+bool Handshakes::apply(const Settings& settings, std::shared_ptr<const Context> context) {
+    const auto rules = [](const Settings& of) {
+        return std::tie(of.client, of.lowest, of.material.ca, of.material.crl);
+    };
+    const bool is_other = rules(settings_) != rules(settings);
     settings_ = settings;
     context_ = std::move(context);
+    return is_other;
+}
+
+void Handshakes::review(std::vector<Guest> guests) {
+    struct Judged {
+        Guest guest;
+        std::shared_ptr<const Proof> proof;
+        std::optional<Refusal> refusal{};
+    };
+    auto all = std::make_shared<std::vector<Judged>>();
+    for (Guest& guest : guests)
+        if (auto proof = guest.stream->proof())
+            all->push_back({std::move(guest), std::move(proof)});
+    if (all->empty()) return;
+    worker_.run(
+        [all, context = context_] {
+            be_nice();
+            for (Judged& one : *all) one.refusal = one.proof->refusal_by(*context);
+        },
+        [all] {
+            for (const Judged& one : *all)
+                if (const auto owner = one.guest.owner.lock(); owner && one.refusal)
+                    one.guest.leave(one.refusal->why);
+        });
 }
 
 void Handshakes::begin(std::shared_ptr<void> owner, Stream& stream, std::string client,
@@ -223,12 +302,14 @@ void Handshakes::begin(std::shared_ptr<void> owner, Stream& stream, std::string 
 }
 
 void Handshakes::make_room(const std::string& address) {
-    std::map<std::string, std::size_t> counts;
-    for (const auto& one : running_) ++counts[one->address];
+    const auto is_same = [&](const Conversation* one) { return one->address == address; };
     std::string from;
-    if (counts[address] >= settings_.max_handshakes_per_address) {
+    if (static_cast<std::size_t>(std::ranges::count_if(running_, is_same)) >=
+        settings_.max_handshakes_per_address) {
         from = address;
     } else if (running_.size() >= settings_.max_handshakes) {
+        std::map<std::string, std::size_t> counts;
+        for (const auto& one : running_) ++counts[one->address];
         from =
             std::ranges::max_element(counts, {}, [](const auto& one) { return one.second; })->first;
     } else {

@@ -281,13 +281,13 @@ class Files(unittest.TestCase):
             http="listen: 127.0.0.1:8080, anonymous: none, hosts: [a.example], allow: ['::1']",
             relays="[{from: oven/GDT0, to: press/UW200, every: 3s, on_change: true}]"))
         text = run("check", "-c", str(self.file)).stdout
-        for shown in ("station 31 press, autonics-gplp-s, read and write, answers up to 2s old",
+        for shown in ("station 31 press, autonics-gplp-s, read and write, 5 goes out as 15, 6 goes out as 16, max_age 2s",
                       "station 20 oven, panasonic-gt, read only",
-                      "point level: UW100, u16, every 1s, in m, writable from 1 to 2.5",
-                      "poll UW0, count 32, every 5s", "other stations: refused",
+                      "point level: at UW100, type u16, unit m, min 1, max 2.5, writable true",
+                      "poll UW0: count 32, every 5s", "other stations: refused",
                       "clients: every request is answered within 2s, so their timeout has to be "
                       "longer; for 500ms set queue: {deadline: 450ms}",
-                      "relay oven/GDT0 to press/UW200: count 1, every 3s, on change",
+                      "relay oven/GDT0 to press/UW200: every 3s, on_change true",
                       "modbus_tcp 127.0.0.1:502: floor1, read and write, for 10.0.0.0/8",
                       "unit 101 is floor1/31", "unit 255 is the gateway itself",
                       "broadcasts are refused",

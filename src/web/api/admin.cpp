@@ -172,11 +172,8 @@ std::string configuration_text(const Api& api, Role role, const std::string& con
 /// The configuration of the stations that may be seen.
 std::string seen_configuration(const std::string& text, const Sight& sight) {
     json::value whole = json::parse(text);
-    json::object& top = whole.as_object();
-    for (const char* key : {"relays", "modbus_tcp", "serial_masters", "access", "warnings"})
-        top.erase(key);
     json::array lines;
-    for (json::value& line : top["lines"].as_array()) {
+    for (json::value& line : whole.as_object()["lines"].as_array()) {
         json::object& object = line.as_object();
         const std::string name(object["name"].as_string());
         const auto seen = [&](const char* list, const char* key) {
@@ -193,8 +190,7 @@ std::string seen_configuration(const std::string& text, const Sight& sight) {
             if (const json::value* own = object.if_contains(key)) shown[key] = *own;
         lines.push_back(std::move(shown));
     }
-    top["lines"] = std::move(lines);
-    return json_text(whole);
+    return json_text(json::object{{"lines", std::move(lines)}, {"partial", true}});
 }
 
 HttpResponse text_answer(std::string body) {

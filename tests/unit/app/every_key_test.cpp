@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "difference.hpp"
+#include "inventory.hpp"
 #include "panelgate/config/describe.hpp"
 #include "panelgate/tls/issue.hpp"
 #include "panelgate/yaml/map_reader.hpp"
@@ -196,6 +197,14 @@ void expect_needs(const config::Config& before, const config::Config& after,
     EXPECT_EQ(said, done) << key;
 }
 
+/// What differs is seen in `GET /configuration`, and so in `check --format json`, and in `check`.
+/// Contents of files are secrets, of which only the names are shown.
+void expect_shown(const config::Config& before, const config::Config& after,
+                  const std::string& key) {
+    EXPECT_NE(inventory_json(before), inventory_json(after)) << key;
+    EXPECT_NE(inventory_text(before), inventory_text(after)) << key;
+}
+
 /// Another value that the loader accepts makes a difference.
 bool makes_a_difference(const yaml::Node& tree, const Leaf& leaf, const config::Config& before) {
     yaml::Node& value = *leaf.value;
@@ -206,6 +215,7 @@ bool makes_a_difference(const yaml::Node& tree, const Leaf& leaf, const config::
         const auto after = load(yaml_text(tree));
         differs = after && !differences(before, *after).empty();
         if (differs) expect_needs(before, *after, leaf.key);
+        if (differs) expect_shown(before, *after, leaf.key);
         if (differs) break;
     }
     value = kept;
@@ -265,15 +275,19 @@ bool shows(const yaml::KeyShape& key) {
         std::optional<config::Config> first = load_with(base, key.path, "");
         for (const std::string& value : values_of(key)) {
             const auto other = load_with(base, key.path, value);
-            if (other && first && !differences(*first, *other).empty()) return true;
+            if (other && first && !differences(*first, *other).empty()) {
+                expect_shown(*first, *other, key.path);
+                return true;
+            }
             if (!first) first = other;  // it cannot be left out
         }
     }
     return false;
 }
 
-/// A key that is new in a table is here without another line: it is loaded, and `--diff`, a reload
-/// and `config get` know it. What the documents and the schema have of it: test_reference.
+/// A key that is new in a table is here without another line: it is loaded, and `--diff`, a reload,
+/// `config get`, `check` as text and as JSON, and `GET /configuration` know it. What the documents
+/// and the schema have of it: test_reference.
 TEST(EveryKey, OfAConfigurationMakesADifference) {
     using Kind = yaml::KeyShape::Kind;
     std::map<std::string, bool> keys;

@@ -59,7 +59,7 @@ struct Reading {
 
 std::vector<std::string> shown(const Lamp& lamp) {
     std::vector<Setting> all;
-    lamp_keys().show(SettingWriter(all, "lamp"), lamp);
+    lamp_keys().show(SettingWriter(all).below("lamp"), lamp);
     std::vector<std::string> texts;
     for (const Setting& setting : all) texts.push_back(setting.path + '=' + setting.value);
     return texts;
@@ -98,7 +98,7 @@ TEST(Keys, DescribeThemselves) {
 
 TEST(Keys, AreInheritedFromTheirOwner) {
     std::vector<Setting> all;
-    const SettingWriter owner(all, "hall");
+    const SettingWriter owner = SettingWriter(all).below("hall");
     lamp_keys().show(owner.below("lamp"), {}, owner);
     EXPECT_EQ(all[0].path, "hall/lamp/count");
     EXPECT_EQ(all[0].otherwise, "hall/count");
