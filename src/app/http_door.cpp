@@ -307,8 +307,10 @@ std::optional<tls::Trust> trust_despite_faults(const std::string& file) {
     if (secure == nullptr) return std::nullopt;
     const auto content = [&](std::string_view key) {
         const yaml::Node* path = secure->find(key);
-        return path == nullptr ? std::string()
-                               : config::RealFiles::read_any(path->scalar).value_or("");
+        return path == nullptr
+                   ? std::string()
+                   : config::RealFiles::read_any(config::beside(path_of(file), path->scalar))
+                         .value_or("");
     };
     return tls::Trust{content("certificate"), content("ca")};
 }
