@@ -71,6 +71,7 @@ class Adder {
                             "or 127.0.0.1:8080");
         command->add_option("--token-file", typed->at.token_file,
                             "a file whose first line is a token");
+        command->add_option("--ca", typed->at.ca, kCa);
         command->footer(kExitCodes);
         return command;
     }

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <iostream>
@@ -19,6 +20,7 @@
 #include "load.hpp"
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/tls/issue.hpp"
+#include "panelgate/tls/peer.hpp"
 
 namespace panelgate::app {
 namespace {
@@ -27,6 +29,7 @@ namespace {
 struct CertificateOptions {
     std::vector<std::string> names;  ///< of the certificate; of `revoke`, its file
     std::string role;
+    std::string role_word;  ///< a role that only rules know
     std::string dir = ".";  ///< of the files, the CA's included
     int days = 0;
     bool force = false;  ///< replace files
@@ -49,23 +52,59 @@ ExitCode cannot(const std::string& what, const std::string& path, ExitCode code)
     return code;
 }
 
-/// Replaces a file in one step, so that a gateway that reads it meanwhile has the old one or the
-/// new.
-bool put(const std::string& path, const std::string& text, mode_t mode) {
-    const std::string fresh = path + ".new";
-    const int file = ::open(fresh.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode);
-    if (file < 0) return false;
-    const bool moded = ::fchmod(file, mode) == 0;
-    const bool written =
-        ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size());
-    const bool kept = ::fsync(file) == 0;
-    const bool closed = ::close(file) == 0;
-    return moded && written && kept && closed && std::rename(fresh.c_str(), path.c_str()) == 0;
-}
+/// Files that are all replaced, each in one step, or none: a gateway that reads them meanwhile has
+/// the old or the new.
+class Files {
+  public:
+    Files() = default;
+    ~Files() {
+        for (const std::string& path : paths_) ::unlink(fresh(path).c_str());
+    }
+    Files(const Files&) = delete;
+    Files& operator=(const Files&) = delete;
 
-/// Writes NAME.key and NAME.crt; says so.
+    /// Writes it under another name; false, and errno, if that fails.
+    bool write(const std::string& path, const std::string& text, mode_t mode) {
+        const int file =
+            ::open(fresh(path).c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode);
+        if (file < 0) return false;
+        paths_.push_back(path);
+        errno = ENOSPC;  // of a short write
+        const bool written =
+            ::fchmod(file, mode) == 0 &&
+            ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
+            ::fsync(file) == 0;
+        const int why = errno;
+        const bool closed = ::close(file) == 0;
+        if (!written) errno = why;
+        return written && closed;
+    }
+    /// Says what is done, then does it: who cannot be told gets nothing.
+    ExitCode keep(const std::string& said) {
+        std::signal(SIGPIPE, SIG_IGN);
+        if (!(std::cout << said << std::flush)) {
+            std::cerr << "panelgate: stdout takes nothing; nothing is written\n";
+            std::cout.clear();
+            return kInternal;
+        }
+        while (!paths_.empty()) {
+            const std::string path = paths_.front();
+            if (std::rename(fresh(path).c_str(), path.c_str()) != 0)
+                return cannot("write", path, kUnavailable);
+            paths_.erase(paths_.begin());
+        }
+        return kFine;
+    }
+
+  private:
+    static std::string fresh(const std::string& path) { return path + ".new"; }
+
+    std::vector<std::string> paths_;
+};
+
+/// Writes NAME.key and NAME.crt; says so, and what to do with them.
 ExitCode write_pair(const CertificateOptions& options, const std::string& name,
-                    const tls::Issued& issued) {
+                    const tls::Issued& issued, const std::string& advice) {
     const std::string key = in_folder(options, name + ".key");
     const std::string certificate = in_folder(options, name + ".crt");
     for (const std::string& path : {key, certificate}) {
@@ -73,12 +112,12 @@ ExitCode write_pair(const CertificateOptions& options, const std::string& name,
         std::cerr << "panelgate: " << path << " is there already; --force replaces it\n";
         return kUnavailable;
     }
-    if (!put(key, issued.key, kSecret)) return cannot("write", key, kUnavailable);
-    if (!put(certificate, issued.certificate, kPublic))
+    Files files;
+    if (!files.write(key, issued.key, kSecret)) return cannot("write", key, kUnavailable);
+    if (!files.write(certificate, issued.certificate, kPublic))
         return cannot("write", certificate, kUnavailable);
-    std::cout << "wrote " << certificate << " and " << key << ", valid for " << options.days
-              << " days\n";
-    return kFine;
+    return files.keep("wrote " + certificate + " and " + key + ", valid for " +
+                      std::to_string(options.days) + " days\n" + advice);
 }
 
 std::optional<tls::Issued> read_ca(const CertificateOptions& options, ExitCode& code) {
@@ -97,67 +136,80 @@ std::optional<tls::Issued> read_ca(const CertificateOptions& options, ExitCode& 
     return ca;
 }
 
-/// A file's name of a certificate's: letters, digits, '.', '-' and '_'.
+/// A file's name of a certificate's: letters, digits, '.', '-' and '_', as long as one may be.
 std::string file_name(std::string name) {
+    constexpr std::size_t kLongest = 200;
     std::ranges::replace_if(
         name,
         [](unsigned char c) { return std::isalnum(c) == 0 && c != '.' && c != '-' && c != '_'; },
         '-');
-    return name;
+    return name.substr(0, kLongest);
+}
+
+/// Does it, and says what was wrong if it could not be done.
+template <class Make>
+ExitCode explained(const Make& make) try {
+    return make();
+} catch (const tls::WrongName& why) {
+    std::cerr << "panelgate: cert: " << why.what() << '\n';
+    return kUsage;
+} catch (const tls::CannotIssue& why) {
+    std::cerr << "panelgate: " << why.what() << '\n';
+    return kUnavailable;
 }
 
 template <class Make>
-ExitCode with_ca(const CertificateOptions& options, const Make& make) try {
-    ExitCode code = kFine;
-    const auto ca = read_ca(options, code);
-    return ca ? make(*ca) : code;
-} catch (const tls::CannotIssue& why) {
-    std::cerr << "panelgate: " << why.what() << '\n';
-    return kUnavailable;
+ExitCode with_ca(const CertificateOptions& options, const Make& make) {
+    return explained([&] {
+        ExitCode code = kFine;
+        const auto ca = read_ca(options, code);
+        return ca ? make(*ca) : code;
+    });
 }
 
-ExitCode new_certificate_authority(const CertificateOptions& options) try {
-    const std::string name = options.names.empty() ? "Plant CA" : options.names.front();
-    const ExitCode code = write_pair(options, "ca", tls::issue_ca(name, validity_of(options)));
-    if (code == kFine)
-        std::cout << "Keep ca.key on a machine that is kept safe, and a copy of it: it signs all "
-                     "others. No gateway needs it.\n"
-                     "ca.crt goes to every gateway (`tls: ca`) and to every client, as the CA that "
-                     "it trusts.\n";
-    return code;
-} catch (const tls::CannotIssue& why) {
-    std::cerr << "panelgate: " << why.what() << '\n';
-    return kUnavailable;
+ExitCode new_certificate_authority(const CertificateOptions& options) {
+    return explained([&] {
+        const std::string name = options.names.empty() ? "Plant CA" : options.names.front();
+        return write_pair(
+            options, "ca", tls::issue_ca(name, validity_of(options)),
+            "Keep ca.key on a machine that is kept safe, and a copy of it: it signs all "
+            "others. No gateway needs it.\n"
+            "ca.crt goes to every gateway (`tls: ca`) and to every client, as the CA that "
+            "it trusts.\n");
+    });
 }
 
 ExitCode new_server_certificate(const CertificateOptions& options) {
     return with_ca(options, [&](const tls::Issued& ca) {
         const std::string name = file_name(options.names.front());
-        const ExitCode code =
-            write_pair(options, name, tls::issue_server(ca, options.names, validity_of(options)));
-        if (code == kFine)
-            std::cout
-                << "Both go to the gateway, readable by its user alone (chown panelgate, chmod "
-                   "600 the key):\n  tls: {certificate: /etc/panelgate/tls/"
-                << name << ".crt, key: /etc/panelgate/tls/" << name
-                << ".key, ca: /etc/panelgate/tls/ca.crt, client: required}\n";
-        return code;
+        return write_pair(
+            options, name, tls::issue_server(ca, options.names, validity_of(options)),
+            "Both go to the gateway, readable by its user alone (chown panelgate, chmod "
+            "600 the key):\n  tls: {certificate: /etc/panelgate/tls/" +
+                name + ".crt, key: /etc/panelgate/tls/" + name +
+                ".key, ca: /etc/panelgate/tls/ca.crt, client: required}\n");
     });
+}
+
+/// Words that only the rules of a plant know are asked for as such: a misspelt role would read
+/// only.
+std::optional<std::string> role_of(const CertificateOptions& options) {
+    if (!options.role_word.empty()) return options.role_word;
+    if (options.role.empty()) return std::nullopt;
+    if (tls::role_named(options.role) != Role::none) return options.role;
+    throw tls::WrongName("--role is viewer, operator, engineer or admin, not '" + options.role +
+                         "'; a word of your own that the rules of `access` know: --role-word");
 }
 
 ExitCode new_client_certificate(const CertificateOptions& options) {
     return with_ca(options, [&](const tls::Issued& ca) {
-        std::optional<std::string> role;
-        if (!options.role.empty()) role = options.role;
-        const ExitCode code =
-            write_pair(options, file_name(options.names.front()),
-                       tls::issue_client(ca, options.names.front(), role, validity_of(options)));
-        if (code == kFine)
-            std::cout << "Both go to the client, with ca.crt as the CA that it trusts. "
-                      << (role ? "Its role is " + *role
-                               : std::string("It has no role, so it only reads"))
-                      << " where a gateway has `role_from: certificate`.\n";
-        return code;
+        const std::optional<std::string> role = role_of(options);
+        return write_pair(
+            options, file_name(options.names.front()),
+            tls::issue_client(ca, options.names.front(), role, validity_of(options)),
+            "Both go to the client, with ca.crt as the CA that it trusts. " +
+                (role ? "Its role is " + *role : std::string("It has no role, so it only reads")) +
+                " where a gateway has `role_from: certificate`.\n");
     });
 }
 
@@ -168,11 +220,11 @@ ExitCode revoke_certificate(const CertificateOptions& options) {
         const std::string path = in_folder(options, "crl.pem");
         const auto former = config::RealFiles::read_any(path);
         const std::string list = tls::revoke(ca, former.value_or(""), *given, validity_of(options));
-        if (!put(path, list, kPublic)) return cannot("write", path, kUnavailable);
-        std::cout << "wrote " << path
-                  << "\nIt goes to every gateway (`tls: crl`), which takes it without a restart; "
-                     "connections that are open stay open until they end.\n";
-        return kFine;
+        Files files;
+        if (!files.write(path, list, kPublic)) return cannot("write", path, kUnavailable);
+        return files.keep("wrote " + path +
+                          "\nIt goes to every gateway (`tls: crl`), which takes it without a "
+                          "restart, and closes the connections of this certificate.\n");
     });
 }
 
@@ -227,9 +279,12 @@ void add_certificate_commands(CLI::App& cli, ExitCode& code) {
     auto client = std::make_shared<CertificateOptions>();
     CLI::App* new_client = adder.add("new-client", "a client's certificate", 825, client);
     new_client->add_option("NAME", client->names, "its name")->required()->expected(1);
-    new_client->add_option("--role", client->role,
-                           "viewer, operator, engineer or admin, or another word that the rules of "
-                           "`access` know; without: it only reads");
+    CLI::Option* const role = new_client->add_option(
+        "--role", client->role, "viewer, operator, engineer or admin; without: it only reads");
+    new_client
+        ->add_option("--role-word", client->role_word,
+                     "instead: a word of your own, which the rules of `access` know")
+        ->excludes(role);
     adder.on_call(new_client, new_client_certificate, client);
 
     auto lost = std::make_shared<CertificateOptions>();

@@ -1,3 +1,4 @@
+#include <boost/asio/error.hpp>
 #include <boost/json/parse.hpp>
 #include <boost/json/value.hpp>
 #include <csignal>
@@ -77,90 +78,97 @@ ExitCode print_verdict(const json::object& verdict) {
     return outcome == "invalid" ? kBadConfig : kUnavailable;
 }
 
-const char* scheme_of(const std::optional<tls::Trust>& trust) {
-    return trust ? "https://" : "http://";
-}
-
-/// The gateway knows the token that its file had when it was read last. Where it is another one by
-/// now, a gateway of this machine is asked by SIGHUP, which is for whoever may end it as well; the
-/// verdict is then asked for with the token, which is known once the file has been read.
-ExitCode reload_by_signal(const ReloadOptions& options, const config::Endpoint& at) {
-    const std::string known = scheme_of(http_trust(options.file, options.http)) +
-                              endpoint_text(at.address, at.port) + " does not know the token in " +
-                              options.token_file;
-    const auto process = process_at(at);
+/// A gateway of this machine is asked by SIGHUP, which is for whoever may end it as well, where it
+/// is asked by what its file says now and goes by what it said before: a token, a certificate, TLS
+/// or none. The verdict is then asked for; it is known once the file has been read.
+ExitCode reload_by_signal(const ReloadOptions& options, const HttpDoor& door,
+                          const std::string& why, const std::string& remedy) {
+    const auto process = process_at(door.endpoint);
     if (options.rollback || !process || ::kill(*process, SIGHUP) != 0) {
-        std::cerr << "panelgate: not reloaded: " << known << "\n  (if it has changed: "
+        std::cerr << "panelgate: not reloaded: " << why << "\n  (" << remedy
                   << (options.rollback ? "reload first, then roll back"
                                        : "systemctl reload panelgate, or kill -HUP its process")
                   << ")\n";
         return kNotReady;
     }
-    std::cerr << "panelgate: " << known << " yet: asked by SIGHUP, process " << *process << '\n';
+    std::cerr << "panelgate: " << why << ": asked by SIGHUP, process " << *process << '\n';
     ExitCode code = kFine;
     const auto gateway =
-        GatewayClient::make({options.file, options.http, options.token_file}, code);
+        GatewayClient::make({options.file, options.http, options.token_file, options.ca}, code);
     if (!gateway) return code;
     for (const Duration pause : kPauses) {
         std::this_thread::sleep_for(pause);
         const GatewayAnswer answer = gateway->get("/api/v1/reload");
         if (answer.is_ok() && answer.json.contains("outcome")) return print_verdict(answer.json);
     }
-    std::cerr
-        << "panelgate: it does not know the token still: its log says whether it has reloaded; "
-           "a token that systemd hands out (LoadCredential) is taken at a restart\n";
+    std::cerr << "panelgate: it cannot be asked what came of it: its log says whether it has "
+                 "reloaded; a token that systemd hands out (LoadCredential) is taken at a restart, "
+                 "and a certificate that must not replace a good one is not taken\n";
     return kNotReady;
+}
+
+std::string reload_request(const ReloadOptions& options, const HttpDoor& door,
+                           const std::string& secret) {
+    return "POST /api/v1/reload" + std::string(options.rollback ? "?rollback=true" : "") +
+           (options.weaker ? "&weaker=true" : "") +
+           " HTTP/1.1\r\nHost: " + endpoint_text(door.endpoint.address, door.endpoint.port) +
+           (secret.empty() ? "" : "\r\nAuthorization: Bearer ") + secret +
+           "\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
+}
+
+/// True if somebody listens, who does not talk as the file says.
+bool is_misunderstood(const HttpReply& reply) {
+    namespace error = boost::asio::error;
+    if (!reply.refused.empty()) return true;
+    return reply.text.empty() &&
+           (reply.error == error::eof || reply.error == error::connection_reset);
 }
 
 }  // namespace
 
 ExitCode reload(const ReloadOptions& options) {
-    const auto endpoint = http_endpoint(options.file, options.http);
-    if (const auto* none = std::get_if<NoHttpEndpoint>(&endpoint)) {
+    const auto found = http_door({options.file, options.http, options.token_file, options.ca});
+    if (const auto* none = std::get_if<NoHttpDoor>(&found)) {
         std::cerr << "panelgate: not reloaded: " << none->why << "; or kill -HUP its process\n";
         return none->code;
     }
+    const auto& door = std::get<HttpDoor>(found);
     const auto secret = token_in(options.token_file);
     if (!secret) return kNoInput;
-    const auto& [address, port] = std::get<config::Endpoint>(endpoint);
-    const std::string place = endpoint_text(address, port);
-    const auto trust = http_trust(options.file, options.http);
-    const std::string request =
-        "POST /api/v1/reload" + std::string(options.rollback ? "?rollback=true" : "") +
-        (options.weaker ? "&weaker=true" : "") + " HTTP/1.1\r\nHost: " + place +
-        (secret->empty() ? "" : "\r\nAuthorization: Bearer ") + *secret +
-        "\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
-    const HttpReply reply = ask(
-        address, port, request, kPatience, kMostOfVerdict, [](const HttpReply&) { return false; },
-        trust);
+    const HttpReply reply = ask(door, reload_request(options, door, *secret), kPatience,
+                                kMostOfVerdict, [](const HttpReply&) { return false; });
     if (!secret->empty() && reply.status().starts_with("401 "))
-        return reload_by_signal(options, std::get<config::Endpoint>(endpoint));
+        return reload_by_signal(
+            options, door,
+            door.url() + " does not know the token in " + options.token_file + " yet",
+            "if it has changed: ");
+    if (is_misunderstood(reply))
+        return reload_by_signal(options, door, door.url() + ": " + reply.failure(),
+                                "if its certificate or `tls` has changed: ");
     boost::system::error_code wrong;
     const json::value body = json::parse(reply.body(), wrong);
     if (!wrong && body.is_object() && body.as_object().contains("outcome"))
         return print_verdict(body.as_object());
     std::string why = reply.text.empty() ? reply.failure() : reply.status();
     if (!wrong && body.is_object()) why += ": " + text_in(body.as_object(), "detail");
-    std::cerr << "panelgate: not reloaded: " << scheme_of(trust) << place << ": " << why << '\n';
+    std::cerr << "panelgate: not reloaded: " << door.url() << ": " << why << '\n';
     if (reply.text.empty() && options.http.empty())
         std::cerr << "  (if it runs with another `http: listen` than " << options.file
                   << " has now: --http ADDR:PORT, or kill -HUP its process)\n";
     return kNotReady;
 }
 
-ExitCode health(const std::string& file, const std::string& http) {
-    const auto endpoint = http_endpoint(file, http);
-    if (const auto* none = std::get_if<NoHttpEndpoint>(&endpoint)) {
+ExitCode health(const GatewayOptions& options) {
+    const auto found = http_door(options);
+    if (const auto* none = std::get_if<NoHttpDoor>(&found)) {
         std::cerr << "panelgate: " << (none->code == kUsage ? "" : "not ready: ") << none->why
                   << '\n';
         return none->code == kUsage ? kUsage : kNotReady;
     }
-    const auto& [address, port] = std::get<config::Endpoint>(endpoint);
-    const auto trust = http_trust(file, http);
-    const std::string why = ask_whether_ready(address, port, kHealthTimeout, trust);
+    const auto& door = std::get<HttpDoor>(found);
+    const std::string why = ask_whether_ready(door, kHealthTimeout);
     if (why.empty()) return kFine;
-    std::cerr << "panelgate: not ready: " << scheme_of(trust) << endpoint_text(address, port)
-              << "/readyz: " << why << '\n';
+    std::cerr << "panelgate: not ready: " << door.url() << "/readyz: " << why << '\n';
     return kNotReady;
 }
 

@@ -69,14 +69,19 @@ struct TokenOptions {
 };
 /// Makes a token and prints it once, with what the configuration must say.
 ExitCode token_new(const TokenOptions& options);
-/// Checks whether the gateway is ready. `http`: "ADDR:PORT" of its REST API; if empty, the address
-/// from `file`, or the default if there is no readable file.
-ExitCode health(const std::string& file, const std::string& http);
+struct GatewayOptions;
+/// Checks whether the gateway is ready.
+ExitCode health(const GatewayOptions& options);
+/// What `--ca` is, of all commands that ask a running gateway.
+inline constexpr const char* kCa =
+    "a file of the CA that has signed its certificate, where the configuration file is not at hand "
+    "(with --http https://ADDR:PORT)";
 /// Which running gateway is asked.
 struct GatewayOptions {
     std::string file = kDefaultConfig;  ///< names its HTTP address
     std::string http{};                 ///< overrides it: "ADDR:PORT"
     std::string token_file{};           ///< its first line is a token
+    std::string ca{};                   ///< file of the CA that has signed its certificate
 };
 /// The command line of `read`; texts are empty and `count` 0 when not given.
 struct ReadOptions {
@@ -128,6 +133,7 @@ struct ReloadOptions {
     std::string token_file;  ///< its first line is a token of the role operator
     bool rollback = false;   ///< return to the previous configuration
     bool weaker = false;     ///< ... even if it protects less
+    std::string ca{};        ///< file of the CA that has signed its certificate
 };
 /// Makes a running gateway reload its file, and prints the verdict.
 ExitCode reload(const ReloadOptions& options);

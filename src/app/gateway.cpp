@@ -234,6 +234,16 @@ void Gateway::watch_certificates() {
     if (certificates_) certificates_->follow(config);
 }
 
+std::vector<ServedCertificate> Gateway::certificates() const {
+    if (!certificates_) return {};
+    return certificates_->served();
+}
+
+void Gateway::refused_certificates(const std::vector<ServedCertificate>& files) {
+    if (!certificates_) return;
+    for (const ServedCertificate& one : files) certificates_->refused(one);
+}
+
 void Gateway::record(const web::ReloadVerdict& verdict) {
     const bool was_kept = audit_.is_kept();
     audit_.reload(verdict);

@@ -51,8 +51,8 @@ std::string GatewayAnswer::problem() const {
 }
 
 std::optional<GatewayClient> GatewayClient::make(const GatewayOptions& options, ExitCode& code) {
-    const auto found = http_endpoint(options.file, options.http);
-    if (const auto* none = std::get_if<NoHttpEndpoint>(&found)) {
+    auto found = http_door(options);
+    if (const auto* none = std::get_if<NoHttpDoor>(&found)) {
         std::cerr << "panelgate: " << none->why << '\n';
         code = none->code;
         return std::nullopt;
@@ -63,15 +63,10 @@ std::optional<GatewayClient> GatewayClient::make(const GatewayOptions& options, 
         return std::nullopt;
     }
     GatewayClient client;
-    client.endpoint_ = std::get<config::Endpoint>(found);
-    client.trust_ = http_trust(options.file, options.http);
+    client.door_ = std::get<HttpDoor>(std::move(found));
     client.token_ = std::move(*token);
     client.token_file_ = options.token_file;
     return client;
-}
-
-std::string GatewayClient::url() const {
-    return (trust_ ? "https://" : "http://") + endpoint_text(endpoint_.address, endpoint_.port);
 }
 
 std::string GatewayClient::without_token(std::string text) const {
@@ -85,8 +80,8 @@ std::string GatewayClient::without_token(std::string text) const {
 
 std::string GatewayClient::request(const std::string& verb, const std::string& path,
                                    const std::string& body) const {
-    std::string made = verb + ' ' + path +
-                       " HTTP/1.1\r\nHost: " + endpoint_text(endpoint_.address, endpoint_.port);
+    std::string made = verb + ' ' + path + " HTTP/1.1\r\nHost: " +
+                       endpoint_text(door_.endpoint.address, door_.endpoint.port);
     if (!token_.empty()) made += "\r\nAuthorization: Bearer " + token_;
     if (verb != "GET")
         made +=
@@ -122,9 +117,8 @@ GatewayAnswer no_answer(const char* why) {
 }  // namespace
 
 GatewayAnswer GatewayClient::put_question(const std::string& request, Duration patience) const {
-    return answer_of(ask(
-        endpoint_.address, endpoint_.port, request, patience, kMostOfAnswer,
-        [](const HttpReply&) { return false; }, trust_));
+    return answer_of(
+        ask(door_, request, patience, kMostOfAnswer, [](const HttpReply&) { return false; }));
 }
 
 GatewayAnswer GatewayClient::get(const std::string& path, Duration patience) const {
@@ -151,8 +145,7 @@ std::optional<GatewayAnswer> GatewayClient::follow(
         taken = body.size();
         return false;
     };
-    const HttpReply reply = ask(endpoint_.address, endpoint_.port, request("GET", path, ""),
-                                kStream, kMostEvents, look, trust_);
+    const HttpReply reply = ask(door_, request("GET", path, ""), kStream, kMostEvents, look);
     if (done) return std::nullopt;
     GatewayAnswer answer = answer_of(reply);
     if (answer.is_ok() && reply.error) return no_answer("the connection has ended");

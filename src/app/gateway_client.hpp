@@ -51,7 +51,7 @@ class GatewayClient {
     ExitCode explain(const GatewayAnswer& answer, const std::string& what = {}) const;
     /// Why, as one sentence.
     std::string reason(const GatewayAnswer& answer) const;
-    std::string url() const;
+    std::string url() const { return door_.url(); }
     /// `text` without the token.
     std::string without_token(std::string text) const;
 
@@ -60,8 +60,7 @@ class GatewayClient {
                         const std::string& body) const;
     GatewayAnswer put_question(const std::string& request, Duration patience) const;
 
-    config::Endpoint endpoint_;
-    std::optional<tls::Trust> trust_;  ///< none: plain HTTP
+    HttpDoor door_;
     std::string token_;
     std::string token_file_;
 };

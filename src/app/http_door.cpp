@@ -238,42 +238,69 @@ config::Endpoint usual() {
     return {settings.address, settings.port};
 }
 
-std::variant<config::Endpoint, NoHttpEndpoint> no_http_endpoint(const std::string& why,
-                                                                ExitCode code = kNotReady) {
-    return NoHttpEndpoint{why + "; --http ADDR:PORT says where", code};
+/// What a file says of `http`.
+struct Known {
+    std::optional<config::Endpoint> endpoint;
+    NoHttpDoor why{};  ///< there is none
+    std::optional<tls::Trust> trust{};
+};
+
+Known nowhere(const std::string& why, ExitCode code = kNotReady) {
+    return {std::nullopt, {why + "; --http ADDR:PORT says where", code}};
 }
 
-/// The value of http's `listen`: nothing if there is no http, "" if http has none.
-std::optional<std::string> listen_in(const std::string& file, const std::string& text) {
-    yaml::Problems faults(file);
-    const yaml::Node tree = yaml::parse(text, faults);
-    if (!faults.empty()) return http_listen_in(text);
-    const yaml::Node* http = tree.find("http");
-    if (http == nullptr) return std::nullopt;
-    const yaml::Node* listen = http->find("listen");
-    return listen == nullptr ? "" : listen->scalar;
+/// Where `http` has `tls`, nothing is asked in plain.
+std::optional<tls::Trust> trust_in(const std::string& file, const yaml::Node* http) {
+    const yaml::Node* secure = http == nullptr ? nullptr : http->find("tls");
+    if (secure == nullptr) return std::nullopt;
+    const auto content = [&](std::string_view key) {
+        const yaml::Node* path = secure->find(key);
+        if (path == nullptr) return std::string();
+        return config::RealFiles::read_any(config::beside(path_of(file), path->scalar))
+            .value_or("");
+    };
+    return tls::Trust{content("certificate"), content("ca")};
 }
 
-/// The endpoint from a file with faults. No endpoint is guessed: it might be another program's.
-std::variant<config::Endpoint, NoHttpEndpoint> endpoint_despite_faults(const std::string& file) {
+/// From a file with faults, such as a key that only the gateway may read. No endpoint is guessed:
+/// it might be another program's.
+Known known_despite_faults(const std::string& file) {
     const auto text = config::RealFiles::read_any(path_of(file));
-    if (!text && file == kDefaultConfig) return usual();  // `panelgate demo` has none
-    if (!text) return no_http_endpoint("cannot read " + file, kNoInput);
-    const std::optional<std::string> listen = listen_in(file, *text);
-    const auto found = config::parse_endpoint(listen.value_or(""));
-    if (found && found->port != 0) return *found;
-    return no_http_endpoint(
+    if (!text && file == kDefaultConfig) return {usual()};  // `panelgate demo` has none
+    if (!text) return nowhere("cannot read " + file, kNoInput);
+    yaml::Problems faults(file);
+    const yaml::Node tree = yaml::parse(*text, faults);
+    std::string listen = http_listen_in(*text);
+    std::optional<tls::Trust> trust;
+    if (faults.empty()) {
+        const yaml::Node* http = tree.find("http");
+        const yaml::Node* at = http == nullptr ? nullptr : http->find("listen");
+        listen = at == nullptr ? "" : at->scalar;
+        trust = trust_in(file, http);
+    } else if (text->find("tls:") != std::string::npos) {
+        trust.emplace();
+    }
+    Known known = nowhere(
         file + " has faults (`panelgate check` names them) and does not say where http listens",
         kBadConfig);
+    const auto found = config::parse_endpoint(listen);
+    if (found && found->port != 0) known.endpoint = *found;
+    known.trust = std::move(trust);
+    return known;
 }
 
-std::variant<config::Endpoint, NoHttpEndpoint> endpoint_of(const std::string& file) {
+Known known_by(const std::string& file) {
     const std::optional<config::Config> config = read_quietly(file);
-    if (!config) return endpoint_despite_faults(file);
-    if (config->http && config->http->port != 0)
-        return config::Endpoint{config->http->address, config->http->port};
-    return no_http_endpoint(file + (config->http ? " lets http listen on any free port"
-                                                 : " has no http, so the gateway cannot be asked"));
+    if (!config) return known_despite_faults(file);
+    if (!config->http) return nowhere(file + " has no http, so the gateway cannot be asked");
+    Known known = nowhere(file + " lets http listen on any free port");
+    if (config->http->port != 0)
+        known.endpoint = config::Endpoint{config->http->address, config->http->port};
+    if (config->http->tls) {
+        const tls::Material& files = config->http->tls->material;
+        known.trust = tls::Trust{files.certificate, files.ca};
+    }
+    return known;
 }
 
 constexpr std::string_view kPlainScheme = "http://";
@@ -289,61 +316,34 @@ std::string without_scheme(std::string http) {
 
 }  // namespace
 
-namespace {
-
-/// From a file with faults, such as a key that only the gateway may read: where `http` has `tls`,
-/// nothing is asked in plain.
-std::optional<tls::Trust> trust_despite_faults(const std::string& file) {
-    const auto text = config::RealFiles::read_any(path_of(file));
-    if (!text) return std::nullopt;
-    yaml::Problems faults(file);
-    const yaml::Node tree = yaml::parse(*text, faults);
-    if (!faults.empty()) {
-        if (text->find("tls:") == std::string::npos) return std::nullopt;
-        return tls::Trust{};
-    }
-    const yaml::Node* http = tree.find("http");
-    const yaml::Node* secure = http == nullptr ? nullptr : http->find("tls");
-    if (secure == nullptr) return std::nullopt;
-    const auto content = [&](std::string_view key) {
-        const yaml::Node* path = secure->find(key);
-        return path == nullptr
-                   ? std::string()
-                   : config::RealFiles::read_any(config::beside(path_of(file), path->scalar))
-                         .value_or("");
-    };
-    return tls::Trust{content("certificate"), content("ca")};
+std::string HttpDoor::url() const {
+    return std::string(trust ? kSecureScheme : kPlainScheme) +
+           endpoint_text(endpoint.address, endpoint.port);
 }
 
-}  // namespace
-
-std::optional<tls::Trust> http_trust(const std::string& file, const std::string& http) {
-    if (http.starts_with(kPlainScheme)) return std::nullopt;
-    const std::optional<config::Config> config = read_quietly(file);
-    if (!config) {
-        if (auto trust = trust_despite_faults(file)) return trust;
-    }
-    if (config && config->http && config->http->tls) {
-        const tls::Material& files = config->http->tls->material;
-        return tls::Trust{files.certificate, files.ca};
-    }
-    if (http.starts_with(kSecureScheme)) return tls::Trust{};
-    return std::nullopt;
-}
-
-std::variant<config::Endpoint, NoHttpEndpoint> http_endpoint(const std::string& file,
-                                                             const std::string& http) {
-    auto found = endpoint_of(file);
+std::variant<HttpDoor, NoHttpDoor> http_door(const GatewayOptions& options) {
+    const std::string& http = options.http;
+    Known known = known_by(options.file);
     if (!http.empty()) {
-        const auto asked = config::parse_endpoint(without_scheme(http));
-        if (!asked || asked->port == 0)
-            return NoHttpEndpoint{"--http '" + http + "' is not ADDR:PORT, such as 127.0.0.1:8080",
-                                  kUsage};
-        found = *asked;
+        known.endpoint = config::parse_endpoint(without_scheme(http));
+        if (!known.endpoint || known.endpoint->port == 0)
+            return NoHttpDoor{"--http '" + http + "' is not ADDR:PORT, such as 127.0.0.1:8080",
+                              kUsage};
     }
-    if (auto* endpoint = std::get_if<config::Endpoint>(&found))
-        endpoint->address = config::reachable(endpoint->address);
-    return found;
+    if (!known.endpoint) return known.why;
+    HttpDoor door{{config::reachable(known.endpoint->address), known.endpoint->port}, known.trust};
+    if (http.starts_with(kPlainScheme)) {
+        door.trust.reset();
+    } else if (!door.trust && (http.starts_with(kSecureScheme) || !options.ca.empty())) {
+        door.trust.emplace();
+    }
+    if (options.ca.empty()) return door;
+    const auto ca = config::RealFiles::read_any(options.ca);
+    if (!ca || !door.trust)
+        return NoHttpDoor{ca ? "--ca is for https://" : "cannot read --ca " + options.ca,
+                          ca ? kUsage : kNoInput};
+    door.trust->ca += *ca;
+    return door;
 }
 
 namespace {
@@ -366,8 +366,9 @@ class Question {
             if (error) return end(error);
             if (!trust_) return send_request();
             tls::connect(stream_, *trust_, target.address(), [this](const std::string& why) {
-                if (why.empty()) return send_request();
+                reply_.secure = why.empty();
                 reply_.refused = why;
+                if (why.empty()) send_request();
             });
         });
         io_.run_for(patience);
@@ -429,15 +430,18 @@ std::string HttpReply::failure() const {
     if (!error) return "no answer in time";
     const bool shut_out = error == asio::error::eof || error == asio::error::connection_reset;
     if (!shut_out) return error.message();
-    return "closed without an answer (does its `allow` let this machine in?)";
+    if (secure)
+        return "closed without an answer: by TLS it got in, so ask its log (`tls handshake "
+               "failed`): does it want a client's certificate (`tls: client: required`)?";
+    return "closed without an answer (does its `allow` let this machine in, and does it have "
+           "`tls`, "
+           "so that it is asked by https://?)";
 }
 
-HttpReply ask(const std::string& address, std::uint16_t port, const std::string& request,
-              Duration patience, std::size_t most,
-              const std::function<bool(const HttpReply&)>& enough,
-              const std::optional<tls::Trust>& trust) {
-    return Question(request, most, enough, trust)
-        .put({asio::ip::make_address(address), port}, patience);
+HttpReply ask(const HttpDoor& door, const std::string& request, Duration patience, std::size_t most,
+              const std::function<bool(const HttpReply&)>& enough) {
+    return Question(request, most, enough, door.trust)
+        .put({asio::ip::make_address(door.endpoint.address), door.endpoint.port}, patience);
 }
 
 namespace {
@@ -451,11 +455,11 @@ bool is_ready(const HttpReply& reply) {
 
 }  // namespace
 
-std::string ask_whether_ready(const std::string& address, std::uint16_t port, Duration patience,
-                              const std::optional<tls::Trust>& trust) {
-    const std::string request = "GET /readyz HTTP/1.1\r\nHost: " + endpoint_text(address, port) +
+std::string ask_whether_ready(const HttpDoor& door, Duration patience) {
+    const std::string request = "GET /readyz HTTP/1.1\r\nHost: " +
+                                endpoint_text(door.endpoint.address, door.endpoint.port) +
                                 "\r\nConnection: close\r\n\r\n";
-    const HttpReply reply = ask(address, port, request, patience, kMost, is_ready, trust);
+    const HttpReply reply = ask(door, request, patience, kMost, is_ready);
     if (is_ready(reply)) return {};
     if (reply.text.empty()) return reply.failure();
     if (!reply.is_http()) return "an answer that is no HTTP: " + first_line(reply.text);

@@ -77,26 +77,29 @@ class Scrapes final : public web::MetricsSource {
 /// and the like are not understood. Pure.
 std::string http_listen_in(std::string_view text);
 
-/// Why the HTTP endpoint of a gateway is unknown.
-struct NoHttpEndpoint {
+/// Why it is unknown where a gateway is asked.
+struct NoHttpDoor {
     std::string why;
     ExitCode code;  ///< kUsage: wrong command line; else kNoInput, kBadConfig, kNotReady
 };
-/// The HTTP endpoint of the gateway, with an address that can be connected to: `http` (ADDR:PORT),
-/// or, if that is "", the one in the file, even if the file has faults. If the default file does
-/// not exist, the default endpoint, which `panelgate demo` uses.
-std::variant<config::Endpoint, NoHttpEndpoint> http_endpoint(const std::string& file,
-                                                             const std::string& http);
+/// Where a gateway is asked, and by whose certificate it is known.
+struct HttpDoor {
+    config::Endpoint endpoint;        ///< with an address that can be connected to
+    std::optional<tls::Trust> trust;  ///< nothing: it is asked by plain HTTP
 
-/// Whom to trust where that endpoint speaks HTTPS, as its file says, or `http` with https:// in
-/// front; nothing: it is asked by plain HTTP.
-std::optional<tls::Trust> http_trust(const std::string& file, const std::string& http);
+    std::string url() const;  ///< "https://127.0.0.1:8443"
+};
+/// The door that `options.http` names (ADDR:PORT, also with http:// or https://), or, if that is
+/// "", the one in the file, even if the file has faults. Whom to trust is what the file says, and
+/// `options.ca`. If the default file does not exist, the default door, which `panelgate demo` has.
+std::variant<HttpDoor, NoHttpDoor> http_door(const GatewayOptions& options);
 
 /// A gateway's reply to an HTTP request: the raw text including its head.
 struct HttpReply {
     std::string text;
     boost::system::error_code error;  ///< why reading ended; no error also after a timeout
     std::string refused{};            ///< why there is no TLS, in words
+    bool secure = false;              ///< the handshake of TLS was done
 
     bool is_http() const { return text.starts_with("HTTP/1."); }
     /// "200 OK" of the status line (RFC 9112, 4); safe for a terminal.
@@ -109,17 +112,13 @@ struct HttpReply {
 /// The first line of `text`, safe for a terminal.
 std::string first_line(std::string_view text);
 
-/// Sends a request over a new connection, by TLS if there is somebody to trust, and reads until
-/// `enough`, `most` bytes, the end of the connection, or `patience` is over. `address`: an IP
-/// address without brackets.
-HttpReply ask(const std::string& address, std::uint16_t port, const std::string& request,
-              Duration patience, std::size_t most,
-              const std::function<bool(const HttpReply&)>& enough,
-              const std::optional<tls::Trust>& trust = std::nullopt);
+/// Sends a request over a new connection and reads until `enough`, `most` bytes, the end of the
+/// connection, or `patience` is over.
+HttpReply ask(const HttpDoor& door, const std::string& request, Duration patience, std::size_t most,
+              const std::function<bool(const HttpReply&)>& enough);
 
-/// Requests http://ADDR:PORT/readyz and waits for at most `patience`. Empty if the answer is 200;
-/// else the answer or the error in one printable line. `address`: an IP address without brackets.
-std::string ask_whether_ready(const std::string& address, std::uint16_t port, Duration patience,
-                              const std::optional<tls::Trust>& trust = std::nullopt);
+/// Requests /readyz and waits for at most `patience`. Empty if the answer is 200; else the answer
+/// or the error in one printable line.
+std::string ask_whether_ready(const HttpDoor& door, Duration patience);
 
 }  // namespace panelgate::app

@@ -393,9 +393,10 @@ class CommandLine {
         command->add_option("--http", http_,
                             "ADDR:PORT of its REST API; without: what the configuration file says, "
                             "or 127.0.0.1:8080");
+        command->add_option("--ca", ca_, kCa);
         command->footer(
             "Exit codes: 0 it is ready; 1 it is not, or says nothing for 2 s; 64 usage.");
-        command->callback([this] { code_ = health(file_, http_); });
+        command->callback([this] { code_ = health({file_, http_, "", ca_}); });
     }
 
     void add_reload() {
@@ -406,6 +407,7 @@ class CommandLine {
         command->add_option("--http", reload_.http, "ADDR:PORT of its REST API");
         command->add_option("--token-file", reload_.token_file,
                             "a file whose first line is a token of the role admin");
+        command->add_option("--ca", reload_.ca, kCa);
         command->add_flag("--rollback", reload_.rollback,
                           "serve what ran before the last reload, whatever the file says");
         command
@@ -423,6 +425,7 @@ class CommandLine {
     CLI::App cli_{kAbout, "panelgate"};
     ExitCode code_ = kFine;
     std::string file_ = kDefaultConfig;
+    std::string ca_;
     std::string path_;  ///< of a setting
     bool simulated_ = false;
     bool watch_ = false;

@@ -7,6 +7,7 @@
 #include <system_error>
 #include <utility>
 
+#include "certificates.hpp"
 #include "difference.hpp"
 #include "gateway.hpp"
 #include "load.hpp"
@@ -126,29 +127,38 @@ struct Reloader::Job {
     std::shared_ptr<const config::Config> running;
     std::shared_ptr<const config::Config> rollback;  ///< null: read the file
     bool may_be_weaker = false;                      ///< for a rollback
+    std::vector<ServedCertificate> certificates;     ///< in use
+    std::vector<ServedCertificate> refused{};        ///< files that do not replace them
     std::shared_ptr<const config::Config> next;      ///< null: there is none
     web::SharedText shown;
     web::ReloadVerdict verdict;
 
     void read();
+    void keep_certificates(config::Config& made);
     void compare();
 };
 
 /// A rollback must not bring back tokens that were removed.
-std::shared_ptr<const config::Config> with_tokens_of(const config::Config& config,
-                                                     const config::Config& running) {
+config::Config with_tokens_of(const config::Config& config, const config::Config& running) {
     config::Config made = config;
     if (made.http && running.http) {
         made.http->tokens = running.http->tokens;
         made.http->anonymous = std::min(made.http->anonymous, running.http->anonymous);
     }
-    return std::make_shared<const config::Config>(std::move(made));
+    return made;
+}
+
+void Reloader::Job::keep_certificates(config::Config& made) {
+    refused = keep_good_certificates(made, certificates, seconds_since_1970(), rollback != nullptr,
+                                     verdict.warnings);
 }
 
 /// Runs in the worker: all that takes long.
 void Reloader::Job::read() try {
     if (rollback) {
-        next = with_tokens_of(*rollback, *running);
+        config::Config made = with_tokens_of(*rollback, *running);
+        keep_certificates(made);
+        next = std::make_shared<const config::Config>(std::move(made));
         verdict.weaker = config::weaker(*running, *next);
         if (!verdict.weaker.empty() && !may_be_weaker) {
             next = nullptr;
@@ -167,6 +177,7 @@ void Reloader::Job::read() try {
             return;
         }
         config::share_profiles(*loaded.config, *running);
+        keep_certificates(*loaded.config);
         for (const StartMessage& message : prepare(*loaded.config))
             verdict.warnings.push_back(message.event == "configuration"
                                            ? message.text
@@ -230,6 +241,7 @@ void Reloader::begin() {
     job->running = gateway_->config();
     if (wish.rollback) job->rollback = before_;
     job->may_be_weaker = wish.weaker;
+    job->certificates = gateway_->certificates();
     job->verdict.rollback = wish.rollback;
     job->verdict.cause = served_.front().cause;
     worker_.run([job] { job->read(); }, [this, job] { apply(job); });
@@ -250,6 +262,7 @@ void Reloader::apply(const std::shared_ptr<Job>& job) {
             job->verdict.why = error.what();
         }
     }
+    gateway_->refused_certificates(job->refused);
     end(job);
 }
 

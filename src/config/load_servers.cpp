@@ -70,11 +70,9 @@ namespace {
 
 using yaml::Node;
 
-const std::string& endpoint_pattern() {
-    static const std::string kPattern =
-        "^([0-9]{1,3}(\\.[0-9]{1,3}){3}|\\[[0-9A-Fa-f:.]+\\]):" + yaml::integer_pattern(0, 65535) +
-        '$';
-    return kPattern;
+std::string endpoint_pattern(bool port_may_lack) {
+    return "^([0-9]{1,3}(\\.[0-9]{1,3}){3}|\\[[0-9A-Fa-f:.]+\\])(:" +
+           yaml::integer_pattern(0, 65535) + (port_may_lack ? ")?$" : ")$");
 }
 
 }  // namespace
@@ -88,19 +86,35 @@ const std::string& network_pattern() {
 
 namespace {
 
+void refuse_listen(MapReader& in, std::string_view typed) {
+    in.problem("listen", "listen must be ADDR:PORT such as 127.0.0.1:502 or [::1]:502, not " +
+                             yaml::quote(typed) + listen_hint(typed));
+}
+
 template <class Settings>
 void load_listen(MapReader& in, Settings& settings) {
     const auto text = in.text("listen");
-    in.looks_like("listen", endpoint_pattern());
+    in.looks_like("listen", endpoint_pattern(false));
     if (!text) return;
     const auto endpoint = parse_endpoint(*text);
-    if (!endpoint) {
-        in.problem("listen", "listen must be ADDR:PORT such as 127.0.0.1:502 or [::1]:502, not " +
-                                 yaml::quote(*text) + listen_hint(*text));
-        return;
-    }
+    if (!endpoint) return refuse_listen(in, *text);
     settings.address = endpoint->address;
     settings.port = endpoint->port;
+}
+
+/// With `tls` it may be an address alone: returns it as typed until that is known.
+std::optional<std::string> load_modbus_listen(MapReader& in, tcp_server::Settings& settings) {
+    const auto text = in.text("listen");
+    const auto secure = parse_endpoint(text.value_or("") + ':' + std::to_string(kSecurePort));
+    if (!secure) {
+        load_listen(in, settings);
+        in.looks_like("listen", endpoint_pattern(true));
+        return std::nullopt;
+    }
+    in.looks_like("listen", endpoint_pattern(true));
+    settings.address = secure->address;
+    settings.port = secure->port;
+    return text;
 }
 
 const Line* find_line(const Config& config, std::string_view name) {
@@ -335,12 +349,13 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a modbus_tcp listener", "{listen: 127.0.0.1:502}");
     in.elsewhere(kServerKeysElsewhere);
     tcp_server::Settings settings;
-    load_listen(in, settings);
+    const std::optional<std::string> without_port = load_modbus_listen(in, settings);
     load_access(loading, in, settings);
     load_framing(in, settings);
     load_diagnostics(loading, in, settings);
     load_allow(loading, in, settings.allow);
     load_modbus_security(loading, in, settings);
+    if (without_port && !settings.tls) refuse_listen(in, *without_port);
     refuse_empty_access(in);
     refuse_empty(in, "allow", kNoNetwork);
     in.finish();

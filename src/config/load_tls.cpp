@@ -87,7 +87,6 @@ std::optional<tls::Settings> load_tls(Loading& loading, MapReader& in) {
 }
 
 void load_modbus_security(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
-    constexpr std::uint16_t kSecurePort = 802;
     settings.tls = load_tls(loading, in);
     if (!settings.tls) return;
     if (!in.has("listen")) settings.port = kSecurePort;

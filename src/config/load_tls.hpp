@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "loader.hpp"
@@ -7,6 +8,9 @@
 #include "setting_writer.hpp"
 
 namespace panelgate::config {
+
+/// Of Modbus/TCP Security, where a listener with `tls` names none.
+inline constexpr std::uint16_t kSecurePort = 802;
 
 /// Reads the key `tls` of a listener with its files; nothing without it. Files that cannot serve
 /// are problems.

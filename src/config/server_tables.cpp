@@ -94,9 +94,10 @@ const Keys<tcp_server::Settings>& listener_keys() {
                      "Most connections of all clients.")
             .integer("max_connections_per_address", &Settings::max_connections_per_address, 1,
                      65535, "Most connections of one address; then its longest idle one is closed.")
-            .other("tls",
-                   "Modbus/TCP Security: only clients that speak TLS are served; `listen` is "
-                   "127.0.0.1:802 then unless it is given.");
+            .other(
+                "tls",
+                "Modbus/TCP Security: only clients that speak TLS are served. `listen` may be an "
+                "address alone then: its port is 802, as it is of the default, 127.0.0.1.");
     return kKeys;
 }
 

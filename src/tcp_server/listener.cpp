@@ -103,6 +103,8 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
     void evict(std::size_t index, bool idle, const tcp::endpoint& peer);
     void count_refused(const tcp::endpoint& peer, const Place& place);
     void on_closed(const std::shared_ptr<Session>& session);
+    void apply_roles(const Settings& before);
+    void review();
     void notify_when_empty();
 
     std::shared_ptr<Shared> shared_;
@@ -129,20 +131,48 @@ void Listener::Core::start() {
 void Listener::Core::apply(Settings settings, UnitMap units) {
     allowed_ = rt::AccessList(settings.allow);
     if (datagrams_) datagrams_->allow(allowed_);
-    if (shared_->handshakes && settings.tls) shared_->handshakes->apply(*settings.tls);
-    shared_->settings = std::move(settings);
+    const bool others =
+        shared_->handshakes && settings.tls && shared_->handshakes->apply(*settings.tls);
+    const Settings before = std::exchange(shared_->settings, std::move(settings));
     shared_->units = std::move(units);
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // close() erases
     for (const auto& session : sessions) {
         if (!allowed_.allows(session->peer())) session->close();
     }
+    if (shared_->handshakes) apply_roles(before);
+    if (others) review();
 }
 
 void Listener::Core::renew(const tls::Settings& settings,
                            std::shared_ptr<const tls::Context> context) {
     if (!shared_->handshakes) return;
-    shared_->handshakes->apply(settings, std::move(context));
+    const bool others = shared_->handshakes->apply(settings, std::move(context));
     shared_->settings.tls = settings;
+    if (others) review();
+}
+
+/// A connection keeps the role that it came in with: who has another one now comes in anew.
+void Listener::Core::apply_roles(const Settings& before) {
+    const auto from_certificate = [](const Settings& settings) {
+        return settings.tls && settings.tls->role_from_certificate;
+    };
+    const bool was = from_certificate(before);
+    const bool is = from_certificate(shared_->settings);
+    if (was == is) return;
+    const std::set<std::shared_ptr<Session>> sessions = sessions_;  // dismiss() erases
+    for (const auto& session : sessions)
+        if (session->has_other_role(was, is))
+            session->dismiss("role_from has changed, and with it what its certificate allows");
+}
+
+void Listener::Core::review() {
+    std::vector<tls::Handshakes::Guest> guests;
+    for (const auto& session : sessions_) {
+        Session* const one = session.get();
+        guests.push_back(
+            {session, &one->stream(), [one](const std::string& why) { one->dismiss(why); }});
+    }
+    shared_->handshakes->review(std::move(guests));
 }
 
 Counters Listener::Core::counters() const {

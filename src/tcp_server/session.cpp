@@ -90,6 +90,19 @@ void Session::finish() {
     go_on();
 }
 
+void Session::dismiss(const std::string& why) {
+    if (!closed_) fail(why, rt::LogLevel::warn);
+}
+
+bool Session::has_other_role(bool from_certificate_before, bool from_certificate_now) const {
+    if (!stream_.is_secure()) return false;
+    const auto role = [&](bool from_certificate) {
+        if (!from_certificate) return Role::operator_;
+        return tls::role_named(stream_.peer().role.value_or(""));
+    };
+    return role(from_certificate_before) != role(from_certificate_now);
+}
+
 void Session::close() {
     if (std::exchange(closed_, true)) return;
     const std::shared_ptr<Session> self = shared_from_this();

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "panelgate/base/bytes.hpp"
@@ -43,6 +44,11 @@ class Session : public std::enable_shared_from_this<Session> {
     Guest guest() const;
     /// Takes no more requests, answers those in flight, refuses queued ones, then closes.
     void finish();
+    /// Closes at once, because of what its certificate no longer allows; logged.
+    void dismiss(const std::string& why);
+    /// True if `role_from` decides something else than before, by its certificate.
+    bool has_other_role(bool from_certificate_before, bool from_certificate_now) const;
+    const tls::Stream& stream() const { return stream_; }
     /// Closes at once and cancels its queued requests on the buses. Idempotent.
     void close();
 

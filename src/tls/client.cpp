@@ -83,7 +83,7 @@ class Connecting : public std::enable_shared_from_this<Connecting> {
         return std::string(
                    "its certificate is not the one of the configuration, and cannot be "
                    "trusted: ") +
-               X509_verify_cert_error_string(chain);
+               X509_verify_cert_error_string(chain) + " (--ca FILE names the CA that signed it)";
     }
 
     Stream& stream_;

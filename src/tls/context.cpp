@@ -33,10 +33,20 @@ int judge_chain(int good, X509_STORE_CTX* chain) {
     }
     const auto* const ssl = static_cast<const SSL*>(
         X509_STORE_CTX_get_ex_data(chain, SSL_get_ex_data_X509_STORE_CTX_idx()));
+    if (ssl == nullptr) return 0;  // not in a handshake
     auto* const subject = static_cast<std::string*>(SSL_get_app_data(ssl));
     const X509* const judged = X509_STORE_CTX_get_current_cert(chain);
     if (subject != nullptr && judged != nullptr) *subject = subject_of(judged);
     return 0;
+}
+
+/// A file that is being written holds the first objects only.
+void check_whole(const char* key, const std::string& file, std::string_view content,
+                 std::string_view kind, std::size_t read) {
+    if (!is_whole(content, kind, read))
+        throw Unusable(key, file +
+                                " is damaged or cut off: not all that it holds can be read; "
+                                "copy it again, and under its name in one step (mv)");
 }
 
 std::string last_reason() {
@@ -97,6 +107,8 @@ void Context::use_certificate(const Settings& settings) {
         throw Unusable("certificate", settings.certificate +
                                           " holds no certificate; give a file in PEM form "
                                           "(-----BEGIN CERTIFICATE-----)");
+    check_whole("certificate", settings.certificate, settings.material.certificate, "CERTIFICATE",
+                chain.size());
     if (SSL_CTX_use_certificate(context_.get(), chain.front().get()) != 1)
         throw Unusable("certificate", "the certificate in " + settings.certificate +
                                           " cannot be used" + last_reason() +
@@ -133,6 +145,7 @@ void Context::use_ca(const Settings& settings) {
         throw Unusable("ca", settings.ca +
                                  " holds no certificate; give the certificate of the CA that signs "
                                  "those of clients, in PEM form");
+    check_whole("ca", settings.ca, settings.material.ca, "CERTIFICATE", trusted.size());
     X509_STORE* const store = SSL_CTX_get_cert_store(context_.get());
     for (const auto& one : trusted) {
         X509_STORE_add_cert(store, one.get());
@@ -148,6 +161,7 @@ void Context::use_crl(const Settings& settings) {
         throw Unusable("crl", settings.crl +
                                   " holds no list of revoked certificates; give a file in PEM form "
                                   "(-----BEGIN X509 CRL-----)");
+    check_whole("crl", settings.crl, settings.material.crl, "CRL", lists.size());
     X509_STORE* const store = SSL_CTX_get_cert_store(context_.get());
     std::set<std::string> issuers;
     for (const auto& list : lists) {

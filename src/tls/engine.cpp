@@ -8,6 +8,8 @@
 #include <cstring>
 #include <utility>
 
+#include "proof.hpp"
+
 namespace panelgate::tls {
 
 /// The BIO of an engine.
@@ -145,40 +147,6 @@ constexpr Explained kExplained[] = {
     {SSL_R_TLSV1_ALERT_PROTOCOL_VERSION, Outcome::version, kVersions},
 };
 
-Outcome outcome_of_chain(long result) {
-    switch (result) {
-        case X509_V_ERR_CERT_HAS_EXPIRED:
-        case X509_V_ERR_CERT_NOT_YET_VALID:
-            return Outcome::expired;
-        case X509_V_ERR_CERT_REVOKED:
-            return Outcome::revoked;
-        default:
-            return Outcome::untrusted;
-    }
-}
-
-std::string words_of_chain(long result) {
-    switch (result) {
-        case X509_V_ERR_CERT_HAS_EXPIRED:
-            return "has expired";
-        case X509_V_ERR_CERT_NOT_YET_VALID:
-            return "is not valid yet; compare the clocks";
-        case X509_V_ERR_CERT_REVOKED:
-            return "is revoked";
-        case X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT_LOCALLY:
-        case X509_V_ERR_UNABLE_TO_VERIFY_LEAF_SIGNATURE:
-        case X509_V_ERR_DEPTH_ZERO_SELF_SIGNED_CERT:
-        case X509_V_ERR_SELF_SIGNED_CERT_IN_CHAIN:
-            return "is not signed by the CA of `ca`";
-        case X509_V_ERR_INVALID_PURPOSE:
-            return "is not one of a client (extended key usage)";
-        case X509_V_ERR_UNABLE_TO_GET_CRL:
-            return "is of a CA whose list of revoked certificates is not in `crl`";
-        default:
-            return std::string("cannot be trusted: ") + X509_verify_cert_error_string(result);
-    }
-}
-
 }  // namespace
 
 void Engine::explain(int reason) {
@@ -197,8 +165,9 @@ void Engine::explain(int reason) {
 }
 
 void Engine::explain_chain(long result) {
-    outcome_ = outcome_of_chain(result);
-    why_ = "the client's certificate " + refused_ + ' ' + words_of_chain(result);
+    Refusal refusal = refusal_of(result, refused_);
+    outcome_ = refusal.outcome;
+    why_ = std::move(refusal.why);
 }
 
 }  // namespace panelgate::tls

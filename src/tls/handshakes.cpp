@@ -14,13 +14,16 @@
 #include <cctype>
 #include <cerrno>
 #include <map>
+#include <optional>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "engine.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tls/stream.hpp"
+#include "proof.hpp"
 
 namespace panelgate::tls {
 namespace {
@@ -78,7 +81,8 @@ class Handshakes::Conversation : public std::enable_shared_from_this<Conversatio
           all_(std::move(all)),
           owner_(std::move(owner)),
           stream_(stream),
-          engine_(std::make_shared<Engine>(all_->context_)),
+          context_(all_->context_),
+          engine_(std::make_shared<Engine>(context_)),
           deadline_(stream.get_executor()),
           done_(std::move(done)) {
         all_->running_.push_back(this);
@@ -106,10 +110,13 @@ class Handshakes::Conversation : public std::enable_shared_from_this<Conversatio
     void compute();
     void send(Engine::Progress progress);
     void judge(Engine::Progress progress);
+    void judge_again();
+    void let_in();
 
     std::shared_ptr<Handshakes> all_;
     std::shared_ptr<void> owner_;
     Stream& stream_;
+    std::shared_ptr<const Context> context_;
     std::shared_ptr<Engine> engine_;
     asio::steady_timer deadline_;
     std::function<void(bool)> done_;  ///< null: over
@@ -174,12 +181,29 @@ void Handshakes::Conversation::judge(Engine::Progress progress) {
         case Engine::Progress::needs_input:
             return listen();
         case Engine::Progress::done:
-            engine_->output = std::string();
-            stream_.secure(engine_);
-            return finish(Outcome::done, "");
+            return context_ == all_->context_ ? let_in() : judge_again();
         case Engine::Progress::failed:
             return finish(engine_->outcome(), engine_->why());
     }
+}
+
+/// It began by former rules.
+void Handshakes::Conversation::judge_again() {
+    context_ = all_->context_;
+    auto refusal = std::make_shared<std::optional<Refusal>>();
+    all_->worker_.run([proof = std::make_shared<const Proof>(engine_->native()), context = context_,
+                       refusal] { *refusal = proof->refusal_by(*context); },
+                      [self = shared_from_this(), refusal] {
+                          if (!self->done_) return;
+                          if (*refusal) return self->finish((*refusal)->outcome, (*refusal)->why);
+                          self->judge(Engine::Progress::done);
+                      });
+}
+
+void Handshakes::Conversation::let_in() {
+    engine_->output = std::string();
+    stream_.secure(engine_);
+    finish(Outcome::done, "");
 }
 
 void Handshakes::Conversation::finish(Outcome outcome, const std::string& why) {
@@ -200,17 +224,46 @@ Handshakes::Handshakes(asio::any_io_executor executor, std::string name, Setting
 
 Handshakes::~Handshakes() = default;
 
-void Handshakes::apply(const Settings& settings) try {
-    if (settings == settings_) return;
-    apply(settings, context_of(settings));
+bool Handshakes::apply(const Settings& settings) try {
+    if (settings == settings_) return false;
+    return apply(settings, context_of(settings));
 } catch (const Unusable& why) {
     rt::log(rt::LogLevel::error, "certificate not renewed",
             {{"listener", name_}, {"reason", why.what()}});
+    return false;
 }
 
-void Handshakes::apply(const Settings& settings, std::shared_ptr<const Context> context) {
+bool Handshakes::apply(const Settings& settings, std::shared_ptr<const Context> context) {
+    const auto rules = [](const Settings& of) {
+        return std::tie(of.client, of.lowest, of.material.ca, of.material.crl);
+    };
+    const bool is_other = rules(settings_) != rules(settings);
     settings_ = settings;
     context_ = std::move(context);
+    return is_other;
+}
+
+void Handshakes::review(std::vector<Guest> guests) {
+    struct Judged {
+        Guest guest;
+        std::shared_ptr<const Proof> proof;
+        std::optional<Refusal> refusal{};
+    };
+    auto all = std::make_shared<std::vector<Judged>>();
+    for (Guest& guest : guests)
+        if (auto proof = guest.stream->proof())
+            all->push_back({std::move(guest), std::move(proof)});
+    if (all->empty()) return;
+    worker_.run(
+        [all, context = context_] {
+            be_nice();
+            for (Judged& one : *all) one.refusal = one.proof->refusal_by(*context);
+        },
+        [all] {
+            for (const Judged& one : *all)
+                if (const auto owner = one.guest.owner.lock(); owner && one.refusal)
+                    one.guest.leave(one.refusal->why);
+        });
 }
 
 void Handshakes::begin(std::shared_ptr<void> owner, Stream& stream, std::string client,

@@ -9,6 +9,7 @@
 #include <openssl/x509v3.h>
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <ctime>
 #include <memory>
 
@@ -84,9 +85,12 @@ class Draft {
         ASN1_TIME_set(X509_getm_notBefore(get()), static_cast<time_t>(validity.now - kHour));
         ASN1_TIME_set(X509_getm_notAfter(get()), static_cast<time_t>(end));
         const auto* const text = reinterpret_cast<const unsigned char*>(name.c_str());
-        check(X509_NAME_add_entry_by_txt(X509_get_subject_name(get()), "CN", MBSTRING_UTF8, text,
-                                         -1, -1, 0) == 1,
-              "a name has 1 to 64 characters");
+        const bool is_name =
+            std::ranges::none_of(name, [](unsigned char c) { return c < ' ' || c == 0x7f; }) &&
+            X509_NAME_add_entry_by_txt(X509_get_subject_name(get()), "CN", MBSTRING_UTF8, text, -1,
+                                       -1, 0) == 1;
+        ERR_clear_error();
+        if (!is_name) throw WrongName("a name has 1 to 64 characters, of UTF-8, none of control");
         X509_set_pubkey(get(), key);
     }
     X509* get() const { return certificate_.get(); }
@@ -139,23 +143,69 @@ void extend_end_entity(Draft& draft, const X509* ca, const std::string& usage) {
     draft.extend(ca, NID_authority_key_identifier, "keyid");
 }
 
-/// "DNS:gateway.plant,IP:192.168.10.4". A comma would begin another entry.
+constexpr std::size_t kLongestSubject = 64;  // X.520, ub-common-name
+
+bool is_address(const std::string& name) {
+    ASN1_OCTET_STRING* const address = a2i_IPADDRESS(name.c_str());
+    ASN1_OCTET_STRING_free(address);
+    ERR_clear_error();
+    return address != nullptr;
+}
+
+bool is_label(std::string_view label) {
+    const auto fits = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; };
+    return !label.empty() && label.size() <= 63 && label.front() != '-' && label.back() != '-' &&
+           std::ranges::all_of(label, fits);
+}
+
+/// RFC 1123 2.1, RFC 6125 6.4.3: a '*' is the whole first label. What ends with a number is an
+/// address, or none.
+bool is_host(std::string_view name) {
+    if (name.size() > 253) return false;
+    const bool is_wild = name.starts_with("*.");
+    if (is_wild) name.remove_prefix(2);
+    std::size_t labels = 0;
+    std::string_view last;
+    for (std::size_t end = 0; end != name.npos;
+         name.remove_prefix(end == name.npos ? 0 : end + 1)) {
+        end = name.find('.');
+        last = name.substr(0, end);
+        if (!is_label(last)) return false;
+        ++labels;
+    }
+    const bool is_number =
+        std::ranges::all_of(last, [](unsigned char c) { return std::isdigit(c) != 0; });
+    return !is_number && (!is_wild || labels > 1);
+}
+
+/// "gw" of "gw:8443", "https://gw/"; "" where no name is in it.
+std::string name_in(std::string name) {
+    if (const std::size_t scheme = name.find("://"); scheme != name.npos) name.erase(0, scheme + 3);
+    if (name.starts_with('[')) return name.substr(1, name.find(']') - 1);
+    name.resize(std::min(name.find_first_of(":/"), name.size()));
+    return is_address(name) || is_host(name) ? name : "";
+}
+
+void check_name(const std::string& name) {
+    if (is_address(name) || is_host(name)) return;
+    const std::string meant = name_in(name);
+    throw WrongName("'" + name + "' is no host name or IP address, " +
+                    (meant.empty() ? "such as gateway.plant.example or 192.168.10.4"
+                                   : "without a port or more; write " + meant));
+}
+
+/// A subject is short; what clients compare are the alternatives.
+std::string subject_for(const std::vector<std::string>& names) {
+    const auto fits = [](const std::string& name) { return name.size() <= kLongestSubject; };
+    const auto found = std::ranges::find_if(names, fits);
+    return found != names.end() ? *found : names.front().substr(0, names.front().find('.'));
+}
+
+/// "DNS:gateway.plant,IP:192.168.10.4".
 std::string alternatives_of(const std::vector<std::string>& names) {
     std::string text;
-    for (const std::string& name : names) {
-        const bool is_plain = !name.empty() && std::ranges::all_of(name, [](unsigned char c) {
-            return std::isalnum(c) != 0 || c == '.' || c == '-' || c == ':' || c == '_' || c == '*';
-        });
-        if (!is_plain)
-            throw CannotIssue("'" + name +
-                              "' is no host name or IP address, such as "
-                              "gateway.plant.example or 192.168.10.4");
-        ASN1_OCTET_STRING* const address = a2i_IPADDRESS(name.c_str());
-        text += text.empty() ? "" : ",";
-        text += (address != nullptr ? "IP:" : "DNS:") + name;
-        ASN1_OCTET_STRING_free(address);
-        ERR_clear_error();
-    }
+    for (const std::string& name : names)
+        text += (text.empty() ? "" : ",") + std::string(is_address(name) ? "IP:" : "DNS:") + name;
     return text;
 }
 
@@ -172,10 +222,11 @@ Issued issue_ca(const std::string& name, const Validity& validity) {
 
 Issued issue_server(const Issued& ca, const std::vector<std::string>& names,
                     const Validity& validity) {
-    if (names.empty()) throw CannotIssue("a server's certificate needs at least one name");
+    if (names.empty()) throw WrongName("a server's certificate needs at least one name");
+    std::ranges::for_each(names, check_name);
     const Signer signer(ca);
     const Owned<EVP_PKEY> key = new_key();
-    Draft draft(names.front(), key.get(), validity,
+    Draft draft(subject_for(names), key.get(), validity,
                 seconds_of(X509_get0_notAfter(signer.certificate.get())));
     extend_end_entity(draft, signer.certificate.get(), "serverAuth");
     draft.extend(signer.certificate.get(), NID_subject_alt_name, alternatives_of(names));
@@ -198,7 +249,17 @@ namespace {
 /// The former list, or an empty one of this CA.
 Owned<X509_CRL> former_list(const Signer& signer, std::string_view list) {
     auto former = lists_of(list);
-    if (!former.empty()) return std::move(former.front());
+    if (!former.empty()) {
+        const bool is_own = X509_NAME_cmp(X509_CRL_get_issuer(former.front().get()),
+                                          X509_get_subject_name(signer.certificate.get())) == 0 &&
+                            X509_CRL_verify(former.front().get(), signer.key.get()) == 1;
+        ERR_clear_error();
+        if (!is_own)
+            throw CannotIssue(
+                "the former list of revoked certificates is another CA's; --dir names "
+                "the folder of the CA and its list");
+        return std::move(former.front());
+    }
     if (!list.empty())
         throw CannotIssue(
             "the file of revoked certificates holds no list; give the one that revoke wrote");
@@ -218,13 +279,29 @@ void add_revoked(X509_CRL* list, X509* certificate, ASN1_TIME* time) {
     X509_CRL_add0_revoked(list, entry);
 }
 
+/// A list says nothing of what another CA has signed.
+void check_issued_by(const Signer& signer, X509* certificate) {
+    X509* const ca = signer.certificate.get();
+    if (X509_cmp(ca, certificate) == 0)
+        throw WrongName("this is the CA itself; put another one in its place everywhere instead");
+    const bool is_own =
+        X509_NAME_cmp(X509_get_issuer_name(certificate), X509_get_subject_name(ca)) == 0 &&
+        X509_verify(certificate, signer.key.get()) == 1;
+    ERR_clear_error();
+    if (!is_own)
+        throw WrongName("the certificate of " + subject_of(certificate) + " is signed by " +
+                        name_text(X509_get_issuer_name(certificate)) +
+                        ", not by this CA; --dir names the folder of the CA that signed it");
+}
+
 }  // namespace
 
 std::string revoke(const Issued& ca, std::string_view list, std::string_view certificate,
                    const Validity& validity) {
     const Signer signer(ca);
     const auto given = certificates_of(certificate);
-    if (given.empty()) throw CannotIssue("the file to revoke holds no certificate");
+    if (given.empty()) throw WrongName("the file to revoke holds no certificate");
+    check_issued_by(signer, given.front().get());
     const Owned<X509_CRL> made = former_list(signer, list);
     ASN1_TIME* const time = ASN1_TIME_set(nullptr, static_cast<time_t>(validity.now));
     add_revoked(made.get(), given.front().get(), time);

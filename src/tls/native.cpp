@@ -52,9 +52,9 @@ std::int64_t seconds_of(const ASN1_TIME* time) {
     return ::timegm(&parts);
 }
 
-std::string subject_of(const X509* certificate) {
+std::string name_text(const X509_NAME* name) {
     const Owned<BIO> out(BIO_new(BIO_s_mem()));
-    X509_NAME_print_ex(out.get(), X509_get_subject_name(certificate), 0,
+    X509_NAME_print_ex(out.get(), name, 0,
                        XN_FLAG_RFC2253 & ~static_cast<unsigned long>(ASN1_STRFLGS_ESC_MSB));
     char* text = nullptr;
     const long size = BIO_get_mem_data(out.get(), &text);
@@ -62,6 +62,26 @@ std::string subject_of(const X509* certificate) {
     if (subject.size() > kLongestName) subject.resize(kLongestName);
     std::ranges::replace_if(subject, [](unsigned char c) { return c < ' ' || c == 0x7f; }, '?');
     return subject;
+}
+
+std::string subject_of(const X509* certificate) {
+    return name_text(X509_get_subject_name(certificate));
+}
+
+bool is_whole(std::string_view pem, std::string_view kind, std::size_t read) {
+    constexpr std::string_view kDashes = "-----";
+    const auto count = [&](std::string_view mark) {
+        std::size_t found = 0;
+        for (std::size_t at = pem.find(mark); at != pem.npos; at = pem.find(mark, at + 1)) {
+            const std::string_view rest = pem.substr(at + mark.size());
+            const std::size_t end = rest.find(kDashes);
+            if (end != rest.npos && rest.substr(0, end).ends_with(kind)) ++found;
+        }
+        return found;
+    };
+    const std::size_t last = pem.rfind("-----END ");
+    const bool begins_another = last != pem.npos && pem.find("-----B", last) != pem.npos;
+    return !begins_another && count("-----BEGIN ") == read && count("-----END ") == read;
 }
 
 }  // namespace panelgate::tls

@@ -31,6 +31,10 @@ std::vector<Owned<X509_CRL>> lists_of(std::string_view pem);
 Owned<EVP_PKEY> key_of(std::string_view pem);
 /// Seconds since 1970.
 std::int64_t seconds_of(const ASN1_TIME* time);
+std::string name_text(const X509_NAME* name);
 std::string subject_of(const X509* certificate);
+/// True if all of a PEM text could be read, which holds `read` objects of a kind ("CERTIFICATE"):
+/// false for one that is cut off or damaged.
+bool is_whole(std::string_view pem, std::string_view kind, std::size_t read);
 
 }  // namespace panelgate::tls

@@ -10,6 +10,7 @@
 #include <cerrno>
 
 #include "engine.hpp"
+#include "proof.hpp"
 
 namespace panelgate::tls {
 namespace asio = boost::asio;
@@ -27,6 +28,10 @@ void Stream::secure(std::shared_ptr<Engine> engine) {
     engine_ = std::move(engine);
     engine_->use_socket(socket_.native_handle());
     peer_ = peer_of(SSL_get0_peer_certificate(engine_->native()));
+}
+
+std::shared_ptr<const Proof> Stream::proof() const {
+    return engine_ ? std::make_shared<const Proof>(engine_->native()) : nullptr;
 }
 
 /// Of SSL_read, SSL_peek and SSL_write.

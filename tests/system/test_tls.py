@@ -212,7 +212,7 @@ class Https(Tls):
                 return get(program.http_port(), "/api/v1/stations", self.made.context(name))[0]
             self.assertEqual([read("scada"), read("panel"), read("nobody"), read(None)],
                              [200, 200, 401, 401])
-            self.assertEqual([put("scada"), put("panel"), put("nobody")], [200, 401, 401])
+            self.assertEqual([put("scada"), put("panel"), put("nobody")], [200, 403, 401])
 
     def test_curl_and_openssl_are_served(self):
         with served(self.made, http=self.made.tls("optional")) as program:
@@ -460,7 +460,7 @@ class Checked(Tls):
 
     def test_cert_says_where_files_go_and_overwrites_nothing(self):
         with plant() as own:
-            self.assertIn("role_from: certificate", own.cert("new-client", "third", "--role", "x"))
+            self.assertIn("role_from: certificate", own.cert("new-client", "third", "--role-word", "x"))
             self.assertIn("client: required", own.cert("new-server", "a.plant", "10.0.0.7"))
             again = harness.run("cert", "new-ca", "--dir", str(own.folder))
             self.assertEqual(again.returncode, 69)

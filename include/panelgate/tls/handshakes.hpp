@@ -6,6 +6,7 @@
 #include <list>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "panelgate/rt/process.hpp"
 #include "panelgate/tls/context.hpp"
@@ -26,17 +27,27 @@ class Handshakes : public std::enable_shared_from_this<Handshakes> {
     Handshakes(boost::asio::any_io_executor executor, std::string name, Settings settings);
     ~Handshakes();
 
-    /// For handshakes that begin from now on. Files that no context can be made of are logged, and
-    /// the former ones stay in use.
-    void apply(const Settings& settings);
+    /// For handshakes that end from now on. Files that no context can be made of are logged, and
+    /// the former ones stay in use. True if other clients are let in than before: review() those
+    /// that are.
+    bool apply(const Settings& settings);
     /// The same, with a context made elsewhere, such as in a worker.
-    void apply(const Settings& settings, std::shared_ptr<const Context> context);
+    bool apply(const Settings& settings, std::shared_ptr<const Context> context);
     const Settings& settings() const { return settings_; }
 
     /// Makes the stream secure. `done` is called once, later, with whether it is; a failure is
     /// logged. `owner` owns the stream; `client` is its name, `address` its address.
     void begin(std::shared_ptr<void> owner, Stream& stream, std::string client, std::string address,
                std::function<void(bool secure)> done);
+    /// A client that is let in: who owns its stream, and how it is told to leave.
+    struct Guest {
+        std::weak_ptr<void> owner;
+        const Stream* stream = nullptr;
+        std::function<void(const std::string& why)> leave;
+    };
+    /// Calls `leave`, later, of those who would not be let in any more. Their certificates are
+    /// judged by the thread.
+    void review(std::vector<Guest> guests);
     Counters counters() const;
 
   private:

@@ -26,18 +26,24 @@ struct CannotIssue : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+/// What was asked for cannot be had, whatever the CA: a name that is none, another CA's certificate.
+struct WrongName : CannotIssue {
+    using CannotIssue::CannotIssue;
+};
+
 // What a small plant needs: ECDSA P-256, X.509v3, SHA-256, random serial numbers. A certificate
 // begins an hour early, because clocks differ, and ends with its CA at the latest. All throw
 // CannotIssue.
 
 Issued issue_ca(const std::string& name, const Validity& validity);
-/// `names`: host names and IP addresses; the first one is its subject.
+/// `names`: host names and IP addresses; the first one is its subject, as far as that may be long.
 Issued issue_server(const Issued& ca, const std::vector<std::string>& names,
                     const Validity& validity);
 /// With the extension of Modbus/TCP Security for the role, if one is given.
 Issued issue_client(const Issued& ca, const std::string& name,
                     const std::optional<std::string>& role, const Validity& validity);
-/// The CA's list of revoked certificates with this one added; `list` is the former one, or "".
+/// The CA's list of revoked certificates with this one added, which it has signed; `list` is the
+/// former one, or "".
 std::string revoke(const Issued& ca, std::string_view list, std::string_view certificate,
                    const Validity& validity);
 

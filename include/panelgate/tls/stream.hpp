@@ -20,6 +20,7 @@
 namespace panelgate::tls {
 
 class Engine;
+class Proof;
 
 /// A connection, plain or with TLS, chosen at run time: plain until secure(). Meets Asio's
 /// AsyncReadStream and AsyncWriteStream. One read and one write at a time; whoever owns it keeps it
@@ -40,6 +41,8 @@ class Stream {
     bool is_secure() const { return engine_ != nullptr; }
     /// Who is at the other end; nobody before secure().
     const Peer& peer() const { return peer_; }
+    /// What it has shown; null before secure().
+    std::shared_ptr<const Proof> proof() const;
 
     executor_type get_executor() { return socket_.get_executor(); }
     /// For its addresses, options and wait operations. Bytes go through this class.

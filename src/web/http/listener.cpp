@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <exception>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tls/handshakes.hpp"
@@ -60,7 +62,8 @@ bool has_same_right(const Caller& caller, const Settings& before, const Settings
 void HttpListener::apply(std::shared_ptr<const Site> site) {
     allowed_ = rt::AccessList(site->settings.allow);
     const std::shared_ptr<const Site> before = shared_->site;
-    if (handshakes_ && site->settings.tls) handshakes_->apply(*site->settings.tls);
+    const bool others =
+        handshakes_ && site->settings.tls && handshakes_->apply(*site->settings.tls);
     shared_->serve(std::move(site));
     const auto sessions = sessions_;
     for (const auto& [id, session] : sessions) {
@@ -70,11 +73,52 @@ void HttpListener::apply(std::shared_ptr<const Site> site) {
             session->end_events();
         }
     }
+    if (handshakes_) apply_roles(before->settings);
+    if (others) review();
+}
+
+namespace {
+
+void dismiss(const std::string& listener, HttpSession& session, const std::string& why,
+             Duration patience) {
+    rt::log(rt::LogLevel::warn, "connection closed",
+            {{"listener", listener}, {"client", session.caller().name()}, {"reason", why}});
+    session.stop(patience);
+}
+
+}  // namespace
+
+/// A connection keeps the role that it came in with: who has another one now comes in anew.
+void HttpListener::apply_roles(const Settings& before) {
+    const auto from_certificate = [](const Settings& settings) {
+        return settings.tls && settings.tls->role_from_certificate;
+    };
+    const Settings& now = shared_->site->settings;
+    if (from_certificate(before) == from_certificate(now)) return;
+    const auto sessions = sessions_;
+    for (const auto& [id, session] : sessions)
+        if (session->stream().peer().role)
+            dismiss(now.name(), *session,
+                    "role_from has changed, and with it what its certificate allows",
+                    now.request_timeout);
+}
+
+/// Running requests are answered, such as the one that has asked for the new rules.
+void HttpListener::review() {
+    std::vector<tls::Handshakes::Guest> guests;
+    for (const auto& [id, session] : sessions_) {
+        HttpSession* const one = session.get();
+        guests.push_back({session, &one->stream(), [one, shared = shared_](const std::string& why) {
+                              const Settings& settings = shared->site->settings;
+                              dismiss(settings.name(), *one, why, settings.request_timeout);
+                          }});
+    }
+    handshakes_->review(std::move(guests));
 }
 
 void HttpListener::renew(const tls::Settings& settings,
                          std::shared_ptr<const tls::Context> context) {
-    if (handshakes_) handshakes_->apply(settings, std::move(context));
+    if (handshakes_ && handshakes_->apply(settings, std::move(context))) review();
 }
 
 Counters HttpListener::counters() const {

@@ -166,7 +166,14 @@ std::optional<Problem> check_access(const HttpRequest& request, Role needed,
     if (needed == Role::none) return std::nullopt;
     if (is_foreign_form(request)) return problem(415, "send the body as application/json");
     if (header(request, "authorization").empty()) {
-        if (role_of(request, settings) >= needed) return std::nullopt;
+        const Role role = role_of(request, settings);
+        if (role >= needed) return std::nullopt;
+        // Who has shown a role is known: another role would help.
+        const bool certified = request.caller && request.caller->certificate_role();
+        if (certified && role != Role::none)
+            return problem(403, "this needs the role " + std::string(label(needed)) +
+                                    ", and the client's certificate has " +
+                                    std::string(label(role)));
         return unauthorized("this needs a token");
     }
     // Do not echo the value: without a scheme it may be the token.

@@ -72,6 +72,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     /// has at most `reading` to take a reply.
     void stop(Duration reading);
     const Caller& caller() const { return *caller_; }
+    const tls::Stream& stream() const { return stream_; }
     /// Ends an event stream after the pending events.
     void end_events();
     /// Returns the peer's address.

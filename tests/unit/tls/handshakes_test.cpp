@@ -197,5 +197,93 @@ TEST_F(HandshakesTest, NewFilesAreForConnectionsToCome) {
     EXPECT_EQ(outcome_for({}), Outcome::done);
 }
 
+class ReviewTest : public HandshakesTest {
+  protected:
+    /// A client that was let in.
+    struct Guest {
+        std::shared_ptr<Stream> stream;
+        std::vector<std::string> told{};
+    };
+    void let_in(Guest& guest, const Issued& identity) {
+        Sockets sockets(io);
+        TestClient client(identity);
+        sockets.client.native_non_blocking(false);
+        std::thread thread([&] { client.connect(sockets.client.native_handle()); });
+        results.clear();
+        guest.stream = begin(std::move(sockets.server));
+        run_until(1);
+        thread.join();
+    }
+    /// What the clients are told once `settings` apply.
+    bool apply(const Settings& settings, std::initializer_list<Guest*> guests) {
+        if (!handshakes->apply(settings)) return false;
+        std::vector<Handshakes::Guest> all;
+        for (Guest* guest : guests)
+            all.push_back({guest->stream, guest->stream.get(),
+                           [guest](const std::string& why) { guest->told.push_back(why); }});
+        handshakes->review(std::move(all));
+        io.restart();
+        io.run();
+        return true;
+    }
+};
+
+TEST_F(ReviewTest, WhoWouldNotBeLetInNowIsToldWhyAndNobodyElse) {
+    const Issued scada = issue_client(plant.ca, "scada", {}, valid());
+    const Issued lost = issue_client(plant.ca, "lost", {}, valid());
+    Settings settings = plant.settings(ClientCertificate::optional);
+    serve(settings);
+    Guest good;
+    Guest bad;
+    Guest nobody;
+    let_in(good, scada);
+    let_in(bad, lost);
+    let_in(nobody, {});
+    settings.crl = "crl.pem";
+    settings.material.crl = revoke(plant.ca, "", lost.certificate, valid());
+    ASSERT_TRUE(apply(settings, {&good, &bad, &nobody}));
+    EXPECT_EQ(bad.told, std::vector<std::string>{"the client's certificate CN=lost is revoked"});
+    settings.client = ClientCertificate::required;
+    ASSERT_TRUE(apply(settings, {&good, &nobody}));
+    EXPECT_EQ(nobody.told,
+              std::vector<std::string>{"the client has shown no certificate, and now must"});
+    EXPECT_TRUE(good.told.empty());
+    settings.material.ca = issue_ca("Another", valid()).certificate;
+    settings.crl = settings.material.crl = "";
+    ASSERT_TRUE(apply(settings, {&good}));
+    EXPECT_EQ(good.told, std::vector<std::string>{
+                             "the client's certificate CN=scada is not signed by the CA of `ca`"});
+}
+
+TEST_F(ReviewTest, AnotherPairOfTheGatewayIsNoReasonToReview) {
+    Settings settings = plant.settings(ClientCertificate::required);
+    serve(settings);
+    const Issued another = issue_server(plant.ca, {"gateway.plant"}, valid());
+    settings.material.certificate = another.certificate;
+    settings.material.key = another.key;
+    EXPECT_FALSE(handshakes->apply(settings));
+}
+
+TEST_F(ReviewTest, AHandshakeThatBeganByFormerRulesIsJudgedByTheNewOnes) {
+    const Issued lost = issue_client(plant.ca, "lost", {}, valid());
+    Settings settings = plant.settings(ClientCertificate::required);
+    serve(settings);
+    Sockets sockets(io);
+    TestClient client(lost);
+    sockets.client.native_non_blocking(false);
+    last = begin(std::move(sockets.server));
+    settings.crl = "crl.pem";
+    settings.material.crl = revoke(plant.ca, "", lost.certificate, valid());
+    EXPECT_TRUE(handshakes->apply(settings));
+    std::thread thread([&] {
+        if (client.connect(sockets.client.native_handle())) client.read();
+    });
+    run_until(1);
+    last->close();
+    thread.join();
+    EXPECT_EQ(results, std::vector<bool>{false});
+    EXPECT_EQ(count(*handshakes, Outcome::revoked), 1U);
+}
+
 }  // namespace
 }  // namespace panelgate::tls::handshakes_test

@@ -51,6 +51,9 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
     void take(boost::asio::ip::tcp::socket socket);
     /// True if it gets one of the places for probes only.
     bool make_room(const Caller& caller);
+    /// Lets those go whose certificate does not count any more.
+    void review();
+    void apply_roles(const Settings& before);
 
     std::shared_ptr<Shared> shared_;
     rt::AccessList allowed_;

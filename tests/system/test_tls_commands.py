@@ -1,0 +1,137 @@
+"""What the commands say of certificates: `cert`, and those that ask by HTTPS."""
+import pathlib
+import resource
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import harness
+from tls_plant import plant, served
+
+
+class Cert(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.assertEqual(self.cert("new-ca").returncode, 0)
+
+    def cert(self, *arguments, **more):
+        return subprocess.run([harness.PANELGATE, "cert", *arguments, "--dir", str(self.folder)],
+                              stderr=subprocess.PIPE, text=True, check=False,
+                              **({"stdout": subprocess.PIPE} | more))
+
+    def files(self):
+        return sorted(path.name for path in self.folder.iterdir())
+
+    def text(self, name):
+        return subprocess.run(["openssl", "x509", "-in", str(self.folder / name), "-noout", "-text"],
+                              capture_output=True, text=True, check=True).stdout
+
+    def test_names_that_are_none_are_wrong_usage_that_says_what_is_right(self):
+        for names, why in ((["gw:8443"], "'gw:8443' is no host name or IP address, without a port or "
+                                         "more; write gw"),
+                           (["https://10.0.0.5/"], "write 10.0.0.5"), (["[fd00::1]:802"], "write fd00::1"),
+                           (["300.1.1.1"], "such as gateway.plant.example"), (["a b"], "such as"),
+                           (["*"], "such as"), (["a..b"], "such as"), ([""], "such as"),
+                           (["gw", "a,DNS:b"], "'a,DNS:b' is no host name"), (["x" * 64 + ".a"], "such as")):
+            done = self.cert("new-server", *names)
+            self.assertEqual(done.returncode, 64, (names, done.stderr))
+            self.assertIn(why, done.stderr)
+            self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+        self.assertEqual(self.files(), ["ca.crt", "ca.key"])
+
+    def test_long_names_are_alternatives_and_the_subject_is_short(self):
+        name = ".".join(["a" * 50, "b" * 50, "plant.example"])
+        self.assertEqual(self.cert("new-server", name, "10.0.0.5").returncode, 0)
+        text = self.text(name + ".crt")
+        self.assertIn("Subject: CN = 10.0.0.5", text)
+        self.assertIn(f"DNS:{name}, IP Address:10.0.0.5", text)
+        longest = ".".join(["c" * 60] * 4)
+        self.assertEqual(self.cert("new-server", longest).returncode, 0)
+        self.assertTrue(any(name.startswith("c" * 60) for name in self.files()))
+        for name in ("y" * 65, "", "a\nb"):
+            done = self.cert("new-client", name)
+            self.assertEqual(done.returncode, 64, done.stderr)
+            self.assertIn("a name has 1 to 64 characters", done.stderr)
+
+    def test_a_role_that_is_none_is_wrong_usage_that_lists_them(self):
+        done = self.cert("new-client", "scada", "--role", "Operator")
+        self.assertEqual(done.returncode, 64)
+        self.assertIn("viewer, operator, engineer or admin, not 'Operator'", done.stderr)
+        self.assertEqual(self.cert("new-client", "scada", "--role-word", "shift").returncode, 0)
+        self.assertIn("shift", self.text("scada.crt"))
+
+    def test_revoke_refuses_another_cas_certificate_and_list(self):
+        with plant() as other:
+            done = self.cert("revoke", other.path("scada.crt"))
+            self.assertEqual(done.returncode, 64)
+            self.assertIn("CN=scada is signed by CN=Plant CA, not by this CA", done.stderr)
+            self.assertIn("this is the CA itself", self.cert("revoke", str(self.folder / "ca.crt")).stderr)
+            other.cert("revoke", other.path("scada.crt"))
+            self.cert("new-client", "own")
+            shutil.copy(other.path("crl.pem"), self.folder / "crl.pem")
+            done = self.cert("revoke", str(self.folder / "own.crt"))
+            self.assertEqual(done.returncode, 69)
+            self.assertIn("the former list of revoked certificates is another CA's", done.stderr)
+
+    def test_a_full_stdout_or_disk_leaves_all_as_it_was(self):
+        self.cert("new-server", "gw")
+        before = {name: (self.folder / name).read_bytes() for name in self.files()}
+        with open("/dev/full", "w", encoding="ascii") as full:
+            for arguments in (["new-server", "gw", "--force"], ["new-client", "scada"], ["revoke",
+                              str(self.folder / "gw.crt")], ["new-ca", "--force"]):
+                self.assertEqual(self.cert(*arguments, stdout=full).returncode, 70)
+        done = self.cert("new-server", "gw", "--force", restore_signals=False,
+                         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (300, 300)))
+        self.assertEqual(done.returncode, 69)
+        self.assertRegex(done.stderr, "cannot write .*gw.crt|cannot write .*gw.key")
+        self.assertEqual({name: (self.folder / name).read_bytes() for name in self.files()}, before)
+
+
+class Asking(unittest.TestCase):
+    def test_ca_is_enough_where_the_configuration_is_not_at_hand(self):
+        with plant() as made, plant() as other, served(made, http=made.tls()) as program:
+            at = ["-c", "/nowhere.yaml", "--http", f"https://127.0.0.1:{program.http_port()}"]
+            for command in (["health"], ["status"], ["reload"]):
+                done = harness.run(*command, *at, "--ca", made.path("ca.crt"))
+                self.assertEqual(done.returncode, 0, (command, done.stderr))
+                done = harness.run(*command, *at, "--ca", other.path("ca.crt"))
+                self.assertNotEqual(done.returncode, 0)
+            done = harness.run("health", *at)
+            self.assertIn("cannot be trusted", done.stderr)
+            self.assertIn("--ca FILE", done.stderr)
+            done = harness.run("health", *at, "--ca", "/nowhere.crt")
+            self.assertIn("cannot read --ca /nowhere.crt", done.stderr)
+
+    def test_who_is_shut_out_by_tls_is_told_of_tls(self):
+        with plant() as made, served(made, http=made.tls("required")) as program:
+            at = ["-c", made.path("panelgate.yaml"), "--http", f"127.0.0.1:{program.http_port()}"]
+            for command in ("health", "status"):
+                done = harness.run(command, *at)
+                self.assertEqual(done.returncode, 1 if command == "health" else 69)
+                self.assertIn("client: required", done.stderr)
+                self.assertNotIn("allow", done.stderr)
+            done = harness.run("health", "-c", "/nowhere.yaml", "--http",
+                               f"http://127.0.0.1:{program.http_port()}")
+            self.assertIn("https://", done.stderr)
+
+
+class Port(unittest.TestCase):
+    def test_802_where_a_listener_with_tls_names_none(self):
+        with plant() as made:
+            file = made.folder / "port.yaml"
+            for listen, shown in (("127.0.0.2", "127.0.0.2:802"), ("\"[::1]\"", "[::1]:802"),
+                                  ("127.0.0.2:1802", "127.0.0.2:1802")):
+                file.write_text("lines: [{name: floor1, device: sim}]\n"
+                                f"modbus_tcp: [{{listen: {listen}, {made.tls()}}}]\n")
+                done = harness.run("check", "-c", str(file))
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertIn(f"modbus_tcp {shown}", done.stdout)
+            file.write_text("lines: [{name: floor1, device: sim}]\nmodbus_tcp: [{listen: 127.0.0.2}]\n")
+            self.assertIn("listen must be ADDR:PORT", harness.run("check", "-c", str(file)).stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
