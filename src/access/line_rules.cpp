@@ -187,6 +187,12 @@ bool LineRules::some_allowed(const Meeting& meeting, Act act, modbus::Table tabl
     return settings_->allow_by_default;
 }
 
+bool LineRules::may_read_some(const WhoRef& who) const {
+    if (listed_.empty()) return may_some(who, 0, Act::read);
+    return std::ranges::any_of(
+        listed_, [&](std::uint8_t station) { return may_some(who, station, Act::read); });
+}
+
 bool LineRules::reads_all(const WhoRef& who, std::uint8_t station) const {
     if (is_open() || is_trusted(who)) return true;
     Meeting& meeting = meet(who, station);

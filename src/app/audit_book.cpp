@@ -52,6 +52,10 @@ std::uint16_t register_at(ByteView bytes, std::size_t at) {
     return static_cast<std::uint16_t>(bytes[at] << 8U | bytes[at + 1]);
 }
 
+std::string plain_place(const modbus::Span& items) {
+    return std::string(modbus::label(items.table)) + '/' + std::to_string(items.first);
+}
+
 /// Where the values of a write begin; 0: it has none that are simply values.
 std::size_t values_at(std::uint8_t function) {
     switch (function) {
@@ -68,8 +72,8 @@ std::size_t values_at(std::uint8_t function) {
     }
 }
 
-/// What one client may have of one kind of refusal is counted under this.
-void make_key(std::string& key, const WhoRef& who, std::string_view what) {
+/// What one client may have of one kind of refusal is counted under this and what it is.
+void make_client_key(std::string& key, const WhoRef& who) {
     key.clear();
     if (who) {
         // A serial master and the gateway's own have no address, but a name without a port.
@@ -80,7 +84,6 @@ void make_key(std::string& key, const WhoRef& who, std::string_view what) {
         key += who->user;
     }
     key += '\t';
-    key += what;
 }
 
 /// A client without the port, which each of its connections has anew.
@@ -212,6 +215,11 @@ const std::string& AuditBook::notation_of(Known& known, const modbus::Span& item
     return known.notations.emplace(key, std::move(text)).first->second;
 }
 
+/// In the panel's notation; of panels together and of one that is not listed, by table.
+std::string AuditBook::place_of(Known* known, const modbus::Span& items) {
+    return known != nullptr ? notation_of(*known, items) : plain_place(items);
+}
+
 void AuditBook::write(const std::string& line, const bus::WriteEnd& end) {
     if (!trail_) return;
     Known* known = find(line, end.station);
@@ -232,7 +240,7 @@ void AuditBook::add_write(const std::string& line, const bus::WriteEnd& end, Kno
     record.text("line", line);
     if (known != nullptr) record.text("station", known->station->name);
     record.number("id", end.station);
-    if (end.items && known != nullptr) record.text("at", notation_of(*known, *end.items));
+    if (end.items) record.text("at", place_of(known, *end.items));
     if (!end.pdu.empty()) record.number("function", end.pdu[0]);
     if (end.items) {
         record.text("table", modbus::label(end.items->table)).number("address", end.items->first);
@@ -284,8 +292,7 @@ void AuditBook::add_before(const Known& known, const modbus::Span& items) {
     composer_.number("before_age_ms", static_cast<std::uint64_t>(to_milliseconds(*age)));
 }
 
-bool AuditBook::is_vain_repeat(const std::string& line, const bus::WriteEnd& end,
-                               const Known* known) {
+bool AuditBook::is_vain_repeat(const std::string& line, const bus::WriteEnd& end, Known* known) {
     const bool refused = end.outcome == Outcome::refused;
     std::string& what = what_;
     what = line;
@@ -295,10 +302,15 @@ bool AuditBook::is_vain_repeat(const std::string& line, const bus::WriteEnd& end
     what += label(end.outcome);
     what += '\t';
     what += end.rule;
+    what += '\t';
+    if (!end.pdu.empty()) what += std::to_string(end.pdu[0]);
+    what += '\t';
+    if (end.items) what += plain_place(*end.items);
     return is_repeat(end.who, what, refused ? 1 : kNotSent, [&] {
         const std::string station =
             known != nullptr ? known->station->name : std::to_string(end.station);
-        return member("line", line) + member("station", station) +
+        const std::string at = end.items ? member("at", place_of(known, *end.items)) : "";
+        return member("line", line) + member("station", station) + at +
                member("outcome", outcome_of(end)) +
                (refused ? end.rule.empty() ? std::string() : member("rule", end.rule)
                         : member("why", label(end.outcome)));
@@ -307,9 +319,12 @@ bool AuditBook::is_vain_repeat(const std::string& line, const bus::WriteEnd& end
 
 bool AuditBook::is_repeat(const WhoRef& who, std::string_view what, unsigned in_full,
                           const std::function<std::string()>& more) {
-    make_key(key_, who, what);
+    make_client_key(key_, who);
+    const std::string client = key_;
+    key_ += what;
+    const auto members = [&] { return client_members(who); };
     const bool is_new = repeats_.is_new(clock_.now(), rt::wall_now(), key_, in_full,
-                                        [&] { return client_members(who) + more(); });
+                                        [&] { return members() + more(); }, {client, members});
     if (!waits_) wait_for_repeats();
     return !is_new;
 }
@@ -368,6 +383,8 @@ void AuditBook::refusal(const web::Deed& deed) {
     what = deed.method;
     what += '\t';
     what += std::to_string(deed.status);
+    what += '\t';
+    what += deed.path;
     if (is_repeat(deed.who, what, 1, [&] {
             return member("method", deed.method) + member("path", deed.path) +
                    member("outcome", "refused");

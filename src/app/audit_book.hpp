@@ -38,7 +38,7 @@ class AuditBook {
   public:
     static constexpr std::size_t kNotations = 4096;  ///< of a station, kept
     static constexpr std::size_t kChanges = 200;     ///< of a reload, told
-    static constexpr unsigned kNotSent = 30;  ///< writes of a client that were not sent, in full
+    static constexpr unsigned kNotSent = 3;  ///< writes to one place that were not sent, in full
 
     /// The clock outlives it.
     AuditBook(boost::asio::any_io_executor executor, rt::Clock& clock);
@@ -84,7 +84,7 @@ class AuditBook {
     /// True if it was counted. `more`: members that tell what is repeated, besides the client.
     bool is_repeat(const WhoRef& who, std::string_view what, unsigned in_full,
                    const std::function<std::string()>& more);
-    bool is_vain_repeat(const std::string& line, const bus::WriteEnd& end, const Known* known);
+    bool is_vain_repeat(const std::string& line, const bus::WriteEnd& end, Known* known);
     void refusal(const web::Deed& deed);
     void record() { trail_->add(composer_.body()); }
     void record_repeats(bool all);
@@ -111,6 +111,7 @@ class AuditBook {
         std::optional<TimePoint> written{};  ///< the last write that may have had an effect
     };
     Known* find(const std::string& line, std::uint8_t id);
+    std::string place_of(Known* known, const modbus::Span& items);
     const std::string& notation_of(Known& known, const modbus::Span& items);
 
     std::shared_ptr<const Snapshot> snapshot_;

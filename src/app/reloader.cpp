@@ -102,20 +102,10 @@ void log_verdict(const web::ReloadVerdict& verdict) {
 /// The configuration without the lines that are equal in the other one: in a large plant most are,
 /// and listing all their settings takes more memory than they do.
 config::Config but_equal_lines(const config::Config& config, const config::Config& other) {
-    config::Config made;
-    made.profiles = config.profiles;
-    made.relays = config.relays;
-    made.modbus_tcp = config.modbus_tcp;
-    made.serial_masters = config.serial_masters;
-    made.http = config.http;
-    made.mqtt = config.mqtt;
-    made.log = config.log;
-    made.realtime = config.realtime;
-    made.audit = config.audit;
-    made.access = config.access;
-    for (const config::Line& line : config.lines) {
-        if (std::ranges::find(other.lines, line) == other.lines.end()) made.lines.push_back(line);
-    }
+    config::Config made = config;
+    std::erase_if(made.lines, [&](const config::Line& line) {
+        return std::ranges::find(other.lines, line) != other.lines.end();
+    });
     return made;
 }
 
@@ -136,13 +126,23 @@ struct Reloader::Job {
     void read();
     void keep_certificates(config::Config& made);
     void compare();
+    void refuse_tokens();
 };
 
-/// A rollback must not bring back tokens that were removed.
+bool allows_more(const web::Token& token, const web::Token& than) {
+    const bool longer = than.expires && (!token.expires || *token.expires > *than.expires);
+    return longer || token.role > than.role;
+}
+
+/// A rollback brings back no token that was removed, and none that allows more than now.
 config::Config with_tokens_of(const config::Config& config, const config::Config& running) {
     config::Config made = config;
     if (made.http && running.http) {
         made.http->tokens = running.http->tokens;
+        for (web::Token& token : made.http->tokens) {
+            const auto was = std::ranges::find(config.http->tokens, token.hash, &web::Token::hash);
+            if (was != config.http->tokens.end() && !allows_more(*was, token)) token = *was;
+        }
         made.http->anonymous = std::min(made.http->anonymous, running.http->anonymous);
     }
     return made;
@@ -156,7 +156,7 @@ void Reloader::Job::keep_certificates(config::Config& made) {
 /// Runs in the worker: all that takes long.
 void Reloader::Job::read() try {
     if (rollback) {
-        config::Config made = with_tokens_of(*rollback, *running);
+        config::Config made = may_be_weaker ? *rollback : with_tokens_of(*rollback, *running);
         keep_certificates(made);
         next = std::make_shared<const config::Config>(std::move(made));
         verdict.weaker = config::weaker(*running, *next);
@@ -185,10 +185,22 @@ void Reloader::Job::read() try {
         next = std::make_shared<const config::Config>(std::move(*loaded.config));
     }
     compare();
+    if (rollback && verdict.outcome == ReloadOutcome::unchanged) refuse_tokens();
 } catch (const std::exception& error) {
     next = nullptr;
     verdict.outcome = ReloadOutcome::failed;
     verdict.why = error.what();
+}
+
+/// Nothing but tokens has changed since, and those that were would allow more.
+void Reloader::Job::refuse_tokens() {
+    verdict.weaker = config::weaker(*running, *rollback);
+    if (verdict.weaker.empty()) return;
+    next = nullptr;
+    verdict.outcome = ReloadOutcome::refused;
+    verdict.why =
+        "only tokens have changed since, and those that ran before allow more; ask with weaker "
+        "where that is meant";
 }
 
 void Reloader::Job::compare() {

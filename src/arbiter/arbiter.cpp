@@ -132,6 +132,11 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
 
 void Arbiter::deny(TimePoint now, const JobQueue::Test& match) {
     for (const Job& job : schedule_.backlog().remove_if(match)) outbox_.finish(job, Fault::denied);
+    // What became of these nobody knows: they were sent.
+    for (const Job& job : schedule_.backlog().remove_retries(match))
+        outbox_.finish(job, Fault::timeout);
+    if (!active_) return step(now);
+    for (Job& job : active_->group().jobs) job.barred = job.barred || match(job);
     step(now);
 }
 

@@ -345,6 +345,7 @@ void Arbiter::ask_again(TimePoint now) {
     Station& station = stations_.of(group.station);
     station.requests().on_unanswered(now, group.request.pdu(), attempt.timing().sent);
     group.silent_after = group.cut_after = {};
+    finish_barred(group);
     if (in_time(now, group) && !group.abandoned()) {
         if (!group.request.is_read()) return schedule_.retry(now, confirming(group, station), {});
         outbox_.decide(now, [&] { return explain::doubted(group.jobs.front(), names_); });
@@ -352,6 +353,14 @@ void Arbiter::ask_again(TimePoint now) {
     }
     for (const Job& job : group.jobs)
         outbox_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
+}
+
+/// Ends those who may not ask again.
+void Arbiter::finish_barred(Group& group) {
+    for (const Job& job : group.jobs) {
+        if (job.barred) outbox_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
+    }
+    std::erase_if(group.jobs, [](const Job& job) { return job.barred; });
 }
 
 /// Makes a read for the jobs of this write, whose confirmation may be its echo.
@@ -403,6 +412,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
                              ? std::min(now - sent, attempt.timing().patience) - latency_
                              : Duration::zero();
     group.cut_after = cut_off ? now - sent : Duration::zero();
+    finish_barred(group);
     if (!group.confirms.empty()) {
         give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);
     } else if (in_time(now, group) && affordable && station.may_retry(group)) {

@@ -106,6 +106,23 @@ std::optional<WriteRecord> write_record_of(ByteView pdu, const WhoRef& who) {
     return write;
 }
 
+bool may_tell(const Settings& settings, const WhoRef& who, std::uint8_t station) {
+    if (!settings.access) return true;
+    return station == 0 ? settings.access->may_read_some(who)
+                        : settings.access->may_some(who, station, access::Act::read);
+}
+
+std::map<std::string, std::uint64_t> denials_by_rule(
+    const Settings& settings, const std::map<std::string, std::uint64_t>& counted) {
+    std::map<std::string, std::uint64_t> all;
+    if (!settings.access) return all;
+    for (const std::string& rule : settings.access->denying_names()) {
+        const auto count = counted.find(rule);
+        all[rule] = count == counted.end() ? 0 : count->second;
+    }
+    return all;
+}
+
 std::optional<Refusal> unrecordable(const Settings& settings, std::uint8_t station) {
     if (!settings.refuses_writes || !settings.refuses_writes()) return std::nullopt;
     return unrecorded(name_of(settings.stations, station));

@@ -45,6 +45,11 @@ struct WriteRecord {
 std::optional<WriteRecord> write_record_of(const Request& request);
 /// The same for a PDU that was never submitted; without `items` if it is not a valid request.
 std::optional<WriteRecord> write_record_of(ByteView pdu, const WhoRef& who);
+/// True if the rules let `who` read something of this station (0: of the line).
+bool may_tell(const Settings& settings, const WhoRef& who, std::uint8_t station);
+/// Counts by the name of the rule: all that may refuse, and no others.
+std::map<std::string, std::uint64_t> denials_by_rule(
+    const Settings& settings, const std::map<std::string, std::uint64_t>& counted);
 /// Refuses a write while none can be recorded.
 std::optional<Refusal> unrecordable(const Settings& settings, std::uint8_t station);
 /// Completes the record of a write that has ended.

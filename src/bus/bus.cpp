@@ -75,11 +75,7 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     if (request.station == 0 ? !what.is_broadcastable() : what.is_never_answered())
         return refuse(std::move(entry), Fault::denied);
     auto other = translated(settings.stations, request.station, what);
-    if (auto refusal = rights.judge(request.who, question_of(request, other)))
-        return refuse(std::move(entry), Fault::denied, std::move(refusal));
-    auto refusal = rights.judge(request.station, what);
-    if (!refusal && entry.write) refusal = unrecordable(settings, request.station);
-    if (refusal) {
+    if (auto refusal = refusal_of(request, other)) {
         Result<Bytes> reply = answer_to(*refusal, what.function());
         return refuse(std::move(entry), std::move(reply), std::move(refusal));
     }
@@ -105,6 +101,15 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
         if (!ticket) return refuse(std::move(entry), ticket.error());
         pending.emplace(*ticket, std::move(entry));
     });
+}
+
+/// Rules before the station's own rights, everywhere.
+std::optional<Refusal> Bus::State::refusal_of(const Request& request,
+                                              const std::optional<modbus::Request>& sent) const {
+    if (auto refusal = rights.judge(request.who, question_of(request, sent))) return refusal;
+    if (auto refusal = rights.judge(request.station, request.request)) return refusal;
+    if (request.request.is_read()) return std::nullopt;
+    return unrecordable(settings, request.station);
 }
 
 void Bus::State::refuse(Pending entry, Result<Bytes> pdu, std::optional<Refusal> refusal) {
@@ -241,6 +246,8 @@ void Bus::count_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) {
     state_->account.add_refused(station, pdu, who, std::move(rule));
 }
 
+void Bus::count_denied(std::string_view rule) { ++state_->denials[std::string(rule)]; }
+
 /// Keeps a disconnecting client's use of the line in the list of clients.
 void Bus::State::record_departure(ClientId client) {
     const auto used = arbiter.shares().of(client);
@@ -298,9 +305,8 @@ OutcomeCounts Bus::outcomes(std::uint8_t station) const {
 }
 
 std::optional<Refusal> Bus::refusal_of(const Request& request) const {
-    const Rights& rights = state_->rights;
-    if (auto refusal = rights.judge(request.station, request.request)) return refusal;
-    return rights.judge(request.who, question_of(request, std::nullopt));
+    const auto sent = translated(state_->settings.stations, request.station, request.request);
+    return state_->refusal_of(request, sent);
 }
 
 std::optional<Refusal> Bus::write_refusal(std::uint8_t station) const {
@@ -316,8 +322,12 @@ TracePart Bus::trace_since(std::uint64_t sequence, std::size_t most) const {
 
 std::vector<IncidentHead> Bus::incidents() const { return state_->book.incidents().heads(); }
 
-std::optional<Incident> Bus::incident(std::uint64_t id) {
-    return state_->book.incidents().fetch(id);
+std::optional<Incident> Bus::incident(std::uint64_t id, bool marks) {
+    return state_->book.incidents().fetch(id, marks);
+}
+
+bool Bus::tells(const WhoRef& who, std::uint8_t station) const {
+    return may_tell(state_->settings, who, station);
 }
 
 TimePoint Bus::clear_at() const { return state_->arbiter.clear_at(state_->clock.now()); }
@@ -334,12 +344,7 @@ LineReport Bus::report() const {
     report.queue_depth = state_->arbiter.queue_depth();
     report.wire = state_->arbiter.counters();
     report.device = state_->line->counters();
-    if (state_->settings.access) {
-        for (const std::string& rule : state_->settings.access->denying_names()) {
-            const auto count = state_->denials.find(rule);
-            report.denials[rule] = count == state_->denials.end() ? 0 : count->second;
-        }
-    }
+    report.denials = denials_by_rule(state_->settings, state_->denials);
     report.stations = state_->account.counters().report(state_->arbiter);
     return report;
 }

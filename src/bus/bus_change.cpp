@@ -37,6 +37,7 @@ void Bus::State::deny_forbidden(TimePoint now) {
         if (entry == pending.end()) return false;
         std::optional<Refusal> denial = judge_again(job, entry->second);
         if (!denial) return false;
+        if (job.attempts > 0) return true;  // sent: no refusal, but it is not sent again
         entry->second.denial = std::make_unique<Refusal>(std::move(*denial));
         return true;
     });
@@ -44,18 +45,17 @@ void Bus::State::deny_forbidden(TimePoint now) {
 
 std::optional<Refusal> Bus::State::judge_again(const arbiter::Job& job,
                                                const Pending& entry) const {
-    if (!job.request.is_read()) {
-        if (auto refusal = rights.judge_write(job.station)) return refusal;
-    }
     std::optional<modbus::Request> asked;
     if (entry.sent_as != 0) {
         auto original = modbus::Request::make(entry.original_pdu, modbus::QuantityCheck::wide);
         if (original) asked = std::move(*original);
     }
-    return rights.judge(job.who, {.station = job.station,
-                                  .asked = asked ? &*asked : &job.request,
-                                  .sent = asked ? &job.request : nullptr,
-                                  .raw = job.raw});
+    auto refusal = rights.judge(job.who, {.station = job.station,
+                                          .asked = asked ? &*asked : &job.request,
+                                          .sent = asked ? &job.request : nullptr,
+                                          .raw = job.raw});
+    if (refusal || job.request.is_read()) return refusal;
+    return rights.judge_write(job.station);
 }
 
 void Bus::State::adopt(Settings next) {

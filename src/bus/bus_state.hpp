@@ -66,6 +66,9 @@ struct Bus::State final : public line::Line::Events {
     void schedule_line_change();
     void change_line();
     void transact(Request request, AnswerHandler handler);
+    /// `sent`: what it is translated to, if it is.
+    std::optional<Refusal> refusal_of(const Request& request,
+                                      const std::optional<modbus::Request>& sent) const;
     void record_departure(ClientId client);
     void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
     void act(arbiter::Transmit& transmit) {

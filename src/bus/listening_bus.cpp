@@ -291,6 +291,7 @@ struct ListeningBus::State final : public line::Line::Events {
     tap::Matcher matcher;
     HeardStations heard;
     Account account;
+    std::map<std::string, std::uint64_t> denials{};  ///< by the name of the rule
     arbiter::ClientNames names;
     mutable LineDoctor doctor;
     HealthEvents health_events;
@@ -403,6 +404,8 @@ void ListeningBus::count_refused(std::uint8_t station, ByteView pdu, const WhoRe
     state_->account.add_refused(station, pdu, who);
 }
 
+void ListeningBus::count_denied(std::string_view rule) { ++state_->denials[std::string(rule)]; }
+
 void ListeningBus::cancel(ClientId client) { state_->names.forget(client); }
 
 void ListeningBus::name_client(ClientId client, std::string name) {
@@ -442,8 +445,12 @@ std::vector<IncidentHead> ListeningBus::incidents() const {
     return state_->book.incidents().heads();
 }
 
-std::optional<Incident> ListeningBus::incident(std::uint64_t id) {
-    return state_->book.incidents().fetch(id);
+std::optional<Incident> ListeningBus::incident(std::uint64_t id, bool marks) {
+    return state_->book.incidents().fetch(id, marks);
+}
+
+bool ListeningBus::tells(const WhoRef& who, std::uint8_t station) const {
+    return may_tell(state_->settings, who, station);
 }
 
 LineReport ListeningBus::report() const {
@@ -453,6 +460,7 @@ LineReport ListeningBus::report() const {
     report.up = state_->up;
     report.wire = state_->heard.line();
     report.device = state_->line->counters();
+    report.denials = denials_by_rule(state_->settings, state_->denials);
     report.stations = state_->account.counters().report(
         state_->heard.wire(), [this](std::uint8_t station) -> RequestCounters::State {
             return {station_status(station).state};

@@ -270,10 +270,10 @@ std::vector<IncidentHead> IncidentBook::heads() const {
     return heads;
 }
 
-std::optional<Incident> IncidentBook::fetch(std::uint64_t id) {
+std::optional<Incident> IncidentBook::fetch(std::uint64_t id, bool marks) {
     for (const auto& kept : kept_) {
         if (kept->head.id != id) continue;
-        kept->head.read = true;
+        kept->head.read = kept->head.read || marks;
         return Incident{kept->head, kept->store.part(SIZE_MAX)};
     }
     return std::nullopt;

@@ -151,8 +151,8 @@ class IncidentBook {
 
     /// The oldest first.
     std::vector<IncidentHead> heads() const;
-    /// Returns an incident and marks it as read.
-    std::optional<Incident> fetch(std::uint64_t id);
+    /// Returns an incident; `marks` it as read.
+    std::optional<Incident> fetch(std::uint64_t id, bool marks);
 
   private:
     struct Kept {

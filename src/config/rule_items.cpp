@@ -41,28 +41,47 @@ void append(std::vector<Span>& to, const std::vector<Span>& more) {
 
 }  // namespace
 
-std::vector<Span> shown_wholly(const profile::PanelProfile& profile, const Span& items) {
+namespace {
+
+void append_in_all_tables(std::vector<Span>& to, const profile::Area& area, const Span& items) {
+    append(to, {{area.table, items.first, items.count}});
+    for (const modbus::Table table : area.also) append(to, {{table, items.first, items.count}});
+}
+
+/// The words of these bits: those that have no other bits (`wholly`), or all.
+std::optional<Span> words_of(const Span& bits, bool wholly) {
     constexpr std::uint32_t kBits = profile::kBitsPerWord;
-    std::vector<Span> shown{items};
+    const std::uint32_t first = (bits.first + (wholly ? kBits - 1 : 0)) / kBits;
+    const std::uint32_t end = (bits.end() + (wholly ? 0 : kBits - 1)) / kBits;
+    if (first >= end) return std::nullopt;
+    return Span{bits.table, first, end - first};
+}
+
+/// All that shows memory of these items, and `wholly`: shows nothing else.
+std::vector<Span> shown(const profile::PanelProfile& profile, const Span& items, bool wholly) {
+    std::vector<Span> all{items};
     for (const profile::Area& area : profile.areas) {
         if (!area.reaches(items.table)) continue;
         const auto part = intersection(items, area.readable);
         if (!part) continue;
         if (area.view_of.empty()) {
-            append(shown, profile::shown_as(profile, *part));
+            append(all, profile::shown_as(profile, *part));
             continue;
         }
-        std::vector<Span> bits{{area.table, part->first, part->count}};
-        for (const modbus::Table table : area.also)
-            bits.push_back({table, part->first, part->count});
-        append(shown, bits);
+        append_in_all_tables(all, area, *part);
         const profile::Area& words = *profile.find_area(std::string_view(area.view_of));
-        const std::uint32_t first = (part->first + kBits - 1) / kBits;
-        const std::uint32_t end = part->end() / kBits;
-        if (first < end)
-            append(shown, profile::shown_as(profile, {words.table, first, end - first}));
+        if (const auto seen = words_of(*part, wholly)) append_in_all_tables(all, words, *seen);
     }
-    return shown;
+    return all;
+}
+
+}  // namespace
+
+std::vector<Span> shown_wholly(const profile::PanelProfile& profile, const Span& items) {
+    return shown(profile, items, true);
+}
+std::vector<Span> shown_in_part(const profile::PanelProfile& profile, const Span& items) {
+    return shown(profile, items, false);
 }
 
 namespace {
@@ -108,8 +127,7 @@ bool is_meant(const Rule& rule, const Place& place) {
 
 void add_items(Rule& rule, const Place& place, const profile::PanelProfile& profile,
                const Span& items) {
-    rule.items[place] =
-        rule.allow ? shown_wholly(profile, items) : profile::shown_as(profile, items);
+    rule.items[place] = rule.allow ? shown_wholly(profile, items) : shown_in_part(profile, items);
 }
 
 /// "holding-registers/100-109", as the map of the same is shown.

@@ -230,6 +230,10 @@ void compare_relays(Lines& all, const Config& running, const Config& next) {
     }
 }
 
+bool lasts_longer(const web::Token& token, const web::Token& than) {
+    return than.expires && (!token.expires || *token.expires > *than.expires);
+}
+
 void compare_tokens(Lines& all, const web::Settings& running, const web::Settings& next) {
     for (const web::Token& token : next.tokens) {
         const auto was = std::ranges::find(running.tokens, token.hash, &web::Token::hash);
@@ -238,6 +242,8 @@ void compare_tokens(Lines& all, const web::Settings& running, const web::Setting
         } else if (token.role > was->role) {
             all.push_back("http: token " + token.name + ": role " + std::string(label(was->role)) +
                           " -> " + std::string(label(token.role)));
+        } else if (lasts_longer(token, *was)) {
+            all.push_back("http: token " + token.name + ": expires later");
         }
     }
 }

@@ -454,9 +454,11 @@ Bytes identify(ByteView request, const Diagnostics& state) {
 
 namespace {
 
-std::optional<Diagnostics::Station> station_of(std::uint8_t unit, const UnitMap& units) {
+std::optional<Diagnostics::Station> station_of(std::uint8_t unit, const UnitMap& units,
+                                               const WhoRef& who) {
     const Result<Target> target = units.route(unit);
     if (!target || !units.is_listed(unit)) return std::nullopt;
+    if (!target->bus->tells(who, target->station)) return std::nullopt;
     const bus::StationStatus status = target->bus->station_status(target->station);
     const auto& lines = units.lines();
     const auto line = std::ranges::find(lines, target->bus);
@@ -471,7 +473,7 @@ std::optional<Diagnostics::Station> station_of(std::uint8_t unit, const UnitMap&
 
 }  // namespace
 
-Diagnostics own_state(const Shared& shared) {
+Diagnostics own_state(const Shared& shared, WhoRef who) {
     Diagnostics state;
     state.uptime = shared.clock.now() - shared.started;
     state.counters = shared.counters;
@@ -479,10 +481,16 @@ Diagnostics own_state(const Shared& shared) {
     state.url = shared.settings.url;
     state.host = shared.settings.host;
     for (const bus::LineView* line : shared.units.lines()) {
+        if (!line->tells(who, 0)) {
+            state.lines.emplace_back();  // the others keep their places
+            continue;
+        }
         const bus::LineStatus status = line->status();
         state.lines.push_back({status.name, status.up, status.queue_depth, status.load_percent});
     }
-    state.station = [&shared](std::uint8_t unit) { return station_of(unit, shared.units); };
+    state.station = [&shared, who = std::move(who)](std::uint8_t unit) {
+        return station_of(unit, shared.units, who);
+    };
     return state;
 }
 

@@ -9,6 +9,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/who.hpp"
 #include "panelgate/base/words.hpp"
 #include "panelgate/tcp_server/counters.hpp"
 #include "shared.hpp"
@@ -48,7 +49,8 @@ struct Diagnostics {
 /// those for serial lines only (SER-01), is exception 01; a malformed request of these 03.
 Bytes answer_diagnostics(ByteView request, const Diagnostics& state);
 
-/// Returns the gateway's current state. `shared` must outlive the result.
-Diagnostics own_state(const Shared& shared);
+/// Returns the gateway's current state as `who` may see it: a line or station of which he may read
+/// nothing is as one that is not there. `shared` must outlive the result.
+Diagnostics own_state(const Shared& shared, WhoRef who);
 
 }  // namespace panelgate::tcp_server

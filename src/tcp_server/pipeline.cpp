@@ -212,8 +212,8 @@ void Pipeline::serve(const modbus::Adu& adu) {
                        });
                    },
                    [&](const Diagnose&) {
-                       answer(adu, [pdu = adu.pdu, shared = shared_.get()] {
-                           return answer_diagnostics(pdu, own_state(*shared));
+                       answer(adu, [pdu = adu.pdu, shared = shared_.get(), who = caller_.who()] {
+                           return answer_diagnostics(pdu, own_state(*shared, who));
                        });
                    },
                    [&](Forward forwarding) { forward(adu, std::move(forwarding)); },

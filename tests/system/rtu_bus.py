@@ -16,7 +16,7 @@ Frame = namedtuple("Frame", "at bytes")  # at: time.monotonic() when its last by
 
 # Of requests: where the byte count is and how many bytes there are besides; 65, user-defined, has
 # one here as well.
-COUNTED = {20: (2, 5), 23: (10, 13), 65: (2, 5)}
+COUNTED = {20: (2, 5), 21: (2, 5), 23: (10, 13), 65: (2, 5)}
 FIXED = {8: 8, 22: 10, 24: 6, 43: 7}
 
 

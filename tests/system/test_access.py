@@ -157,6 +157,31 @@ class Viewer(unittest.TestCase):
                 self.assertEqual(one["request"] == "", one["station"] == 0, "that something was there, not what")
             self.assertLessEqual({one["station"] for one in trace["frames"]}, {31, None})
 
+    def test_denials_of_reads_count_by_the_rule_that_decides_and_are_not_shown_to_him(self):
+        with plant() as program:
+            status, text = ask(program, "GET", "/api/v1/lines/floor1/discover", "eye")
+            self.assertEqual((status, json.loads(text)["rule"]), (403, "eye-sees-no-more"))
+            self.assertEqual(ask(program, "GET", "/api/v1/stations/oven", "eye")[0], 403)
+            self.assertIn('panelgate_access_denied_total{rule="eye-sees-no-more"} 2', ask(program, "GET", "/metrics")[1])
+            self.assertNotIn("rule=", ask(program, "GET", "/metrics", "eye")[1])
+
+    def test_the_own_registers_hide_what_may_not_be_read(self):
+        hidden = """{rules: [{name: not-the-oven, deny: [read], faces: [modbus_tcp], stations: [oven]}]}"""
+        with plant(hidden) as program, program.client() as client:
+            registers = lambda unit: client.ask(255, read_registers(1000 + 16 * unit, 4))[2:]
+            self.assertEqual(registers(31)[:6], bytes.fromhex("0002 0001 001F"), "online, on the first line, 31")
+            self.assertEqual(registers(20), bytes(8))
+            self.assertEqual(client.ask(255, bytes.fromhex("02 0014 0001")), bytes.fromhex("02 01 00"))
+
+    def test_an_incident_that_he_sees_in_part_stays_unread(self):
+        with plant() as program:
+            incidents = "/api/v1/lines/floor1/incidents"
+            self.assertEqual(ask(program, "PUT", "/api/v1/simulator/press", "lab", {"dead": 1})[0], 200)
+            until(lambda: json.loads(ask(program, "GET", incidents)[1])["incidents"])
+            for token, read in (("eye", False), ("lab", True)):
+                self.assertEqual(ask(program, "GET", incidents + "/1", token)[0], 200)
+                self.assertEqual(json.loads(ask(program, "GET", incidents)[1])["incidents"][0]["read"], read, token)
+
     def test_events_are_of_the_one(self):
         with plant() as program:
             seen = {}
@@ -179,6 +204,18 @@ class Viewer(unittest.TestCase):
             self.assertEqual((status, json.loads(text)["weaker"]), (409, ["access: rule eye-sees-press is another"]))
             self.assertEqual(ask(program, "POST", "/api/v1/reload", None, {"rollback": True, "weaker": True})[0], 200)
             self.assertEqual(ask(program, "GET", "/api/v1/stations/oven", "eye")[0], 403)
+
+    def test_a_rollback_over_which_only_a_token_changed_says_so(self):
+        with plant() as program:
+            self.assertEqual(ask(program, "GET", "/api/v1/lines", "eye")[0], 200)
+            file = program.file
+            file.write_text(file.read_text().replace("role: viewer, file", "role: viewer, expires: 2020-01-01, file"))
+            self.assertEqual(ask(program, "POST", "/api/v1/reload")[0], 200)
+            self.assertEqual(ask(program, "GET", "/api/v1/lines", "eye")[0], 401)
+            status, text = ask(program, "POST", "/api/v1/reload", None, {"rollback": True})
+            self.assertEqual((status, json.loads(text)["weaker"]), (409, ["http: token eye: expires later"]))
+            self.assertEqual(ask(program, "POST", "/api/v1/reload", None, {"rollback": True, "weaker": True})[0], 200)
+            self.assertEqual(ask(program, "GET", "/api/v1/lines", "eye")[0], 200)
 
 
 @unittest.skipUnless(mqtt_side.BROKER and mqtt_side.paho, "needs mosquitto and python3-paho-mqtt")

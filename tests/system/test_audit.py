@@ -374,12 +374,13 @@ class Refusing(unittest.TestCase):
         self.write_config()
         self.folder.mkdir()
         with self.gateway() as program, program.client() as client:
-            for i in range(200):
+            for i in [*range(200), *[7] * 100]:
                 self.assertEqual(client.ask(8, write_register(i, i)), b"\x86\x01")
-        of_meter = [one for one in records(self.folder) if one.get("station") == "meter"]
-        self.assertEqual([one["kind"] for one in of_meter], ["write", "repeats"])
-        self.assertEqual(of_meter[1]["count"], 199)
-        self.assertEqual(of_meter[1]["rule"], "access")
+        kept = records(self.folder)
+        of_meter = [one for one in kept if one.get("station") == "meter"]
+        self.assertEqual([one["kind"] for one in of_meter], ["write"] * 64 + ["repeats"], "each place once")
+        self.assertEqual((of_meter[-1]["count"], of_meter[-1]["at"], of_meter[-1]["rule"]), (100, of_meter[7]["at"], "access"))
+        self.assertEqual([one["count"] for one in kept if one.get("at") == "other places"], [136])
 
     def test_reload_tells_who_changed_what_and_goes_on_in_another_file(self):
         self.write_config(anonymous="admin")

@@ -5,8 +5,8 @@ import tempfile
 import unittest
 
 import harness
-from browser import Browser
-from config import gateway, line
+from browser import VIEWS, Browser
+from config import PRESS, gateway, line
 
 
 TILE = '.tile[data-station="press"]'
@@ -15,6 +15,8 @@ TILE = '.tile[data-station="press"]'
 class Roles(Browser):
     """Without a token everybody may look; a token is needed to write."""
     anonymous = "viewer"
+    stations = PRESS
+    more = {}
 
     @classmethod
     def gateway(cls):
@@ -24,7 +26,8 @@ class Roles(Browser):
         tokens = ", ".join(f"{{name: {name}, role: {role}, file: {folder / name}}}"
                            for name, role in (("ops", "operator"), ("eye", "viewer")))
         config = folder / "panelgate.yaml"
-        config.write_text(gateway(line(), http=f'listen: "127.0.0.1:0", anonymous: {cls.anonymous}, tokens: [{tokens}]'))
+        config.write_text(gateway(line(stations=cls.stations), **cls.more,
+                                  http=f'listen: "127.0.0.1:0", anonymous: {cls.anonymous}, tokens: [{tokens}]'))
         return cls.enterClassContext(harness.Program("run", "-c", str(config)))
 
     def enter(self, token):
@@ -124,6 +127,36 @@ class SignIn(Roles):
             eye.write_text("let-me-look-please-4711\n")
             self.program.process.send_signal(signal.SIGHUP)
             self.program.log.wait_for("reload", 2)
+
+
+
+class OneStation(SignIn):
+    """A viewer whom a rule shows one station of two."""
+    stations = """
+      {id: 31, name: press, profile: autonics-gplp-s, points: [{name: warmth, at: UW200}, {name: mode, at: UW105, writable: true}]},
+      {id: 20, name: oven, profile: panasonic-gt, points: [{name: heat, at: GDT100}]}""".strip()
+    more = {"access": """{rules: [{name: eye-sees-press, allow: [read], tokens: [eye], stations: [press]},
+      {name: eye-sees-no-more, deny: [read, write, broadcast, raw], tokens: [eye]}]}"""}
+    test_it_asks_for_a_token_until_the_gateway_knows_it = None
+    test_what_happens_is_told_by_events_and_files_are_taken_with_the_token = None
+    test_who_signs_out_is_asked_again = None
+    test_a_token_that_is_taken_away_is_asked_for_again = None
+
+    def test_no_view_shows_the_other_nor_a_button_in_vain_and_nothing_is_refused(self):
+        self.opened()
+        self.sign_in("let-me-look-please-4711")
+        self.wait(lambda: self.all(TILE))
+        self.complaints()
+        for view in VIEWS:
+            with self.subTest(view=view):
+                self.open(view)
+                self.wait(lambda: self.script("return document.querySelector('main, #view').innerText.length") > 0)
+                shown = self.script("return document.body.innerText").lower()
+                for word in ("oven", "panasonic", "heat"):
+                    self.assertNotIn(word, shown)
+                self.assertFalse(self.all("#write"))
+                self.assertFalse([one.text for one in self.all("main button") if one.text.lower() in ("write", "search", "start", "look for stations")])
+                self.assertEqual(self.complaints(), [])
 
 
 if __name__ == "__main__":

@@ -56,6 +56,8 @@ class LineRules {
     bool may_some(const WhoRef& who, std::uint8_t station, Act act) const;
     /// True if every item of its tables may be read, or written.
     bool may_all(const WhoRef& who, std::uint8_t station, Act act) const;
+    /// True if some item of a listed station may be read, or there is none.
+    bool may_read_some(const WhoRef& who) const;
     /// may_all() of reads, remembered.
     bool reads_all(const WhoRef& who, std::uint8_t station) const;
     /// True if both decide alike on any line.

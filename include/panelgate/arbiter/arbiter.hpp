@@ -189,6 +189,7 @@ class Arbiter {
     void learn_from_failure(TimePoint now, const Attempt& attempt, Verdict verdict);
     void fail(TimePoint now, Verdict verdict);
     void give_back(Group& group);
+    void finish_barred(Group& group);
     void give_up(TimePoint now, const Group& group, Fault fault);
     void explain_condition(TimePoint now, std::uint8_t station, Condition before);
     Attempt take_active(TimePoint now);

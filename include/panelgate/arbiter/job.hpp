@@ -71,6 +71,7 @@ struct Job {
     TransactionNumbers transactions{};  ///< one for each attempt
     WhoRef who{};                       ///< who asks, for those who judge it again
     bool raw = false;                   ///< ... and whether its client has made the PDU
+    bool barred = false;                ///< forbidden since it was sent: no retry
 };
 using Jobs = PoolVector<Job>;
 

@@ -81,12 +81,12 @@ class Backlog {
     std::optional<TimePoint> first_expiry() const;
     /// Removes and returns the matching jobs that wait for their first turn.
     Jobs remove_if(const JobQueue::Test& match) { return queue_.remove_if(match); }
+    /// Removes and returns the matching jobs whose request waits to be sent again.
+    Jobs remove_retries(const JobQueue::Test& match);
     /// Removes and returns all jobs.
     Jobs clear();
 
   private:
-    Jobs remove_retries(const JobQueue::Test& match);
-
     JobQueue queue_;
     PoolDeque<Group> retries_;
     std::vector<Group> dropped_;

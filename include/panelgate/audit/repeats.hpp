@@ -19,6 +19,7 @@ class Repeats {
   public:
     static constexpr Duration kInterval = 1min;
     static constexpr std::size_t kMost = 1024;
+    static constexpr std::size_t kMostOfOne = 64;  ///< keys of one client
 
     /// What was counted under one key.
     struct Counted {
@@ -28,16 +29,25 @@ class Repeats {
         WallTime last{};
     };
 
+    /// A client, by the beginning of its keys. What finds no place among its keys shares one, of
+    /// which nothing is recorded in full.
+    struct Client {
+        std::string_view key;                  ///< empty: without a limit
+        std::function<std::string()> members;  ///< that tell who it is
+    };
+
     /// True if this one is to be recorded in full: one of the first `in_full` of its interval;
     /// otherwise it was counted. `members` makes the JSON members that tell what is repeated
     /// (`,"client":"..."`), for a new key.
     bool is_new(TimePoint now, WallTime wall, std::string_view key, unsigned in_full,
-                const std::function<std::string()>& members);
+                const std::function<std::string()>& members, const Client& client = {});
     /// Takes what is to be recorded of intervals that have ended; `all`: of all.
     std::vector<Counted> due(TimePoint now, bool all = false);
     bool empty() const { return entries_.empty(); }
 
   private:
+    bool has_many(std::string_view client) const;
+
     struct Entry {
         TimePoint began{};
         unsigned in_full = 0;

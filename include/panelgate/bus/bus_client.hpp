@@ -176,8 +176,9 @@ class RequestPort {
         return std::nullopt;
     }
     /// Returns why transact() would refuse this request (0: a broadcast), if so: for callers that
-    /// ask other lines as well.
+    /// ask other lines, or for other items, as well.
     virtual std::optional<Refusal> refusal_of(const Request& request) const {
+        if (request.request.is_read()) return std::nullopt;
         return write_refusal(request.station);
     }
     /// Counts (and logs, if it is a write) a request that the caller refused before submitting it:
@@ -187,6 +188,8 @@ class RequestPort {
         static_cast<void>(pdu);
         static_cast<void>(who);
     }
+    /// Counts what the caller refused by a rule of `access`, without asking the line.
+    virtual void count_denied(std::string_view rule) { static_cast<void>(rule); }
     /// Removes a client: its waiting requests are answered Fault::cancelled and never transmitted;
     /// a request on the wire completes and is answered normally.
     virtual void cancel(ClientId client) = 0;
@@ -223,10 +226,18 @@ class LineView {
     }
     /// Returns the recorded incidents, oldest first, at most IncidentSettings::incidents.
     virtual std::vector<IncidentHead> incidents() const { return {}; }
-    /// Returns an incident and marks it as read; nullopt if it is not recorded.
-    virtual std::optional<Incident> incident(std::uint64_t id) {
+    /// Returns an incident, nullopt if it is not recorded. `marks` it as read: its reader has seen
+    /// all of it.
+    virtual std::optional<Incident> incident(std::uint64_t id, bool marks) {
         static_cast<void>(id);
+        static_cast<void>(marks);
         return std::nullopt;
+    }
+    /// True if `who` may read something of this station (0: of the line), by the rules of `access`.
+    virtual bool tells(const WhoRef& who, std::uint8_t station) const {
+        static_cast<void>(who);
+        static_cast<void>(station);
+        return true;
     }
 };
 

@@ -33,6 +33,7 @@ class ListeningBus final : public LineBus {
 
     void transact(Request request, AnswerHandler handler) override;
     void count_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) override;
+    void count_denied(std::string_view rule) override;
     void cancel(ClientId client) override;
     LineStatus status() const override;
     StationStatus station_status(std::uint8_t station) const override;
@@ -40,7 +41,8 @@ class ListeningBus final : public LineBus {
     TracePart trace(std::size_t last) const override;
     TracePart trace_since(std::uint64_t sequence, std::size_t most) const override;
     std::vector<IncidentHead> incidents() const override;
-    std::optional<Incident> incident(std::uint64_t id) override;
+    std::optional<Incident> incident(std::uint64_t id, bool marks) override;
+    bool tells(const WhoRef& who, std::uint8_t station) const override;
     void name_client(ClientId client, std::string name) override;
     LineReport report() const override;
 

@@ -190,7 +190,7 @@ std::string seen_configuration(const std::string& text, const Sight& sight) {
             if (const json::value* own = object.if_contains(key)) shown[key] = *own;
         lines.push_back(std::move(shown));
     }
-    return json_text(json::object{{"lines", std::move(lines)}});
+    return json_text(json::object{{"lines", std::move(lines)}, {"partial", true}});
 }
 
 HttpResponse text_answer(std::string body) {

@@ -233,14 +233,38 @@ void Reading::take(const bus::Answer& answer, const modbus::Span& span) {
     age = std::max(age, answer.age);
 }
 
+namespace {
+
+bool is_refused_here(const Caller& caller, const StationEntry& station, const modbus::Span& span) {
+    const bus::Request request{
+        .station = station.id, .request = modbus::Request::read(span), .who = caller.who()};
+    return station.bus->refusal_of(request).has_value();
+}
+
+/// The requests that read these items. One that is refused comes first: what is refused in part is
+/// not sent at all.
+std::deque<modbus::Span> parts_of(const Caller& caller, const StationEntry& station,
+                                  const modbus::Span& span) {
+    const std::uint32_t limit = station.profile->max_count(read_function(span.table));
+    std::deque<modbus::Span> parts;
+    for (std::uint32_t first = span.first; first < span.end(); first += limit)
+        parts.push_back({span.table, first, std::min(limit, span.end() - first)});
+    if (parts.size() == 1) return parts;
+    const auto refused = std::ranges::find_if(
+        parts, [&](const modbus::Span& part) { return is_refused_here(caller, station, part); });
+    if (refused != parts.end()) std::iter_swap(parts.begin(), refused);
+    return parts;
+}
+
+}  // namespace
+
 boost::asio::awaitable<Parsed<Reading>> read_all(std::shared_ptr<Caller> caller,
                                                  const StationEntry* station, modbus::Span span,
                                                  Patience patience) {
     Reading reading;
-    const unsigned limit = station->profile->max_count(read_function(span.table));
-    while (reading.items.size() < span.count) {
+    const std::deque<modbus::Span> parts = parts_of(*caller, *station, span);
+    for (const modbus::Span& part : parts) {
         const auto done = static_cast<unsigned>(reading.items.size());
-        const modbus::Span part{span.table, span.first + done, std::min(limit, span.count - done)};
         auto planned = request_to(station->id, modbus::encode_read(part));
         if (!planned) co_return planned.error();
         bus::Request made = std::move(*planned);
@@ -356,6 +380,28 @@ bool halve(Plan& plan, const points::PlannedRead& read) {
     return true;
 }
 
+/// Takes apart what is refused as it was joined, and puts first what is refused by itself: the rest
+/// of its entry is not sent.
+void part_refused(Plan& plan, const Caller& caller) {
+    const StationEntry& station = plan.entries.front()->items.station;
+    std::deque<points::PlannedRead> refused;
+    std::deque<points::PlannedRead> others;
+    while (!plan.reads.empty()) {
+        points::PlannedRead read = std::move(plan.reads.front());
+        plan.reads.pop_front();
+        const bool is_refused = is_refused_here(caller, station, read.span);
+        if (is_refused && halve(plan, read)) continue;
+        (is_refused ? refused : others).push_back(std::move(read));
+    }
+    plan.reads = std::move(refused);
+    for (points::PlannedRead& read : others) plan.reads.push_back(std::move(read));
+}
+
+bool is_in_vain(const Plan& plan, const points::PlannedRead& read) {
+    return std::ranges::all_of(
+        read.wants, [&](std::size_t want) { return plan.entries[want]->problem.has_value(); });
+}
+
 void settle(Plan& plan, const points::PlannedRead& read, const bus::Answer& answer) {
     const auto failed = problem_of(answer, *plan.entries.front()->items.station.profile);
     if (failed && is_refused(answer) && halve(plan, read)) return;
@@ -374,10 +420,12 @@ boost::asio::awaitable<void> read_station(std::shared_ptr<Caller> caller,
                                           std::vector<BatchRead*> entries, SerialFormat serial,
                                           Patience patience, unsigned* transactions) {
     Plan plan = plan_of(std::move(entries), serial);
+    part_refused(plan, *caller);
     const StationEntry& station = plan.entries.front()->items.station;
     while (!plan.reads.empty()) {
         const points::PlannedRead read = std::move(plan.reads.front());
         plan.reads.pop_front();
+        if (is_in_vain(plan, read)) continue;
         bus::Request made{.station = station.id, .request = modbus::Request::read(read.span)};
         made.within = patience.left();
         const bus::Answer answer = co_await ask(caller, station.bus, std::move(made));

@@ -21,18 +21,24 @@ using modbus::Span;
 constexpr std::uint8_t kUnlisted = 0;
 constexpr const char* kHidden = "hidden";
 
-Span whole_table() { return {modbus::Table::holding_registers, 0, modbus::kTableItems}; }
-
-std::string_view denying_rule(const LineEntry& line, const WhoRef& who, std::uint8_t id) {
-    return line.access->judge(who, id, Act::read, modbus::kReadHoldingRegisters, whole_table())
-        .rule_name();
+/// The rule that hides something of the station.
+std::string denying_rule(const LineEntry& line, const WhoRef& who, std::uint8_t id) {
+    for (const modbus::Table table : modbus::kTables) {
+        const Span all{table, 0, modbus::kTableItems};
+        const auto verdict =
+            line.access->judge(who, id, Act::read, modbus::read_function(table), all);
+        if (!verdict.allowed) return std::string(verdict.rule_name());
+    }
+    return std::string(access::kDefaultRule);
 }
 
+/// Counts it as a denial, too.
 Problem denied(const LineEntry& line, const WhoRef& who, std::uint8_t id,
                const std::string& station) {
+    std::string rule = denying_rule(line, who, id);
+    line.bus->count_denied(rule);
     return problem_of(bus::Refusal{bus::Rule::denied, station,
-                                   modbus::ExceptionCode::illegal_function,
-                                   std::string(denying_rule(line, who, id))});
+                                   modbus::ExceptionCode::illegal_function, std::move(rule)});
 }
 
 }  // namespace
@@ -108,8 +114,9 @@ bool Sight::named(std::string_view line_name, std::string_view station_name,
 bool Sight::event(const EventTopic& topic) const {
     if (!topic.station.empty()) return named(topic.line, topic.station, topic.point);
     const LineEntry* on = directory_.find_line(topic.line);
-    // Its text may name any of the line's stations.
-    return on == nullptr ? everything() : whole(*on);
+    if (on == nullptr) return everything();
+    // What others tell may be about any of the line's stations.
+    return topic.type == "line" ? line(*on) : whole(*on);
 }
 
 void Sight::mask(const LineEntry& line, bus::TracePart& part) const {
@@ -149,7 +156,11 @@ std::optional<Problem> check_line(const HttpRequest& request, const Directory& d
     if (line == nullptr || request.method == "POST") return std::nullopt;
     const bool discovers = request.path.size() > 4 && request.path[4] == "discover";
     if (discovers ? sight.whole(*line) : sight.line(*line)) return std::nullopt;
-    return denied(*line, request.caller->who(), kUnlisted, "");
+    const auto hidden = std::ranges::find_if(directory.stations, [&](const StationEntry& one) {
+        return one.line == line->name && !sight.whole(*line, one.id);
+    });
+    const bool none = hidden == directory.stations.end();
+    return denied(*line, request.caller->who(), none ? kUnlisted : hidden->id, "");
 }
 
 /// What the gateway knows of a station; what is asked of the panel is judged by its bus.
@@ -203,6 +214,7 @@ std::string_view label_in(std::string_view line, std::string_view name) {
 bool is_seen(std::string_view line, const Sight& sight) {
     if (line.starts_with('#')) return true;
     if (!label_in(line, "relay").empty()) return false;
+    if (!label_in(line, "rule").empty()) return sight.everything();
     return sight.named(label_in(line, "line"), label_in(line, "station"), label_in(line, "point"));
 }
 

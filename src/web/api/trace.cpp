@@ -441,11 +441,12 @@ Handling get_incident(HttpRequest request, const Api* api) {
     if (!line) co_return to_response(line.error());
     const std::string name = (*line)->name;
     const auto wanted = wanted_of(request.arguments[1]);
-    auto found = wanted ? (*line)->bus->incident(wanted->id) : std::nullopt;
+    const Sight sight(*api->directory, request.caller->who());
+    const bool sees_all = sight.whole(**line);
+    auto found = wanted ? (*line)->bus->incident(wanted->id, sees_all) : std::nullopt;
     if (!found)
         co_return to_response(
             problem(404, "line '" + name + "' keeps no incident '" + request.arguments[1] + "'"));
-    const Sight sight(*api->directory, request.caller->who());
     sight.mask(**line, found->head);
     if (wanted->capture) {
         mask_capture(sight, **line, found->part);

@@ -1,5 +1,5 @@
 // Looks for stations that nobody has listed, on a line that runs.
-import {get, mayEngineer, path, post, remove} from './api.js';
+import {gateway, get, mayEngineer, path, post, remove} from './api.js';
 import {refusal} from './confirm.js';
 import {choice, h, replace, table, text} from './dom.js';
 import {duration, t} from './language.js';
@@ -36,6 +36,7 @@ class Discovery {
 
     /** How far it is, and what was found, also where others have begun it. */
     #ask() {
+        if (gateway.configuration.partial) return;  // it is about all stations
         this.looked = performance.now();
         get(path('lines', this.line, 'discover')).then((report) => this.#show(report), () => {});
     }

@@ -39,7 +39,7 @@ function line(one) {
         h('td', null, access(station.access)), h('td', null, station.guard ? t('on') : t('off')), h('td', null, station.retry_writes ? t('on') : t('off')),
         h('td', {class: 'number'}, station.max_age_ms ? duration(station.max_age_ms) : '–'), h('td', {class: 'number'}, String(station.points.length)))));
     return h('section', {class: 'card'}, h('h2', null, t('line'), ' ', one.name), facts([[t('device'), h('code', null, one.device)], [t('serial'), one.serial],
-        [t('mode'), word('mode', one.mode)], [t('unlisted'), word('unlisted', one.unlisted_stations)], [t('answers.within'), duration(one.clients.answered_within_ms)]]),
+        [t('mode'), word('mode', one.mode)], [t('unlisted'), word('unlisted', one.unlisted_stations)], [t('answers.within'), one.clients ? duration(one.clients.answered_within_ms) : undefined]]),
     shown.node, one.polls.length ? h('p', {class: 'muted'}, `${t('polls')}: ` + one.polls.map((poll) => `${poll.station} ${poll.read}×${poll.count} / ${duration(poll.every_ms)}`).join(', ')) : null);
 }
 
@@ -67,6 +67,6 @@ function build() {
 export function settingsView() {
     const now = gateway.configuration;
     return {node: h('div', null, h('h1', null, t('nav.settings')), h('p', {class: 'muted'}, `panelgate ${now.version} · ${t('role', {role: word('role', gateway.role)})}`), build(),
-        h('h2', null, t('open.to.whom')), h('div', {class: 'columns'}, http(now), now.modbus_tcp.map(listener), (now.serial_masters ?? []).map(master)), interface_(now.rest),
-        h('h2', null, t('lines')), now.lines.map(line), relays(now.relays))};
+        h('h2', null, t('open.to.whom')), h('div', {class: 'columns'}, http(now), (now.modbus_tcp ?? []).map(listener), (now.serial_masters ?? []).map(master)), interface_(now.rest),
+        h('h2', null, t('lines')), now.lines.map(line), relays(now.relays ?? []))};
 }

@@ -48,6 +48,22 @@ TEST(AuditRepeats, SomeMayBeRecordedInFull) {
     ASSERT_EQ(repeats.due(kStart + 1s, true).size(), 1U);
 }
 
+TEST(AuditRepeats, PlacesOfOneClientShareARecordAtLast) {
+    Repeats repeats;
+    const Repeats::Client client{"eve\t", [] { return std::string(R"(,"client":"eve")"); }};
+    const auto try_at = [&](const std::string& place) {
+        return repeats.is_new(kStart, {}, "eve\t" + place, 1, [] { return std::string(); }, client);
+    };
+    for (std::size_t i = 0; i < Repeats::kMostOfOne; ++i) EXPECT_TRUE(try_at(std::to_string(i)));
+    EXPECT_FALSE(try_at("x"));
+    EXPECT_FALSE(try_at("y"));
+    EXPECT_TRUE(note(repeats, 0s, "adam"));
+    const auto due = repeats.due(kStart, true);
+    ASSERT_EQ(due.size(), 1U);
+    EXPECT_EQ(due[0].count, 2U);
+    EXPECT_EQ(due[0].members, R"(,"client":"eve","at":"other places")");
+}
+
 TEST(AuditRepeats, ManyClientsShareAPlaceAtLast) {
     Repeats repeats;
     for (std::size_t i = 0; i < Repeats::kMost; ++i)

@@ -98,6 +98,34 @@ TEST_F(BusAccessTest, P2WhatWaitsIsJudgedAgainWhenTheRulesChange) {
     EXPECT_EQ(std::ranges::count(answers, true, &Answer::transmitted), 2) << "the reads";
 }
 
+TEST_F(BusAccessTest, P2AWriteThatWasSentIsNotRepeatedAfterItIsForbidden) {
+    settings.arbiter.stations[0].retry_writes = true;
+    settings.arbiter.stations[0].retries = 2;
+    bus->apply(settings, nullptr, nullptr);
+    ask_as(kOperator, 17, kRead);  // the station is healthy
+    const std::size_t before = line->written.size();
+    line->reply.clear();
+    std::vector<Answer> answers;
+    send(17, "06 00 02 00 01"_hex, answers);
+    ASSERT_TRUE(run_until([&] { return line->written.size() > before; }));
+    rules.rules.insert(rules.rules.begin(), access::Rule{.name = "closed", .acts = {Act::write}});
+    use_rules();
+    bus->apply(settings, nullptr, nullptr);
+    ASSERT_TRUE(run_until([&] { return !answers.empty(); }));
+    EXPECT_EQ(line->written.size(), before + 1) << "once";
+    EXPECT_EQ(end_of(answers[0]), "timeout, sent") << "what became of it nobody knows";
+    EXPECT_EQ(rule_of(answers[0]), "");
+}
+
+TEST_F(BusAccessTest, TellsOfWhatMayBeRead) {
+    EXPECT_FALSE(bus->tells(kViewer, 17));
+    EXPECT_TRUE(bus->tells(kViewer, 18));
+    EXPECT_FALSE(bus->tells(kViewer, 0)) << "no listed station of the line";
+    EXPECT_TRUE(bus->tells(kOperator, 0));
+    bus->count_denied("blind");
+    EXPECT_EQ(bus->report().denials.at("blind"), 1u);
+}
+
 TEST_F(BusAccessTest, SaysWhatItWouldRefuseToThoseWhoAskOtherLinesAsWell) {
     Request broadcast{.station = 0, .request = test::request_of(kWrite), .who = kOperator};
     EXPECT_EQ(bus->refusal_of(broadcast).value().why, "fixed");

@@ -60,6 +60,7 @@ TEST(Rules, ADeniedRangeIsTheMemoryHoweverItIsShown) {
     EXPECT_EQ(denied(config, 31, "0F 0670 0001 01 01"_hex), "");
     EXPECT_EQ(denied(config, 20, "10 0066 0001 02 0001"_hex), "") << "the oven has no UW";
     const Config bit = loaded("    - {name: no, deny: [write], range: UB1023}\n");
+    EXPECT_EQ(denied(bit, 31, "0F 0662 0001 01 01"_hex), "") << "UB1022 is another bit";
     EXPECT_EQ(denied(bit, 31, "10 0066 0001 02 0001"_hex), "no") << "the word has that bit";
 }
 
