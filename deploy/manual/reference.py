@@ -40,7 +40,7 @@ x-fast: &fast {data_bits: 8, stop_bits: 1}    # serial: {<<: *fast, baud: 38400}
 """
 # What needs a file, or a neighbour that the example has not, or has otherwise.
 NEEDY = {"profiles_dir", "access", "modbus_tcp.tls", "http.tls", "lines.stations.template", "lines.stations.points.bit", "http.tokens",
-         "mqtt.password_file", "mqtt.ca", "mqtt.certificate", "mqtt.key"}
+         "mqtt.password_file", "mqtt.tls", "mqtt.ca", "mqtt.certificate", "mqtt.key"}
 # What needs a device, a broker or a right that not every machine has, and a simulation.
 OFF = {"serial_masters", "mqtt", "realtime", "audit", "lines.simulate", "lines.stations.simulate"}
 TITLES = {"": "Top level", "lines": "A line", "lines.stations": "A station",
@@ -59,7 +59,8 @@ EXAMPLES = {"profiles_dir": "/etc/panelgate/profiles", "lines.serial.data_bits":
             "serial_masters.response_timeout": "1s", "mqtt.group": "plant", "mqtt.node": "box17",
             "mqtt.client_id": "box17", "mqtt.username": "box17",
             "mqtt.password_file": "/run/secrets/broker", "mqtt.ca": "ca.pem",
-            "mqtt.certificate": "box17.pem", "mqtt.key": "box17.key",
+            "mqtt.certificate": "box17.pem", "mqtt.key": "box17.key", "mqtt.tls.certificate": "/etc/panelgate/tls/box17.crt",
+            "mqtt.tls.key": "/etc/panelgate/tls/box17.key",
             "http.tokens.expires": "2027-12-31"}
 FIRST = ("name", "listen", "id")
 

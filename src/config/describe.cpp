@@ -53,7 +53,7 @@ http: {listen: "127.0.0.1:8080", hosts: [gateway.plant.example], allow: [127.0.0
              ca: /etc/panelgate/tls/ca.crt, client: optional, crl: /etc/panelgate/tls/crl.pem,
              role_from: certificate}}
 relays: [{from: press/UW100, to: press/UW200, count: 8, every: 1s}]
-mqtt: {broker: "mqtt://broker.plant:1883"}
+mqtt: {broker: "mqtts://broker.plant:8883", tls: {ca: /etc/panelgate/tls/ca.crt}}
 access:
   default: allow
   rules:

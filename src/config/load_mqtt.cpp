@@ -24,15 +24,15 @@ constexpr std::string_view kSecret =
     "a secret does not belong in the configuration: write it to a file that only this program may "
     "read, and here password_file: with its path";
 constexpr std::string_view kTls =
-    "write broker: mqtts://HOST:8883; ca, certificate and key are keys beside it";
-constexpr std::array<yaml::Elsewhere, 9> kMqttKeysElsewhere{{{"host", {}, {}, kBroker},
+    "write broker: mqtts://HOST:8883, and ca, certificate and key into tls: {...}";
+constexpr std::string_view kTlsExample = "{ca: /etc/panelgate/tls/ca.crt}";
+constexpr std::array<yaml::Elsewhere, 8> kMqttKeysElsewhere{{{"host", {}, {}, kBroker},
                                                              {"port", {}, {}, kBroker},
                                                              {"url", {}, {}, kBroker},
                                                              {"server", {}, {}, kBroker},
                                                              {"password", {}, {}, kSecret},
                                                              {"secret", {}, {}, kSecret},
                                                              {"token", {}, {}, kSecret},
-                                                             {"tls", {}, {}, kTls},
                                                              {"ssl", {}, {}, kTls}}};
 
 /// Parses "mqtt://HOST:PORT", "mqtts://HOST"; false for anything else.
@@ -132,13 +132,35 @@ void load_file(Loading& loading, MapReader& in, std::string_view key, bool tls, 
                             "may read");
 }
 
-void load_tls(Loading& loading, MapReader& in, mqtt::Settings& settings) {
+void load_files(Loading& loading, MapReader& in, mqtt::Settings& settings) {
     load_file(loading, in, "ca", settings.tls, settings.ca);
     load_file(loading, in, "certificate", settings.tls, settings.certificate);
     load_file(loading, in, "key", settings.tls, settings.key);
     if (settings.certificate.empty() == settings.key.empty()) return;
     in.problem(settings.key.empty() ? "certificate" : "key",
                "certificate and key belong together; give both");
+}
+
+/// A map as that of listeners; the same keys may stand beside it instead, as they did first.
+void load_tls(Loading& loading, MapReader& in, mqtt::Settings& settings) {
+    const yaml::Node* node = in.map("tls", kTlsExample);
+    refuse_empty(in, "tls", "give ca, certificate and key, or leave it out");
+    if (node != nullptr) {
+        MapReader keys(*node, loading.problems, "tls", kTlsExample);
+        mqtt_tls_keys().read(keys, settings);
+        load_files(loading, keys, settings);
+        keys.finish();
+    }
+    mqtt::Settings beside;
+    beside.tls = settings.tls;
+    load_files(loading, in, beside);
+    for (const std::string_view key : {"ca", "certificate", "key"})
+        if (node != nullptr && in.has(key))
+            in.problem(key, std::string(key) + " belongs into tls, which is there; move it");
+    if (node != nullptr) return;
+    settings.ca = std::move(beside.ca);
+    settings.certificate = std::move(beside.certificate);
+    settings.key = std::move(beside.key);
 }
 
 void load_format(MapReader& in, mqtt::Settings& settings) {

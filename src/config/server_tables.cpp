@@ -97,7 +97,8 @@ const Keys<tcp_server::Settings>& listener_keys() {
             .other(
                 "tls",
                 "Modbus/TCP Security: only clients that speak TLS are served. `listen` may be an "
-                "address alone then: its port is 802, as it is of the default, 127.0.0.1.");
+                "address alone then: its port is 802, as it is of the default, 127.0.0.1.")
+            .change_needs(kListensAnew);
     return kKeys;
 }
 
@@ -174,6 +175,7 @@ const Keys<web::Settings>& http_keys() {
             .change_needs(kAllowCloses)
             .other("tokens", "Tokens of clients (Authorization: Bearer TOKEN).")
             .other("tls", "HTTPS: only clients that speak TLS are served.")
+            .change_needs(kListensAnew)
             .integer("max_connections_per_address", &Settings::max_connections_per_address, 1,
                      static_cast<std::int64_t>(Settings().max_connections),
                      "Most connections of one address, event streams apart; then its longest "
@@ -200,20 +202,27 @@ const Keys<tls::Settings>& tls_keys() {
             .other("certificate",
                    "PEM file of the gateway's certificate, then of those between it and its CA.",
                    text(&Settings::certificate))
+            .change_needs(kTlsRenewed)
             .other("key", "PEM file of that certificate's key, without a password.",
                    text(&Settings::key))
+            .change_needs(kTlsRenewed)
             .other("ca", "PEM file of the CA that signs the certificates of clients.",
                    text(&Settings::ca))
+            .change_needs(kTlsCloses)
             .word("client", &Settings::client, kClients,
                   "Whether clients show a certificate: none, optional, required.")
+            .change_needs(kTlsCloses)
             .other("crl", "PEM file of the certificates that the CA has revoked.",
                    text(&Settings::crl))
+            .change_needs(kTlsCloses)
             .word("role_from", &Settings::role_from_certificate, kRoles,
                   "certificate: the role in a client's certificate decides what it may; without "
                   "one it only reads.")
             .initially("")
+            .change_needs(kTlsCloses)
             .word("min_version", &Settings::lowest, kVersions,
-                  "Oldest version that is spoken: TLSv1.2 or TLSv1.3.");
+                  "Oldest version that is spoken: TLSv1.2 or TLSv1.3.")
+            .change_needs(kTlsCloses);
     return kKeys;
 }
 
@@ -291,13 +300,23 @@ const Keys<mqtt::Settings>& mqtt_keys() {
                      "Changes that are kept while the broker is away.")
             .word("write", &Settings::write, kWrites,
                   "points: who may publish TOPIC/+/+/set, or DCMD, writes points.")
-            .other("ca", "PEM file of the CA, with mqtts://. Without it the system's trusted CAs.",
-                   text(&Settings::ca))
-            .other("certificate",
-                   "PEM file of the gateway's own certificate, with mqtts:// and key.",
+            .other("tls", "TLS at the broker, with mqtts://. Without it the system's CAs count.")
+            .other("ca", "The same as in `tls`, from earlier versions.", text(&Settings::ca))
+            .other("certificate", "The same as in `tls`, from earlier versions.",
                    text(&Settings::certificate))
-            .other("key", "PEM file of that certificate's key, with certificate.",
-                   text(&Settings::key));
+            .other("key", "The same as in `tls`, from earlier versions.", text(&Settings::key));
+    return kKeys;
+}
+
+const Keys<mqtt::Settings>& mqtt_tls_keys() {
+    using mqtt::Settings;
+    static const auto kKeys =
+        Keys<Settings>()
+            .other("ca",
+                   "PEM file of the CA that signs the broker's certificate. Without it the "
+                   "system's trusted CAs.")
+            .other("certificate", "PEM file of the gateway's own certificate, with key.")
+            .other("key", "PEM file of that certificate's key, with certificate.");
     return kKeys;
 }
 

@@ -72,6 +72,8 @@ const Keys<tls::Settings>& tls_keys();
 const Keys<web::Token>& token_keys();
 const Keys<points::Relay>& relay_keys();
 const Keys<mqtt::Settings>& mqtt_keys();
+/// Of `tls` of mqtt.
+const Keys<mqtt::Settings>& mqtt_tls_keys();
 const Keys<audit::Settings>& audit_keys();
 /// "50MiB", as in the file.
 std::string size_text(std::size_t bytes);

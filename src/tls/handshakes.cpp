@@ -1,5 +1,6 @@
 #include "panelgate/tls/handshakes.hpp"
 
+#include <sched.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
@@ -20,6 +21,7 @@
 #include <utility>
 
 #include "engine.hpp"
+#include "pace.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tls/stream.hpp"
@@ -38,9 +40,12 @@ constexpr std::size_t kMostInput = 128 * 1024;
 constexpr int kNice = 10;
 constexpr std::uint8_t kHandshakeRecord = 22;  // RFC 8446 5.1
 
-/// Of the calling thread: the loop, whose time is the lines', goes first.
+/// Of the calling thread: the loop, whose time is the lines', goes first, and is never preempted by
+/// this one (sched(7), SCHED_BATCH).
 void be_nice() {
     thread_local const bool kDone = [] {
+        const sched_param none{};
+        ::sched_setscheduler(0, SCHED_BATCH, &none);
         ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), kNice);
         return true;
     }();
@@ -84,6 +89,7 @@ class Handshakes::Conversation : public std::enable_shared_from_this<Conversatio
           context_(all_->context_),
           engine_(std::make_shared<Engine>(context_)),
           deadline_(stream.get_executor()),
+          turn_(stream.get_executor()),
           done_(std::move(done)) {
         all_->running_.push_back(this);
     }
@@ -107,6 +113,7 @@ class Handshakes::Conversation : public std::enable_shared_from_this<Conversatio
   private:
     void listen();
     void on_readable();
+    void wait_for_turn();
     void compute();
     void send(Engine::Progress progress);
     void judge(Engine::Progress progress);
@@ -119,6 +126,8 @@ class Handshakes::Conversation : public std::enable_shared_from_this<Conversatio
     std::shared_ptr<const Context> context_;
     std::shared_ptr<Engine> engine_;
     asio::steady_timer deadline_;
+    asio::steady_timer turn_;
+    bool waits_for_turn_ = false;
     std::function<void(bool)> done_;  ///< null: over
     std::size_t received_ = 0;
 };
@@ -142,12 +151,25 @@ void Handshakes::Conversation::on_readable() {
         return finish(Outcome::broken, std::string("the client left ") + when);
     }
     const ByteView bytes(chunk.data(), static_cast<std::size_t>(size));
-    if (received_ == 0 && bytes[0] != kHandshakeRecord)
-        return finish(Outcome::plain, spoken(bytes));
+    const bool is_first = received_ == 0;
+    if (is_first && bytes[0] != kHandshakeRecord) return finish(Outcome::plain, spoken(bytes));
     received_ += bytes.size();
     if (received_ > kMostInput) return finish(Outcome::broken, "the client sent too much");
     engine_->input.append(bytes.begin(), bytes.end());
-    compute();
+    is_first ? wait_for_turn() : compute();
+}
+
+void Handshakes::Conversation::wait_for_turn() {
+    turn_.expires_after(Duration::zero());
+    const Duration pause = all_->pace_->wait(turn_.expiry(), address);
+    if (pause == Duration::zero()) return compute();
+    waits_for_turn_ = true;
+    turn_.expires_after(pause);
+    turn_.async_wait([self = shared_from_this()](const error_code&) {
+        if (!self->done_) return;
+        self->waits_for_turn_ = false;
+        self->compute();
+    });
 }
 
 /// The engine is the thread's until it is done; the socket stays here.
@@ -211,6 +233,8 @@ void Handshakes::Conversation::finish(Outcome outcome, const std::string& why) {
     if (!done) return;
     const auto self = shared_from_this();
     deadline_.cancel();
+    turn_.cancel();
+    if (waits_for_turn_) all_->pace_->give_back(address);
     const std::shared_ptr<void> owner = std::exchange(owner_, nullptr);
     all_->end(*this, outcome, why);
     done(outcome == Outcome::done);
@@ -220,6 +244,8 @@ Handshakes::Handshakes(asio::any_io_executor executor, std::string name, Setting
     : name_(std::move(name)),
       settings_(std::move(settings)),
       context_(context_of(settings_)),
+      pace_(std::make_unique<Pace>(settings_.handshakes_per_second_per_address,
+                                   settings_.handshakes_per_second)),
       worker_(std::move(executor)) {}
 
 Handshakes::~Handshakes() = default;
@@ -276,12 +302,14 @@ void Handshakes::begin(std::shared_ptr<void> owner, Stream& stream, std::string 
 }
 
 void Handshakes::make_room(const std::string& address) {
-    std::map<std::string, std::size_t> counts;
-    for (const auto& one : running_) ++counts[one->address];
+    const auto is_same = [&](const Conversation* one) { return one->address == address; };
     std::string from;
-    if (counts[address] >= settings_.max_handshakes_per_address) {
+    if (static_cast<std::size_t>(std::ranges::count_if(running_, is_same)) >=
+        settings_.max_handshakes_per_address) {
         from = address;
     } else if (running_.size() >= settings_.max_handshakes) {
+        std::map<std::string, std::size_t> counts;
+        for (const auto& one : running_) ++counts[one->address];
         from =
             std::ranges::max_element(counts, {}, [](const auto& one) { return one.second; })->first;
     } else {

@@ -225,6 +225,21 @@ class Configuration(unittest.TestCase):
                 self.connects(broker, f", ca: {here}/wrong.pem, username: box, password_file: {here}/password",
                               "mqtt not connected .*TLS")
                 self.connects(broker, f", ca: {here}/right.pem", "mqtt not connected .*the broker refuses")
+                self.connects(broker, f", tls: {{ca: {here}/right.pem}}, username: box, password_file: "
+                              f"{here}/password", "mqtt connected broker=mqtts://localhost")
+
+    @unittest.skipUnless(shutil.which("openssl"), "needs openssl")
+    def test_the_broker_knows_the_gateway_by_its_certificate(self):
+        with tempfile.TemporaryDirectory() as folder:
+            here = pathlib.Path(folder)
+            for name in ("right", "wrong"):
+                self.certify(here, name)
+            mutual = (f"certfile {here}/right.pem\nkeyfile {here}/right.key\ncafile {here}/right.pem\n"
+                      "require_certificate true\nallow_anonymous true\n")
+            with Broker(mutual) as broker:
+                for name, said in (("right", "mqtt connected"), ("wrong", "mqtt not connected")):
+                    self.connects(broker, f", tls: {{ca: {here}/right.pem, certificate: {here}/{name}.pem, "
+                                  f"key: {here}/{name}.key}}", said)
 
     def connects(self, broker, more, said):
         text = plant(broker, more=more).replace(f"mqtt://127.0.0.1:{broker.port}",

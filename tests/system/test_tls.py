@@ -6,12 +6,14 @@ import http.client
 import importlib.util
 import itertools
 import os
+import pathlib
 import re
 import signal
 import socket
 import ssl
 import struct
 import subprocess
+import tempfile
 import threading
 import time
 import unittest
@@ -263,6 +265,20 @@ class Versions(Tls):
             done = subprocess.run([*where, "-reconnect", "-tls1_2"], stdin=subprocess.DEVNULL,
                                   capture_output=True, text=True, check=False)
             self.assertNotIn("Reused", done.stdout)
+
+    def test_no_early_data(self):
+        with served(self.made, self.made.tls()) as program, tempfile.TemporaryDirectory() as folder:
+            session, early = f"{folder}/session", pathlib.Path(folder) / "early"
+            early.write_bytes(harness.adu(1, 31, WRITE))
+            where = ["openssl", "s_client", "-connect", f"127.0.0.1:{program.modbus_port()}", "-tls1_3"]
+            told = ""
+            for more in (["-sess_out", session], ["-sess_in", session, "-early_data", str(early)]):
+                done = subprocess.run([*where, *more], stdin=subprocess.DEVNULL, capture_output=True,
+                                      text=True, check=False, timeout=harness.PATIENCE)
+                told += done.stdout + done.stderr
+            self.assertNotIn("Early data was accepted", told)
+            self.assertNotIn("Reused", told)
+            self.assertNotIn("info write ", program.log.text())
 
 
 class Abuse(Tls):

@@ -19,6 +19,8 @@ inline constexpr std::string_view kOpensPort = "the port is opened anew";
 inline constexpr std::string_view kListensAnew = "it listens anew, and its clients connect again";
 inline constexpr std::string_view kConnectsAnew = "it connects to the broker anew";
 inline constexpr std::string_view kAllowCloses = "clients outside `allow` are closed";
+inline constexpr std::string_view kTlsCloses = "clients that are not let in any more are closed";
+inline constexpr std::string_view kTlsRenewed = "for connections to come";
 /// The change of a key that a reload cannot take over (KeyShape::change).
 inline constexpr std::string_view kNextStart = "takes effect at the next start";
 

@@ -15,12 +15,14 @@
 
 namespace panelgate::tls {
 
+class Pace;
 class Stream;
 
 /// The handshakes of a listener. What they compute is done by a thread of low priority, so that a
 /// flood of them costs the loop little, and their number is bounded: beyond the limit of an address
 /// its oldest one gives way, beyond that of all the oldest one of the address with most. Each has
-/// `handshake_timeout`. One thread.
+/// `handshake_timeout`, and begins when its address and all together have begun no more than they
+/// may a second. One thread.
 class Handshakes : public std::enable_shared_from_this<Handshakes> {
   public:
     /// `name` is the listener's, for the log. Throws Unusable.
@@ -59,6 +61,7 @@ class Handshakes : public std::enable_shared_from_this<Handshakes> {
     std::string name_;
     Settings settings_;
     std::shared_ptr<const Context> context_;
+    std::unique_ptr<Pace> pace_;
     std::list<Conversation*> running_;  ///< the oldest first; each removes itself
     Counters counters_;
     rt::Worker worker_;

@@ -26,7 +26,8 @@ struct CannotIssue : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/// What was asked for cannot be had, whatever the CA: a name that is none, another CA's certificate.
+/// What was asked for cannot be had, whatever the CA: a name that is none, another CA's
+/// certificate.
 struct WrongName : CannotIssue {
     using CannotIssue::CannotIssue;
 };

@@ -37,15 +37,20 @@ struct Settings {
     Duration handshake_timeout = 10s;
     std::size_t max_handshakes = 128;  ///< at the same time; beyond it the oldest gives way
     std::size_t max_handshakes_per_address = 16;
+    /// That begin; the others wait for their turn. A handshake costs the loop some tens of
+    /// microseconds, so a flood of them costs it a percent or two.
+    std::size_t handshakes_per_second = 200;
+    std::size_t handshakes_per_second_per_address = 100;
     Material material{};
     /// Made of all this by whoever read the files, which takes milliseconds; null: not yet.
     std::shared_ptr<const Context> made{};
 
     friend bool operator==(const Settings& one, const Settings& other) {
         const auto all = [](const Settings& of) {
-            return std::tie(of.certificate, of.key, of.ca, of.crl, of.client,
-                            of.role_from_certificate, of.lowest, of.handshake_timeout,
-                            of.max_handshakes, of.max_handshakes_per_address, of.material);
+            return std::tie(
+                of.certificate, of.key, of.ca, of.crl, of.client, of.role_from_certificate,
+                of.lowest, of.handshake_timeout, of.max_handshakes, of.max_handshakes_per_address,
+                of.handshakes_per_second, of.handshakes_per_second_per_address, of.material);
         };
         return all(one) == all(other);
     }
