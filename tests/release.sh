@@ -28,7 +28,7 @@ for architecture in amd64 arm64 armhf; do deploy/package.sh $architecture; done
 git clone --quiet --shared . "$work/tree"
 git -C "$work/tree" -c user.name=test -c user.email=test@plant.example tag --force "v$version" >/dev/null
 SECONDS=0
-"$work/tree/deploy/release.sh" --packages build/packages --image-by files --out "$out"
+"$work/tree/deploy/release.sh" --packages "$PWD/build/packages" --image-by files --out "$out"
 say "made in $SECONDS s, packages not counted"
 (cd "$out" && must sha256sum --check --quiet --strict SHA256SUMS)
 

@@ -297,7 +297,9 @@ void Arbiter::expire_active(TimePoint now) {
 }
 
 Attempt::Ends Arbiter::ends_attempt(TimePoint now) const {
-    return [this, now](ByteView adu) { return unsolicited_.is_wrong_reply(now, adu, stations_); };
+    return [this, now](ByteView adu) {
+        return unsolicited_.is_wrong_reply(now, adu, stations_, active_->heard_after());
+    };
 }
 
 void Arbiter::hear_idle(TimePoint now, ByteView bytes) {

@@ -194,12 +194,13 @@ OutstandingRequests::Heard OutstandingRequests::on_unsolicited(TimePoint now, By
     // timeout does not.
     if (now <= due) heard.needed = now - answered.sent;
     heard.lateness = std::max(now - due, Duration::zero());
-    if (heard.lateness > Duration::zero()) late_.on_late(heard.lateness);
+    const bool may_be_meant = asked && modbus::exception_of(pdu);  // for the request on the wire
+    if (heard.lateness > Duration::zero() && !may_be_meant) late_.on_late(heard.lateness);
     // A repetition of the previous reply may be a duplicate, and the outstanding reply still comes.
     if (may_be_duplicate) {
         duplicates_.on_ambiguous(now, pdu);
     } else {
-        close(pdu, asked && modbus::exception_of(pdu));
+        close(pdu, may_be_meant);
     }
     heard.settled = !any();
     // Later ones are still to come.

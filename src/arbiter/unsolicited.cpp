@@ -134,18 +134,21 @@ void UnsolicitedFrames::let_reply_pass(TimePoint now, ByteView request, const St
     quiet.rest_until(now + silent_interval(serial_) + think + reply);
 }
 
-bool UnsolicitedFrames::is_wrong_reply(TimePoint now, ByteView adu,
-                                       const Stations& stations) const {
+bool UnsolicitedFrames::is_wrong_reply(TimePoint now, ByteView adu, const Stations& stations,
+                                       Duration heard_after) const {
     if (std::ranges::equal(adu, last_frame_) || is_request(adu) ||
         delay_behind_broadcast(now, adu, stations) || answers_other_master(now, adu))
         return false;
     const Station* station = stations.find(adu[0]);
     if (station == nullptr) return false;
-    // An exception for another outstanding function may be meant for this request: asking again
-    // decides sooner than waiting.
     const Claim kind = station->requests().claim_of(now, modbus::pdu_of(adu));
-    return kind == Claim::unasked ||
-           (kind == Claim::late && modbus::exception_of(modbus::pdu_of(adu)));
+    if (kind == Claim::unasked) return true;
+    // An exception for another function may be meant for this request, even if it is outstanding:
+    // asking again decides sooner than waiting. One that repeats an earlier one may be, too, where
+    // the answer was due; a duplicate comes at any time.
+    const bool in_time = !station->is_quicker_than_ever(heard_after);
+    const bool may_be_meant = kind == Claim::late || (kind == Claim::duplicate && in_time);
+    return may_be_meant && modbus::exception_of(modbus::pdu_of(adu));
 }
 
 }  // namespace panelgate::arbiter

@@ -343,7 +343,7 @@ void Arbiter::ask_again(TimePoint now) {
     outbox_.report(attempt, end_of(Verdict::doubtful));
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
-    station.requests().on_unanswered(now, group.request.pdu(), attempt.timing().sent);
+    station.requests().on_doubted(now, group, attempt.timing().sent);
     group.silent_after = group.cut_after = {};
     finish_barred(group);
     if (in_time(now, group) && !group.abandoned()) {

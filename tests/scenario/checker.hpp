@@ -110,6 +110,7 @@ class Checker : public Witness {
     // What may be sent when (checker_wire.cpp)
     void check_moment(TimePoint now);
     void check_idling(TimePoint now);
+    bool looks_late(std::uint8_t station) const;
     void check_write_sent(std::uint8_t station, ByteView pdu);
     void check_again(std::uint8_t station, ByteView pdu, FrameKind what);
     void check_crc(const Bytes& adu);
@@ -129,6 +130,7 @@ class Checker : public Witness {
     void check_reply(TimePoint now, const Open& open, const arbiter::Finish& finish);
     void check_values(TimePoint now, const Open& open, const arbiter::Finish& finish);
     Bytes heard_for(const Open& open, const Bytes& reply) const;
+    bool is_padded(const Open& open, const Bytes& reply) const;
     bool is_luck(ByteView heard);
     void check_write(TimePoint now, const Open& open, const Bytes& reply);
     void check_fault(TimePoint now, const Open& open, Fault fault);

@@ -191,14 +191,16 @@ void Checker::check_idling(TimePoint now) {
     constexpr std::size_t kReply = 45;
     const Duration slack = 100ms + frame_time(settings_.serial, kReply);
     // An answer that repeats another one may be held back for as long as its station needs: it
-    // could be a copy of that, with its own still to come (P1). So may a station's very first that
+    // could be a copy of that, with its own still to come (P1). Values are not handed on then, but
+    // asked for once more. So may a station's very first that
     // equals its request, for a timeout: it could be the echo (P8).
     const bool is_echo = attempt_.first && told_ < heard_until_;
     const Duration needs = is_echo ? settings_of(attempt_.station).response_timeout
                                    : watch_.own_slowest(attempt_.station);
     const TimePoint held = heard_until_ + needs + 20ms;
+    const bool in_doubt = attempt_.answered && told_ <= attempt_.sent;
     const TimePoint over =
-        std::max({sent_until_, heard_until_, is_echo ? held : std::min(told_, held)});
+        std::max({sent_until_, heard_until_, is_echo || in_doubt ? held : std::min(told_, held)});
     const auto waited = good_work_since(over);
     if (!waited || now <= *waited + slack) return;
     const Duration idle = now - *waited;
@@ -206,9 +208,20 @@ void Checker::check_idling(TimePoint now) {
     Duration most = slack;
     if (!attempt_.answered) most += settings_.unlisted.response_timeout;
     if (attempt_.station == kBroadcast) most += settings_.broadcast_turnaround;
+    // A reply of another length is, byte for byte, the late one to an earlier request of that
+    // length that had no answer: nobody on the wire can tell. Behind a station that is late the
+    // line rests for another timeout and a quarter.
+    if (!attempt_.answered && looks_late(attempt_.station))
+        most += settings_.unlisted.response_timeout * 5 / 4;
     if (calm_ && idle > most)
         fail("P5: the line was silent for " + std::to_string(idle / 1ms) +
              " ms while a request waited");
+}
+
+/// It says replies of other lengths than were asked for.
+bool Checker::looks_late(std::uint8_t station) const {
+    const auto panel = std::ranges::find(plan_.panels, station, &PanelPlan::id);
+    return panel != plan_.panels.end() && panel->padded_inside > 0;
 }
 
 /// Since when, but not before `since`, a request has waited that nothing keeps from going: it has

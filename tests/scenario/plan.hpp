@@ -62,6 +62,8 @@ struct PanelPlan {
     /// Its answers come in time and a gateway can find each of them: all but single bytes around
     /// them and pauses. `timeout`: of the line.
     bool is_sound(Duration timeout, Duration reply_hole) const;
+    /// None of its answers is one.
+    bool never_right() const { return wrong_function == 1 || padded_inside == 1; }
     /// Never silent, unless it is dead.
     bool only_dies() const;
 };

@@ -160,7 +160,12 @@ std::string compare(Oddity oddity, std::uint64_t seed, Outcome& with, bool histo
     if (!without.violation.empty()) return "without it: " + without.violation;
     const Duration much = p90(with.waits);
     const Duration usual = p90(without.waits);
-    if (much < 3 * usual) return {};
+    // Who says a reply twice has the line until the second one, and as long again as that may be
+    // late: nobody can be asked meanwhile without a collision, and at a high rate that is longer
+    // than all the others take. A request that misses its turn waits for one such rest more.
+    const PanelPlan& odd = plan.panels.back();
+    const Duration rest = odd.duplicate > 0 ? odd.duplicate_delay * 3 / 2 : Duration{};
+    if (much < 3 * usual + rest) return {};
     return "P9: of one odd panel the others wait " + std::to_string(much / 1us) + " us, else " +
            std::to_string(usual / 1us) + " us";
 }
@@ -172,6 +177,24 @@ TEST(Scenario, SeedsInWhichAnOddPanelOnceBrokeAPromiseKeepThemAll) {
         const std::string broken = compare(Oddity::doubled, seed, with);
         if (is_open(label(Oddity::doubled), broken)) continue;
         EXPECT_EQ(broken, "") << replay(label(Oddity::doubled), seed);
+    }
+}
+
+/// ... and with an odd panel: an exception equal to an earlier one ended nothing, and those of
+/// another function taught a lateness; a reply of another length is that to an earlier request, for
+/// anybody on the wire.
+TEST(Scenario, SeedsInWhichThePanelAnsweredWronglyKeepThemAll) {
+    struct Known {
+        Oddity oddity;
+        std::uint64_t seed;
+    };
+    constexpr Known kKnown[] = {{Oddity::wrong_function, 4},  {Oddity::wrong_function, 5},
+                                {Oddity::wrong_function, 10}, {Oddity::wrong_function, 76},
+                                {Oddity::padded_inside, 18},  {Oddity::padded_inside, 65}};
+    for (const Known& known : kKnown) {
+        Outcome with;
+        EXPECT_EQ(compare(known.oddity, known.seed, with), "")
+            << replay(label(known.oddity), known.seed);
     }
 }
 

@@ -194,6 +194,8 @@ class Attempt {
     Duration first_sign(TimePoint now) const {
         return std::max(waited(now), first_byte_ - timing_.sent);
     }
+    /// ... of whatever was heard.
+    Duration heard_after() const { return first_byte_ - timing_.sent; }
     /// When the last byte came that could not yet be a reply because our frame was still leaving.
     /// Empty: none did, or the reply began then.
     std::optional<TimePoint> early_noise() const {

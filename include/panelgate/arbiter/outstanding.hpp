@@ -303,13 +303,15 @@ class DuplicateGuard {
         confirmed_ = {};
         denied_ = at - denied_at_ <= timing::kForgetDuplicates ? denied_ + 1 : 1;
         denied_at_ = at;
-        const TimePoint earlier = earlier_reply_at(at, reply);
+        const TimePoint earlier = earlier_reply_at(at, reply, at);
         if (denied_ >= kDenials && earlier != TimePoint{}) learn(at, at - earlier);
     }
     /// With nothing outstanding, one request got this reply at `first` and again now: one of them
-    /// is a duplicate, of the other or of an earlier reply.
+    /// is a duplicate: of the other, if that is how late this station's duplicates come, else
+    /// perhaps of an earlier reply.
     void on_repeated_reply(TimePoint now, TimePoint first, ByteView reply) {
         if (now - first > timing::kLatestRepetition) return;
+        if (known() && now - first <= settle_time()) return learn(now, now - first);
         const TimePoint earlier = earlier_reply_at(first, reply);
         learn(now,
               std::max(now - first, earlier == TimePoint{} ? Duration::zero() : first - earlier));
@@ -340,11 +342,12 @@ class DuplicateGuard {
     }
     std::size_t last_index() const { return (next_ + kReplies - 1) % kReplies; }
     const Slot& last() const { return slots_[last_index()]; }
-    /// When it last sent this reply; TimePoint{}: not recently.
-    TimePoint earlier_reply_at(TimePoint now, ByteView reply) const {
+    /// When it last sent this reply, before `before`; TimePoint{}: not recently.
+    TimePoint earlier_reply_at(TimePoint now, ByteView reply,
+                               TimePoint before = TimePoint::max()) const {
         TimePoint earlier{};
         for (const Slot& slot : slots_) {
-            if (slot.is_recent(now) && std::ranges::equal(reply, slot.reply))
+            if (slot.at < before && slot.is_recent(now) && std::ranges::equal(reply, slot.reply))
                 earlier = std::max(earlier, slot.at);
         }
         return earlier;

@@ -145,6 +145,13 @@ class OutstandingRequests {
     /// An attempt that left at `sent` ended without its own reply: one more is outstanding, until
     /// it has come or cannot come any more.
     void on_unanswered(TimePoint now, const Bytes& pdu, TimePoint sent);
+    /// ... but for a reply that may be a duplicate of an earlier one; a duplicate of this
+    /// one may follow.
+    void on_doubted(TimePoint now, const Group& group, TimePoint sent) {
+        if (group.request.is_read())
+            duplicates_.on_reply(group.doubted_at, group.request.pdu(), group.doubted);
+        on_unanswered(now, group.request.pdu(), sent);
+    }
     /// ... but its reply came damaged. Some panels resend it: until that would be over only the
     /// same request may be sent, and after its answer the same rest applies.
     void on_damaged_reply(TimePoint now, const modbus::Request& request, TimePoint sent);

@@ -51,8 +51,10 @@ class UnsolicitedFrames {
     void note(TimePoint now, const std::vector<modbus::Unused>& parts, bool idle,
               Stations& stations, Quiet& quiet, Outbox& outbox);
     /// True if the station sent this instead of the right reply: not the echo, a duplicate, an
-    /// outstanding reply, or its answer to a broadcast or another master.
-    bool is_wrong_reply(TimePoint now, ByteView adu, const Stations& stations) const;
+    /// outstanding reply, or its answer to a broadcast or another master. `heard_after`: from the
+    /// end of the request to the first byte behind it.
+    bool is_wrong_reply(TimePoint now, ByteView adu, const Stations& stations,
+                        Duration heard_after) const;
 
   private:
     Outbox::Part judge(TimePoint now, const modbus::Unused& part, const Stations& stations) const;

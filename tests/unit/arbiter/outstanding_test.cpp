@@ -317,11 +317,27 @@ TEST_F(DuplicateGuardTest, P1AStationThatAnswersOneRequestTwiceSendsDuplicates) 
     guard_.on_repeated_reply(now_ + 30ms, now_ + 10ms, kReply);
     EXPECT_EQ(guard_.settle_time(), Duration(30ms));
     reply();
-    guard_.on_repeated_reply(now_ + 60ms, now_ + 50ms, kReply);
-    EXPECT_EQ(guard_.settle_time(), Duration(75ms))
+    guard_.on_repeated_reply(now_ + 80ms, now_ + 50ms, kReply);
+    EXPECT_EQ(guard_.settle_time(), Duration(45ms)) << "they come as late as that";
+    guard_.on_repeated_reply(now_ + 50ms + timing::kLatestRepetition + 1ms, now_ + 50ms, kReply);
+    EXPECT_EQ(guard_.settle_time(), Duration(45ms)) << "later, it is something else";
+    guard_.on_repeated_reply(now_ + 130ms, now_ + 80ms, kReply);
+    EXPECT_EQ(guard_.settle_time(), Duration(120ms))
         << "the first may have been a duplicate of the one before";
-    guard_.on_repeated_reply(now_ + 60ms + timing::kLatestRepetition, now_ + 50ms, kReply);
-    EXPECT_EQ(guard_.settle_time(), Duration(75ms)) << "later, it is something else";
+}
+
+/// Once its own duplicate behind it passed for one of an earlier equal answer, half a second ago,
+/// and the station rested for so long behind each reply.
+TEST_F(DuplicateGuardTest, ADoubtedAnswerIsADuplicateOfNoneButEarlierOnes) {
+    reply();
+    guard_.on_reply(now_ + 400ms, kRequest, kReply);
+    for (int i = 0; i < DuplicateGuard::kDenials; ++i) guard_.on_denied(now_ + 400ms, kReply);
+    EXPECT_EQ(guard_.settle_time(), Duration(600ms));
+    guard_ = {};
+    reply();
+    guard_.on_reply(now_ + 400ms, kRequest, kReply);
+    guard_.on_unasked(now_ + 430ms, kReply);
+    EXPECT_EQ(guard_.settle_time(), Duration(45ms));
 }
 
 TEST_F(DuplicateGuardTest, P1WhatIsInDoubtIsWaitedForBehindOneMoreReply) {

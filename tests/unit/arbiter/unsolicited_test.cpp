@@ -51,8 +51,8 @@ class UnsolicitedFramesTest : public testing::Test {
         }
         return words;
     }
-    bool is_wrong_reply(const Bytes& adu) const {
-        return unsolicited.is_wrong_reply(now, adu, stations);
+    bool is_wrong_reply(const Bytes& adu, Duration heard_after = 10ms) const {
+        return unsolicited.is_wrong_reply(now, adu, stations, heard_after);
     }
     const StationCounters& counters() const { return outbox.stations().at(17); }
 
@@ -107,6 +107,16 @@ TEST_F(UnsolicitedFramesTest, AWrongReplyIsNeitherEchoNorRequestNorOutstanding) 
     EXPECT_FALSE(is_wrong_reply(encode_adu(99, kReply))) << "nobody";
     stations.of(17).requests().on_unanswered(now, kRead, now - 500ms);
     EXPECT_FALSE(is_wrong_reply(kAnswer)) << "outstanding";
+}
+
+/// A panel that refuses everything with the same function's number: each refusal repeats another.
+TEST_F(UnsolicitedFramesTest, AnEqualRefusalInTheUsualTimeMayBeMeantForThisRequest) {
+    const Bytes refusal = "84 02"_hex;
+    stations.of(17).requests().on_unanswered(now, "04 00 6B 00 01"_hex, now - 500ms);
+    EXPECT_EQ(heard(encode_adu(17, refusal)), "late");
+    now += 100ms;
+    ASSERT_EQ(stations.of(17).requests().claim_of(now, refusal), Claim::duplicate);
+    EXPECT_TRUE(is_wrong_reply(encode_adu(17, refusal)));
 }
 
 /// Once it was one within four requests after the broadcast, once within a time: they disagreed.
