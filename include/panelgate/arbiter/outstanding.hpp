@@ -117,14 +117,12 @@ class ReconnectState {
     /// takes as long as waiting.
     void on_replied(bool quick) {
         answered_ = opened_;
-        unanswered_ = 0;
         if (only_known_reads_ && quick && ++replies_ >= kEnough) only_known_reads_ = false;
     }
     /// `distinct_length`: a read sent only because its reply's length is distinct.
     void on_probe_unanswered(bool distinct_length) {
         only_known_reads_ = distinct_length;
         replies_ = 0;
-        unanswered_ = std::min(unanswered_ + 1, kMost);
     }
 
     /// True if it has answered each request since then, and at least one. These may have been the
@@ -132,16 +130,12 @@ class ReconnectState {
     bool answered() const { return answered_; }
     /// True if it may answer only the reads that it has answered before.
     bool only_known_reads() const { return only_known_reads_; }
-    /// True if it did not answer those either: perhaps it answers only writes.
-    bool reads_unanswered() const { return unanswered_ >= kMost; }
 
   private:
-    static constexpr int kMost = 3;
     static constexpr int kEnough =
         16;  ///< replies after which the other length may just have been lost
 
-    int replies_ = 0;     ///< since it did not answer a read of another length
-    int unanswered_ = 0;  ///< in a row
+    int replies_ = 0;  ///< since it did not answer a read of another length
     bool opened_ = false;
     bool answered_ = false;
     bool only_known_reads_ = false;
@@ -212,6 +206,35 @@ class ForeignRequests {
     std::vector<Entry> requests_;
 };
 
+/// Answers that a station was seen to give to different requests: each is trusted after three
+/// times, and any other as soon as three different ones were seen. Zeros say nothing of other
+/// values. Pure.
+class EqualAnswers {
+  public:
+    static constexpr int kEnough = 3;
+
+    void add(ByteView reply) {
+        for (Seen& one : seen_) {
+            if (one.times > 0 && !std::ranges::equal(one.reply, reply)) continue;
+            if (one.times == 0) one.reply.assign(reply.begin(), reply.end());
+            one.times = std::min(one.times + 1, kEnough);
+            return;
+        }
+    }
+    bool trusts(ByteView reply) const {
+        return seen_.back().times > 0 || std::ranges::any_of(seen_, [&](const Seen& one) {
+                   return one.times == kEnough && std::ranges::equal(one.reply, reply);
+               });
+    }
+
+  private:
+    struct Seen {
+        Bytes reply;
+        int times = 0;
+    };
+    std::array<Seen, kEnough> seen_;
+};
+
 /// Detects that a station sends its replies twice, or that two panels share one address, and how
 /// long after a reply the second one must be awaited: it could pass for the answer to a request of
 /// the same shape (P1). An exact repetition is a duplicate at once; a frame of the same shape must
@@ -219,8 +242,8 @@ class ForeignRequests {
 class DuplicateGuard {
   public:
     static constexpr std::size_t kReplies = 8;
-    static constexpr int kConfirmations = 3;  ///< after which equal answers are trusted
-    static constexpr int kDenials = 3;        ///< after which they count as duplicates
+    static constexpr int kConfirmations = EqualAnswers::kEnough;
+    static constexpr int kDenials = 3;  ///< after which they count as duplicates
 
     void on_reply(TimePoint now, Bytes request, Bytes reply) {
         if (now - learned_at_ > timing::kForgetDuplicates) learned_ = {};
@@ -277,12 +300,9 @@ class DuplicateGuard {
     /// True if this answer repeats the answer to another request, or, after a proven duplicate, any
     /// earlier one, and the station has not yet shown that it gives equal answers.
     bool suspicious(TimePoint now, ByteView request, ByteView reply) const {
-        if (confirmed_[kind_of(request, reply)] >= kConfirmations) return false;
+        if (confirmed_[kind_of(request, reply)].trusts(reply)) return false;
         const bool any = denied_ > 0 && now - denied_at_ <= timing::kForgetDuplicates;
-        return std::ranges::any_of(slots_, [&](const Slot& slot) {
-            return slot.is_recent(now) && std::ranges::equal(reply, slot.reply) &&
-                   (any || !std::ranges::equal(request, slot.request));
-        });
+        return any ? is_duplicate(now, reply) : repeats_other(now, request, reply);
     }
     /// True if this answer repeats a recent answer to another request.
     bool repeats_other(TimePoint now, ByteView request, ByteView reply) const {
@@ -294,7 +314,7 @@ class DuplicateGuard {
     /// The reply was no duplicate: a read had the same values when asked again; for any other
     /// request, which is not asked again, no other answer came.
     void on_confirmed(ByteView request, ByteView reply) {
-        ++confirmed_[kind_of(request, reply)];
+        confirmed_[kind_of(request, reply)].add(reply);
         denied_ = 0;
     }
     /// A reply at `at` repeated an earlier one, and the station answered differently when asked
@@ -360,7 +380,7 @@ class DuplicateGuard {
 
     std::array<Slot, kReplies> slots_{};
     std::size_t next_ = 0;
-    std::array<int, 2> confirmed_{};  ///< by kind_of()
+    std::array<EqualAnswers, 2> confirmed_;  ///< by kind_of()
     TimePoint denied_at_{};
     int denied_ = 0;  ///< in a row
     Duration doubt_{};

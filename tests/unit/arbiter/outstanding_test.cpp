@@ -300,6 +300,21 @@ TEST_F(DuplicateGuardTest, P1AStationThatIsDeniedIsNoLongerTrusted) {
     EXPECT_TRUE(suspicious(20ms));
 }
 
+/// A panel whose empty registers are alike may still say its other replies twice.
+TEST(EqualAnswers, P1ZerosSayNothingOfOtherValues) {
+    EqualAnswers seen;
+    for (int i = 0; i < EqualAnswers::kEnough; ++i) {
+        EXPECT_FALSE(seen.trusts(kReply));
+        seen.add(kReply);
+    }
+    EXPECT_TRUE(seen.trusts(kReply));
+    EXPECT_FALSE(seen.trusts(kOtherReply));
+    seen.add("03 02 00 03"_hex);
+    EXPECT_FALSE(seen.trusts(kOtherReply));
+    seen.add("03 02 00 04"_hex);
+    EXPECT_TRUE(seen.trusts(kOtherReply)) << "it shows the same in several places";
+}
+
 TEST_F(DuplicateGuardTest, P1AfterADenialAnEqualAnswerToTheVerySameRequestIsSuspiciousToo) {
     reply();
     EXPECT_FALSE(suspicious(20ms, kRequest));
