@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "northbound.hpp"
@@ -15,6 +16,7 @@
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/config/setting.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/tls/settings.hpp"
 #include "running_line.hpp"
 
 namespace panelgate::app {
@@ -154,12 +156,22 @@ bool may_close(const std::vector<Network>& before, const std::vector<Network>& a
     return !after.empty() && !std::ranges::all_of(before.empty() ? kAll : before, is_inside);
 }
 
+/// Who is let in by certificate, and as whom. What the files hold is not the file's text.
+bool has_other_rules(const std::optional<tls::Settings>& before,
+                     const std::optional<tls::Settings>& after) {
+    const auto rules = [](const tls::Settings& of) {
+        return std::tie(of.ca, of.crl, of.client, of.role_from_certificate, of.lowest);
+    };
+    return before && after && rules(*before) != rules(*after);
+}
+
 /// What happens to the clients of a listener; `after` is null where it is gone.
 template <class Settings>
 std::string_view cut_of(const Settings& before, const Settings* after) {
     if (after == nullptr) return kClientsClose;
     if (!before.is_same_listener(*after)) return config::kListensAnew;
-    return may_close(before.allow, after->allow) ? config::kAllowCloses : std::string_view();
+    if (may_close(before.allow, after->allow)) return config::kAllowCloses;
+    return has_other_rules(before.tls, after->tls) ? config::kTlsCloses : std::string_view();
 }
 
 std::string_view cut_of(const config::Line& before, const config::Config& after) {

@@ -250,13 +250,14 @@ Known nowhere(const std::string& why, ExitCode code = kNotReady) {
 }
 
 /// Where `http` has `tls`, nothing is asked in plain.
-std::optional<tls::Trust> trust_in(const yaml::Node* http) {
+std::optional<tls::Trust> trust_in(const std::string& file, const yaml::Node* http) {
     const yaml::Node* secure = http == nullptr ? nullptr : http->find("tls");
     if (secure == nullptr) return std::nullopt;
     const auto content = [&](std::string_view key) {
         const yaml::Node* path = secure->find(key);
-        return path == nullptr ? std::string()
-                               : config::RealFiles::read_any(path->scalar).value_or("");
+        if (path == nullptr) return std::string();
+        return config::RealFiles::read_any(config::beside(path_of(file), path->scalar))
+            .value_or("");
     };
     return tls::Trust{content("certificate"), content("ca")};
 }
@@ -275,7 +276,7 @@ Known known_despite_faults(const std::string& file) {
         const yaml::Node* http = tree.find("http");
         const yaml::Node* at = http == nullptr ? nullptr : http->find("listen");
         listen = at == nullptr ? "" : at->scalar;
-        trust = trust_in(http);
+        trust = trust_in(file, http);
     } else if (text->find("tls:") != std::string::npos) {
         trust.emplace();
     }

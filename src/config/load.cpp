@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -229,22 +228,14 @@ void load_realtime(Loading& loading, MapReader& root) {
     in.finish();
 }
 
-/// A relative folder is beside the configuration file, so that a service and a check find the same
-/// one wherever they are started. Standard input and pipes are in no folder of their own.
-std::string beside(const std::string& file, const std::string& typed) {
-    const std::filesystem::path folder = std::filesystem::path(file).parent_path();
-    const bool is_pipe = file.starts_with("/dev/") || file.starts_with("/proc/");
-    return is_pipe ? typed : (folder / typed).lexically_normal().string();
-}
-
 /// The shipped profiles; those of profiles_dir are added or replace them.
 std::shared_ptr<const profile::Catalogue> load_profiles(Loading& loading, MapReader& root) {
     auto catalogue = std::make_shared<profile::Catalogue>(profile::Catalogue::shipped());
     const auto dir = root.text("profiles_dir");
     if (!dir) return catalogue;
     loading.config.profiles_dir = *dir;
-    for (const std::string& fault : add_profiles(beside(loading.problems.file(), *dir),
-                                                 loading.files, *catalogue, loading.problems)) {
+    for (const std::string& fault :
+         add_profiles(loading.path_of(*dir), loading.files, *catalogue, loading.problems)) {
         root.problem("profiles_dir", "profiles_dir: " + fault);
     }
     return catalogue;

@@ -82,14 +82,15 @@ std::string path_of(const Node* file) {
 /// `elsewhere`: the secret is in the configuration, which is already a problem.
 std::string load_secret(Loading& loading, MapReader& in, bool elsewhere, web::Token& token) {
     constexpr std::string_view kBlanks = " \t\r\n";
-    const auto file = elsewhere ? in.text("file") : in.required_text("file");
-    if (!file) return "";
-    token.file = *file;
-    if (loading.files.is_special(*file)) {
+    const auto typed = elsewhere ? in.text("file") : in.required_text("file");
+    if (!typed) return "";
+    token.file = loading.path_of(*typed);
+    const std::string& file = token.file;
+    if (loading.files.is_special(file)) {
         in.problem("file", "the token file must be a file, not a pipe, a socket or a device");
         return "";
     }
-    auto text = loading.files.read(*file);
+    auto text = loading.files.read(file);
     if (text) text->erase(0, byte_order_mark(*text));
     if (!text) {
         // Does not show the text: users may have written the token itself there.
@@ -105,9 +106,9 @@ std::string load_secret(Loading& loading, MapReader& in, bool elsewhere, web::To
     }
     std::string secret = text->substr(first, text->find_last_not_of(kBlanks) + 1 - first);
     if (secret.find_first_of(kBlanks) != std::string::npos)
-        in.problem("file", "the token file " + *file + " must hold one token, without blanks");
+        in.problem("file", "the token file " + file + " must hold one token, without blanks");
     else if (has_control_character(secret))
-        in.problem("file", "the token file " + *file +
+        in.problem("file", "the token file " + file +
                                " must be plain text (UTF-8); it holds control characters");
     return secret;
 }

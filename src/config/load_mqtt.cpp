@@ -101,10 +101,11 @@ void load_part(MapReader& in, std::string_view key, std::string_view forbidden,
 }
 
 /// Returns the file's text without the line end; "" and a problem if there is none.
-std::string load_password(Loading& loading, MapReader& in) {
-    const auto file = in.text("password_file");
-    if (!file) return "";
-    auto text = loading.files.is_special(*file) ? std::nullopt : loading.files.read(*file);
+std::string load_password(Loading& loading, MapReader& in, std::string& file) {
+    const auto typed = in.text("password_file");
+    if (!typed) return "";
+    file = loading.path_of(*typed);
+    auto text = loading.files.is_special(file) ? std::nullopt : loading.files.read(file);
     if (!text) {
         in.problem("password_file",
                    "cannot read the password file; give the path of a file that holds the password "
@@ -122,7 +123,7 @@ std::string load_password(Loading& loading, MapReader& in) {
 void load_file(Loading& loading, MapReader& in, std::string_view key, bool tls, std::string& path) {
     const auto text = in.text(key);
     if (!text) return;
-    path = *text;
+    path = loading.path_of(*text);
     if (!tls)
         in.problem(key, std::string(key) + " needs TLS; write broker: mqtts://HOST:8883");
     else if (loading.files.is_special(path) || !loading.files.read(path))
@@ -193,8 +194,7 @@ void load_session(Loading& loading, MapReader& in, mqtt::Settings& settings) {
     if (settings.client_id.size() > kLongest)
         in.problem("client_id", "client_id must have at most 128 characters");
     settings.username = in.text("username").value_or("");
-    settings.password_file = in.text("password_file").value_or("");
-    settings.password = load_password(loading, in);
+    settings.password = load_password(loading, in, settings.password_file);
 }
 
 void warn_of_broker(Loading& loading, MapReader& in, const mqtt::Settings& settings) {

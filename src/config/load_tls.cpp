@@ -22,7 +22,7 @@ bool load_file(Loading& loading, MapReader& in, std::string_view key, bool requi
                std::string& path, std::string& content) {
     const auto text = required ? in.required_text(key) : in.text(key);
     if (!text) return !required && !in.has(key);
-    path = *text;
+    path = loading.path_of(*text);
     const auto read = loading.files.is_special(path) ? std::nullopt : loading.files.read(path);
     if (!read) {
         in.problem(key, "cannot read " + path +

@@ -11,6 +11,7 @@
 
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/describe.hpp"
+#include "panelgate/config/real_files.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::config {
@@ -43,6 +44,9 @@ struct Loading {
     /// `lines`, or a line's `stations`, was no list: names that are not known may be right.
     bool names_missing = false;
     Firsts firsts{};  ///< "line floor1", "device /dev/ttyS1"
+
+    /// The file that a text of the configuration names.
+    std::string path_of(const std::string& typed) const { return beside(problems.file(), typed); }
 
     void warn(yaml::Mark mark, const std::string& message) {
         std::string text = yaml::format({problems.file(), mark, "warning: " + message});

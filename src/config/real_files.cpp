@@ -111,6 +111,14 @@ bool RealFiles::is_readable_by_all(const std::string& path) const {
     return !error && (rights & fs::perms::others_read) != fs::perms::none;
 }
 
+std::string beside(const std::string& file, const std::string& typed) {
+    const fs::path folder = fs::path(file).parent_path();
+    const bool has_folder =
+        !folder.empty() && !file.starts_with("/dev/") && !file.starts_with("/proc/");
+    if (!has_folder || fs::path(typed).is_absolute()) return typed;
+    return fs::absolute(folder / typed).lexically_normal().string();
+}
+
 std::vector<std::string> add_profiles(const std::string& dir, const Files& files,
                                       profile::Catalogue& catalogue, yaml::Problems& problems) {
     const auto paths = files.list_yaml(dir);

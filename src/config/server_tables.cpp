@@ -98,7 +98,7 @@ const Keys<tcp_server::Settings>& listener_keys() {
                 "tls",
                 "Modbus/TCP Security: only clients that speak TLS are served. `listen` may be an "
                 "address alone then: its port is 802, as it is of the default, 127.0.0.1.")
-            .change_needs(kListensAnew);
+            .change_needs(kTlsCloses);
     return kKeys;
 }
 
@@ -175,7 +175,7 @@ const Keys<web::Settings>& http_keys() {
             .change_needs(kAllowCloses)
             .other("tokens", "Tokens of clients (Authorization: Bearer TOKEN).")
             .other("tls", "HTTPS: only clients that speak TLS are served.")
-            .change_needs(kListensAnew)
+            .change_needs(kTlsCloses)
             .integer("max_connections_per_address", &Settings::max_connections_per_address, 1,
                      static_cast<std::int64_t>(Settings().max_connections),
                      "Most connections of one address, event streams apart; then its longest "

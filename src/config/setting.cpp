@@ -6,6 +6,7 @@
 #include <string_view>
 #include <unordered_map>
 #include <utility>
+#include <vector>
 
 #include "load_tls.hpp"
 #include "panelgate/config/describe.hpp"
@@ -117,17 +118,28 @@ void show_servers(const SettingWriter& top, const Config& config) {
     }
 }
 
+/// The rules by which a key may not be beside a value of its map.
+std::vector<const yaml::KeyRule*> rules_of(const SettingMap& map) {
+    std::vector<const yaml::KeyRule*> all;
+    for (const yaml::KeyRule& rule : describe().rules)
+        if (!rule.needs && rule.map == map.keys) all.push_back(&rule);
+    return all;
+}
+
 /// Finds what a file cannot have beside the values of its neighbours, which are shown before it.
 void find_idle(std::vector<Setting>& all) {
     std::unordered_map<std::string_view, std::string_view> values;
+    const SettingMap* map = nullptr;
+    std::vector<const yaml::KeyRule*> rules;
     for (Setting& setting : all) {
         values.emplace(setting.path, setting.value);
-        for (const yaml::KeyRule& rule : describe().rules) {
-            if (rule.needs || rule.key != setting.key() || rule.map != setting.map->keys) continue;
-            const auto other = values.find(setting.map->path + '/' + rule.other);
-            setting.applies = setting.applies &&
-                              (other == values.end() ||
-                               std::ranges::find(rule.words, other->second) != rule.words.end());
+        if (std::exchange(map, setting.map.get()) != setting.map.get()) rules = rules_of(*map);
+        for (const yaml::KeyRule* rule : rules) {
+            if (rule->key != setting.key()) continue;
+            const auto other = values.find(map->path + '/' + rule->other);
+            const bool is_free = other == values.end() ||
+                                 std::ranges::find(rule->words, other->second) != rule->words.end();
+            setting.applies = setting.applies && is_free;
         }
     }
 }

@@ -115,8 +115,8 @@ struct Files {
 };
 
 /// Parses and checks a configuration. Returns nothing if it adds anything to `problems`.
-/// `environment` gives the values of ${NAME}. A relative profiles_dir is beside the file of
-/// `problems`; other file names in the text are used as they are.
+/// `environment` gives the values of ${NAME}. Relative file names in the text are beside the
+/// file of `problems` (beside()).
 std::optional<Config> load(std::string_view text, const Files& files, yaml::Problems& problems,
                            const yaml::Environment& environment = {});
 

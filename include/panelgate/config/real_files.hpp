@@ -21,6 +21,11 @@ class RealFiles final : public Files {
     static std::optional<std::string> read_any(const std::string& path);
 };
 
+/// The path that a text of the configuration `file` means: a relative one is beside it, so that a
+/// service and a check find the same wherever they are started. Standard input and pipes are in no
+/// folder of their own.
+std::string beside(const std::string& file, const std::string& typed);
+
 /// Adds the profiles of a directory to a catalogue; they replace those of the same name. Faults
 /// inside a file go to `problems` with that file's name; returns a text for the directory, or each
 /// file, that cannot be read.

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -15,6 +16,7 @@
 #include "memory_files.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/real_files.hpp"
+#include "panelgate/tls/issue.hpp"
 #include "panelgate/yaml/document.hpp"
 
 namespace panelgate::config::load_test {
@@ -218,7 +220,7 @@ TEST(ConfigLoad, ARelativeProfilesDirIsBesideTheConfigurationFile) {
     const auto generic =
         RealFiles().read(std::string(SOURCE_ROOT) + "/config/profiles/generic.yaml").value();
     const MemoryFiles files({{"/etc/pg/p/own-panel.yaml", generic},
-                             {"here/p/own-panel.yaml", generic},
+                             {std::filesystem::absolute("here/p/own-panel.yaml"), generic},
                              {"p/own-panel.yaml", generic},
                              {"/q/own-panel.yaml", generic}});
     const std::string rest =
@@ -232,6 +234,26 @@ TEST(ConfigLoad, ARelativeProfilesDirIsBesideTheConfigurationFile) {
     yaml::Problems problems("/etc/pg/f.yaml");
     EXPECT_FALSE(load(kSimple + kServe + "profiles_dir: ../x", files, problems));
     EXPECT_THAT(problems.text(), HasSubstr("cannot list the directory /etc/x"));
+}
+
+TEST(ConfigLoad, ARelativeFileIsBesideTheConfigurationFile) {
+    const tls::Issued ca = tls::issue_ca("CA", {0, 1});
+    const tls::Issued gateway = tls::issue_server(ca, {"gateway"}, {0, 1});
+    for (const std::string file : {"/etc/pg/f.yaml", "f.yaml", "/dev/stdin"}) {
+        const std::string folder = file.starts_with("/etc") ? "/etc/pg/" : "";
+        const MemoryFiles files({{folder + "ops", "token-0123456789ab"},
+                                 {folder + "tls/g.crt", gateway.certificate},
+                                 {folder + "tls/g.key", gateway.key}});
+        const Config config = load_valid(
+            kSimple + kServe +
+                "http: {tokens: [{name: ops, role: viewer, file: ops}],\n"
+                "  tls: {certificate: tls/g.crt, key: tls/g.key}}\n"
+                "mqtt: {broker: \"mqtts://b:8883\", username: x, password_file: ops, ca: "
+                "tls/g.crt}\n",
+            files, file);
+        EXPECT_EQ(config.http->tls->key, folder + "tls/g.key");
+        EXPECT_EQ(config.mqtt->password, "token-0123456789ab");
+    }
 }
 
 TEST(ConfigLoad, NothingIsReturnedWhenAnythingIsWrong) {
