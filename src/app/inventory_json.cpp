@@ -22,7 +22,7 @@ namespace panelgate::app {
 namespace {
 
 namespace json = boost::json;
-using Kind = yaml::KeyShape::Kind;
+using KeyKind = yaml::KeyShape::Kind;
 
 /// Whole milliseconds as an integer.
 json::value milliseconds(Duration duration) {
@@ -53,21 +53,21 @@ json::value list_json(const std::string& text, const yaml::KeyShape& key) {
 json::value value_json(const std::string& value, const yaml::KeyShape* key) {
     if (key == nullptr) return json::value(value);
     switch (key->kind) {
-        case Kind::integer:
+        case KeyKind::integer:
             return number<std::int64_t>(value);
-        case Kind::number:
+        case KeyKind::number:
             return number<double>(value);
-        case Kind::boolean:
+        case KeyKind::boolean:
             return value == "true";
-        case Kind::duration: {
+        case KeyKind::duration: {
             const auto duration = yaml::parse_duration(value);
             return duration ? milliseconds(*duration) : json::value(value);
         }
-        case Kind::list:
+        case KeyKind::list:
             return list_json(value, *key);
-        case Kind::text:
-        case Kind::word:
-        case Kind::map:
+        case KeyKind::text:
+        case KeyKind::word:
+        case KeyKind::map:
             break;
     }
     return json::value(value);
@@ -102,7 +102,7 @@ json::object object_of(const SettingTree& tree) {
     for (const config::Setting* setting : tree.settings) {
         if (setting->secret || !setting->applies || setting->value.empty()) continue;
         const yaml::KeyShape* key = config::describe().of(*setting);
-        const bool is_time = key != nullptr && key->kind == Kind::duration;
+        const bool is_time = key != nullptr && key->kind == KeyKind::duration;
         made[std::string(setting->key()) + (is_time ? "_ms" : "")] =
             value_json(setting->value, key);
     }

@@ -294,9 +294,9 @@ std::string name_of(std::string_view notation) {
 }
 
 bool is_clock(const profile::PanelProfile& profile, const profile::Area& area) {
-    using Kind = profile::Simulation::Motion::Kind;
+    using MotionKind = profile::Simulation::Motion::Kind;
     return std::ranges::any_of(profile.simulation.motion, [&](const auto& motion) {
-        return motion.kind == Kind::clock && motion.area == area.name;
+        return motion.kind == MotionKind::clock && motion.area == area.name;
     });
 }
 
