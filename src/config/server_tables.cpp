@@ -106,7 +106,7 @@ const Keys<serial_server::Settings>& master_keys() {
     using serial_server::OnFailure;
     using serial_server::Settings;
     using tcp_server::BroadcastMode;
-    static constexpr Words<modbus::Framing, 2> kFramings{
+    static constexpr Words<modbus::Framing, 2> kMasterFramings{
         {{"rtu", modbus::Framing::rtu}, {"ascii", modbus::Framing::ascii}}};
     static constexpr Words<BroadcastMode, 2> kBroadcasts{
         {{"silent", BroadcastMode::silent}, {"deny", BroadcastMode::deny}}};
@@ -123,7 +123,7 @@ const Keys<serial_server::Settings>& master_keys() {
             .other("rs485", "Direction control of an RS-485 transceiver.")
             .change_needs(kOpensPort)
             .word(
-                "framing", [](auto& master) -> auto& { return master.access.framing; }, kFramings,
+                "framing", [](auto& master) -> auto& { return master.access.framing; }, kMasterFramings,
                 "Framing of the master.")
             .initially("rtu")
             .change_needs(kOpensPort)
