@@ -81,6 +81,9 @@ void load_own_roles(Loading& loading, MapReader& root) {
     // load_rules() says what is wrong with the list.
     const bool is_list = list != nullptr && list->kind == Node::Kind::sequence;
     if (!is_list || list->items.size() > access::Settings::kMaxRoles) return;
+    // So that the schema has the keys of a role.
+    root.map("access", kRoleExample);
+    in.sequence("roles", kRoleExample);
     for (const Node& item : list->items) load_own_role(loading, item);
 }
 

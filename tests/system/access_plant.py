@@ -5,6 +5,7 @@ import json
 import os
 import pathlib
 import re
+import select
 import socket
 import struct
 import tempfile
@@ -267,6 +268,8 @@ class Serial:
     def finish(self):
         data = b""
         while len(data) < 5 or harness.crc(data[:-2]) != data[-2:]:
+            if not select.select([self._master], [], [], harness.PATIENCE)[0]:
+                raise AssertionError(f"the master heard no more than {data.hex()}")
             data += os.read(self._master, 300)
         return data[1:-2]
 
@@ -346,6 +349,7 @@ def running(generator):
         with harness.configured(text) as program:
             program.log.wait_for("line up line=floor2")
             program.log.wait_for("line up line=floor1")
+            program.log.wait_for("serial master up")  # what came before is not heard
             plant = Plant(program, buses, master)
             stack.callback(plant.close)
             yield plant

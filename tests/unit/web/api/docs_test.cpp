@@ -191,8 +191,9 @@ TEST_F(Configuration, IsShownWithThePathsAndTheRoleOfWhoAsks) {
     const Reply mine = get("/api/v1/configuration");
     EXPECT_EQ(status_and(mine, "role version configuration"), R"(200 viewer 1.2.3 {"lines":[]})");
     const auto paths = mine.at("rest").as_array();
-    EXPECT_THAT(paths, ::testing::Contains(
-                           json_of(R"({"method":"GET","path":"/api/v1/lines","role":"viewer"})")));
+    EXPECT_THAT(paths,
+                ::testing::Contains(json_of(
+                    R"({"method":"GET","path":"/api/v1/lines","role":"viewer","right":"read"})")));
     const Reply theirs =
         ask("GET", "/api/v1/configuration", "", "Authorization: Bearer let-me\r\n");
     EXPECT_EQ(theirs.at("role"), "operator");
