@@ -125,6 +125,7 @@ http:
   tls: {certificate: /tls/a.crt, key: /tls/a.key, ca: /tls/a-ca.crt, client: optional}
 access:
   default: deny
+  roles: [{name: setter, rights: [read, write]}]
   rules:
     - {name: no, deny: [write], from: [10.1.0.0/16], roles: [operator], tokens: [ops],
        faces: [http], listeners: ["127.0.0.1:502"], stations: [a/1], functions: [6],
