@@ -113,7 +113,8 @@ struct Trail::State {
     void round(std::unique_lock<std::mutex>& lock);
     bool wait(std::unique_lock<std::mutex>& lock);
     void take_over();
-    void work();
+    void work(bool synchronizes);
+    bool is_sync_due() const;
     void anchor();
     void publish();
 
@@ -139,6 +140,7 @@ struct Trail::State {
     std::uint64_t failures = 0;
     std::uint64_t anchored = 0;
     WallTime anchored_at{};
+    WallTime synchronized_at{};
     std::thread thread;
 };
 
@@ -148,7 +150,11 @@ bool Trail::State::wait(std::unique_lock<std::mutex>& lock) {
         wake.wait_for(lock, kAgain, [&] { return stop; });
         return stop;
     }
-    wake.wait(lock, [&] { return stop || next || !pending.empty(); });
+    const auto is_wanted = [&] { return stop || next || !pending.empty(); };
+    if (!writer.is_unsynced())
+        wake.wait(lock, is_wanted);
+    else if (!wake.wait_for(lock, settings.sync, is_wanted))
+        return stop;
     wake.wait_for(lock, settings.flush,
                   [&] { return stop || next || pending.size() > settings.buffer / 2; });
     return stop;
@@ -157,7 +163,7 @@ bool Trail::State::wait(std::unique_lock<std::mutex>& lock) {
 /// Call with the lock. What was added before another file was wanted belongs to the one before, if
 /// that takes it.
 void Trail::State::take_over() {
-    const bool is_drained = of_last == 0 && writer.idle();
+    const bool is_drained = of_last == 0 && writer.idle() && !writer.is_unsynced();
     if (next && (is_drained || failing || next->file == settings.file)) {
         settings = *std::exchange(next, std::nullopt);
         writer.apply(settings);
@@ -190,14 +196,20 @@ void Trail::State::anchor() {
     hooks.tell({Notice::Kind::anchor, {}, last});
 }
 
-void Trail::State::work() {
+bool Trail::State::is_sync_due() const {
+    const WallTime time = hooks.wall();
+    return time - synchronized_at >= settings.sync || time < synchronized_at;
+}
+
+void Trail::State::work(bool synchronizes) {
     bool good = false;
     std::string why;
     try {
         if (!taken.empty() && settings.syslog) syslog_lost += syslog.send(taken);
         if (!taken.empty()) writer.take(taken);
         taken.clear();
-        good = writer.work();
+        good = writer.work(synchronizes);
+        if (synchronizes) synchronized_at = hooks.wall();
         if (!good) why = writer.why();
     } catch (const std::exception& error) {
         why = error.what();
@@ -209,7 +221,7 @@ void Trail::State::work() {
         hooks.tell({good ? Notice::Kind::recovered : Notice::Kind::failing, why, {}});
         if (!good) ++failures;
     }
-    if (good) anchor();
+    if (good && !writer.is_unsynced()) anchor();
 }
 
 void Trail::State::publish() {
@@ -223,8 +235,9 @@ void Trail::State::publish() {
 /// Takes what waits, and writes it without the lock.
 void Trail::State::round(std::unique_lock<std::mutex>& lock) {
     take_over();
+    const bool synchronizes = stop || next || failing || taken.empty() || is_sync_due();
     lock.unlock();
-    work();
+    work(synchronizes);
     lock.lock();
     publish();
 }
