@@ -198,6 +198,9 @@ std::string decided_before(const AskedRight& asked) {
     if (asked.station->listens) return "line '" + asked.line->name + "' is only listened to";
     if (writes && asked.station->read_only)
         return "station '" + asked.station->name + "' is read_only";
+    if (asked.act != Act::read && !asked.who.certificate_role.empty())
+        return "the role '" + asked.who.certificate_role +
+               "' of a certificate is no role that the gateway has, so it may only read";
     if (asked.who.face != Face::http || asked.who.own_role) return "";
     const Role needed = asked.act == Act::read    ? Role::viewer
                         : asked.act == Act::write ? Role::operator_

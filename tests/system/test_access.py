@@ -32,7 +32,7 @@ ILLEGAL = b"\x01"
 
 
 @contextlib.contextmanager
-def plant(rules=RULES, roles=None):
+def plant(rules=RULES, roles=None, **more):
     with tempfile.TemporaryDirectory() as folder:
         tokens = []
         for name, role in (roles or {"eye": "viewer", "lab": "engineer"}).items():
@@ -41,7 +41,7 @@ def plant(rules=RULES, roles=None):
             file.chmod(0o600)
             tokens.append(f"{{name: {name}, role: {role}, file: {file}}}")
         door = config.ADMIN + f", tokens: [{', '.join(tokens)}]"
-        text = config.gateway(config.line(stations=STATIONS.strip()), http=door, access=rules)
+        text = config.gateway(config.line(stations=STATIONS.strip()), http=door, access=rules, **more)
         file = pathlib.Path(folder) / "panelgate.yaml"
         file.write_text(text)
         with harness.Program("run", "-c", str(file)) as program:
@@ -136,6 +136,17 @@ class Viewer(unittest.TestCase):
                     for word in OTHERS:
                         self.assertNotIn(word, text.replace(path, ""), f"{verb} {path} -> {status}")
             self.assertGreater(asked, 30)
+
+    def test_a_relay_is_there_but_not_what_it_writes_to(self):
+        with plant(relays="[{from: press/UW100, to: oven/GDT200, every: 50ms}]") as program:
+            path = "/api/v1/lines/floor1/trace?last=500"
+            def clients(token):
+                return {one["client"] for one in json.loads(ask(program, "GET", path, token)[1])["transactions"]}
+            until(lambda: any("relay press/UW100 to oven/GDT200" in str(one) for one in clients(None)))
+            self.assertTrue(any(str(one).endswith("relay") for one in clients("eye")), clients("eye"))
+            seen = ask(program, "GET", path, "eye")[1]
+            self.assertIn("relay to station 31", seen)
+            self.assertNotIn("oven", seen)
 
     def test_lists_metrics_and_trace_have_the_one(self):
         with plant() as program:
@@ -307,6 +318,8 @@ class Explain(unittest.TestCase):
                     ("from=10.0.1.7 write press/mode", 1, "denied: rule 'no-writes'"),
                     ("read oven/GDT100", 0, "allowed: no rule matches, and the default is allow"),
                     ("role=viewer write oven/GDT100", 1, "denied: over http this needs the role operator"),
+                    ("role=nothing read press/UW102", 0, "allowed"),
+                    ("role=nothing write press/UW102", 1, "denied: the role 'nothing' of a certificate is no role"),
                     ("write nobody/UW1", 64, ""), ("role=operator press/UW102", 64, ""))
             for question, code, text in rows:
                 done = harness.run("check", "-c", file, "--explain", question)

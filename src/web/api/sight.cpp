@@ -20,6 +20,16 @@ using modbus::Span;
 /// Stands for stations that nobody has listed.
 constexpr std::uint8_t kUnlisted = 0;
 constexpr const char* kHidden = "hidden";
+constexpr std::string_view kRelay = "relay ";
+
+/// The name of a relay tells which other station it writes to.
+void hide_relay(std::string& text) {
+    const auto at = text.find(kRelay);
+    if (at == text.npos) return;
+    const auto behind = text.find(" to station ", at);
+    text.erase(at + kRelay.size() - 1,
+               behind == text.npos ? behind : behind - at - kRelay.size() + 1);
+}
 
 /// The rule that hides something of the station.
 std::string denying_rule(const LineEntry& line, const WhoRef& who, std::uint8_t id) {
@@ -124,14 +134,17 @@ void Sight::mask(const LineEntry& line, bus::TracePart& part) const {
     for (bus::TraceFrame& frame : part.frames) {
         const bool may_be_anybodys = direction_of(frame.kind) == FrameDirection::discarded;
         if (!may_be_anybodys && !frame.bytes.empty() && frame.bytes.front() != 0 &&
-            whole(line, frame.bytes.front()))
+            whole(line, frame.bytes.front())) {
+            hide_relay(frame.why);
             continue;
+        }
         frame.bytes.clear();
         frame.why.clear();
     }
     for (bus::TraceDecision& decision : part.decisions) decision.text = kHidden;
     for (bus::TraceTransaction& one : part.transactions) {
         std::erase_if(one.discarded, [](const auto&) { return true; });
+        hide_relay(one.client);
         if (one.station != 0 && whole(line, one.station)) continue;
         one.request.clear();
         one.reply.clear();
