@@ -123,8 +123,8 @@ const Keys<serial_server::Settings>& master_keys() {
             .other("rs485", "Direction control of an RS-485 transceiver.")
             .change_needs(kOpensPort)
             .word(
-                "framing", [](auto& master) -> auto& { return master.access.framing; }, kMasterFramings,
-                "Framing of the master.")
+                "framing", [](auto& master) -> auto& { return master.access.framing; },
+                kMasterFramings, "Framing of the master.")
             .initially("rtu")
             .change_needs(kOpensPort)
             .word(
