@@ -18,6 +18,10 @@ struct Free {
     void operator()(X509* certificate) const { X509_free(certificate); }
     void operator()(X509_CRL* list) const { X509_CRL_free(list); }
     void operator()(SSL* ssl) const { SSL_free(ssl); }
+    void operator()(X509_STORE* store) const { X509_STORE_free(store); }
+    void operator()(X509_STORE_CTX* judging) const { X509_STORE_CTX_free(judging); }
+    /// Not what is in it.
+    void operator()(STACK_OF(X509) * stack) const { sk_X509_free(stack); }
 };
 template <class T>
 using Owned = std::unique_ptr<T, Free>;

@@ -5,7 +5,6 @@
 #include <openssl/objects.h>
 #include <openssl/x509.h>
 #include <algorithm>
-#include <array>
 #include <memory>
 
 #include "native.hpp"
@@ -52,11 +51,7 @@ void read_role(const ASN1_OCTET_STRING* value, Peer& peer) {
 
 }  // namespace
 
-Role role_named(std::string_view word) {
-    constexpr std::array kRoles{Role::viewer, Role::operator_, Role::engineer, Role::admin};
-    const auto* const known = std::ranges::find(kRoles, word, [](Role one) { return label(one); });
-    return known == kRoles.end() ? Role::none : *known;
-}
+Role role_named(std::string_view word) { return standing_named(word, {}).role; }
 
 Peer peer_of(const x509_st* certificate) {
     Peer peer;

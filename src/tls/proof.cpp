@@ -2,15 +2,9 @@
 
 #include <openssl/err.h>
 #include <openssl/x509_vfy.h>
-#include <memory>
 
 namespace panelgate::tls {
 namespace {
-
-struct FreeChain {
-    void operator()(X509_STORE_CTX* judging) const { X509_STORE_CTX_free(judging); }
-    void operator()(STACK_OF(X509) * stack) const { sk_X509_free(stack); }
-};
 
 Owned<X509> kept(X509* certificate) {
     if (certificate != nullptr) X509_up_ref(certificate);
@@ -77,9 +71,9 @@ std::optional<Refusal> Proof::refusal_by(const Context& context) const {
 /// As SSL_do_handshake() does.
 std::optional<Refusal> Proof::judge_chain(const Context& context) const {
     SSL_CTX* const rules = context.native();
-    const std::unique_ptr<STACK_OF(X509), FreeChain> between(sk_X509_new_null());
+    const Owned<STACK_OF(X509)> between(sk_X509_new_null());
     for (const auto& one : others_) sk_X509_push(between.get(), one.get());
-    const std::unique_ptr<X509_STORE_CTX, FreeChain> judging(X509_STORE_CTX_new());
+    const Owned<X509_STORE_CTX> judging(X509_STORE_CTX_new());
     X509_STORE_CTX_init(judging.get(), SSL_CTX_get_cert_store(rules), certificate_.get(),
                         between.get());
     X509_STORE_CTX_set_default(judging.get(), "ssl_client");

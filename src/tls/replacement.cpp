@@ -21,10 +21,7 @@ using Certificates = std::vector<Owned<X509>>;
 using Lists = std::vector<Owned<X509_CRL>>;
 
 struct FreeMore {
-    void operator()(X509_STORE* store) const { X509_STORE_free(store); }
-    void operator()(X509_STORE_CTX* chain) const { X509_STORE_CTX_free(chain); }
     void operator()(GENERAL_NAMES* names) const { GENERAL_NAMES_free(names); }
-    void operator()(STACK_OF(X509) * stack) const { sk_X509_free(stack); }
     void operator()(BIGNUM* number) const { BN_free(number); }
     void operator()(char* text) const { OPENSSL_free(text); }
 };
@@ -39,11 +36,11 @@ bool is_valid(const X509* certificate, std::int64_t now) {
 /// True if one of these CAs has signed the first certificate, through those behind it.
 bool verifies(const Certificates& trusted, const Certificates& chain, std::int64_t now) {
     if (trusted.empty() || chain.empty()) return false;
-    const Kept<X509_STORE> store(X509_STORE_new());
+    const Owned<X509_STORE> store(X509_STORE_new());
     for (const auto& one : trusted) X509_STORE_add_cert(store.get(), one.get());
-    const Kept<STACK_OF(X509)> between(sk_X509_new_null());
+    const Owned<STACK_OF(X509)> between(sk_X509_new_null());
     for (const auto& one : chain) sk_X509_push(between.get(), one.get());
-    const Kept<X509_STORE_CTX> judging(X509_STORE_CTX_new());
+    const Owned<X509_STORE_CTX> judging(X509_STORE_CTX_new());
     X509_STORE_CTX_init(judging.get(), store.get(), chain.front().get(), between.get());
     X509_VERIFY_PARAM* const how = X509_STORE_CTX_get0_param(judging.get());
     X509_VERIFY_PARAM_set_time(how, static_cast<time_t>(now));

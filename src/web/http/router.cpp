@@ -159,10 +159,6 @@ bool is_foreign_form(const HttpRequest& request) {
     return !header(request, "origin").empty() && !is_json(header(request, "content-type"));
 }
 
-}  // namespace
-
-namespace {
-
 /// Default roles have what the least one has that is needed; others have what they list.
 bool suffices(const Standing& standing, Role needed, Right right) {
     return standing.own ? standing.may(right) : standing.role >= needed;

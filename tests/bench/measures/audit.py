@@ -86,9 +86,13 @@ def measure_line(run, line, case, turns, seconds):
         yield Row(SHARE, case, subject.name, figures.quantile(shares, 0.5), "", {"turns": turns})
 
 
-def measure(run):
+def on_both_lines(run, measure_line):
     turns, seconds = (4, 2) if run.quick else (12, 4)
     with rig.TcpLine(run.tools) as line:
         yield from measure_line(run, line, UNPACED, turns, seconds)
     with tempfile.TemporaryDirectory() as folder, rig.LoggedLine(run.tools, folder, 115200) as line:
         yield from measure_line(run, line, PACED, turns, 2 * seconds)
+
+
+def measure(run):
+    yield from on_both_lines(run, measure_line)

@@ -3,15 +3,14 @@ clients and line, in turn. All rules name items that are not asked for, but the 
 import pathlib
 import tempfile
 
-from measures import audit, figures, rig
+from measures import audit, figures
 import config  # noqa: E402  (rig puts tests/system into the path)
 from measures.figures import Bar, Row
 
 RULES = 200
 SHARE = "CPU of 200 rules, share of a write"
 WITH_AUDIT = "CPU of 200 rules and the audit, share of a write"
-UNPACED, PACED = "unpaced tcp://", "115200"
-BARS = [Bar(SHARE, {PACED}, most=0.03), Bar(WITH_AUDIT, {PACED}, most=0.03)]
+BARS = [Bar(SHARE, {audit.PACED}, most=0.03), Bar(WITH_AUDIT, {audit.PACED}, most=0.03)]
 
 
 def rules():
@@ -45,8 +44,4 @@ def measure_line(run, line, case, turns, seconds):
 
 
 def measure(run):
-    turns, seconds = (4, 2) if run.quick else (12, 4)
-    with rig.TcpLine(run.tools) as line:
-        yield from measure_line(run, line, UNPACED, turns, seconds)
-    with tempfile.TemporaryDirectory() as folder, rig.LoggedLine(run.tools, folder, 115200) as line:
-        yield from measure_line(run, line, PACED, turns, 2 * seconds)
+    yield from audit.on_both_lines(run, measure_line)
