@@ -54,7 +54,7 @@ bool has_same_right(const Caller& caller, const Settings& before, const Settings
     const auto was = in(before);
     const auto is = in(now);
     return was != before.tokens.end() && is != now.tokens.end() && was->hash == is->hash &&
-           was->role == is->role;
+           was->standing == is->standing;
 }
 
 }  // namespace

@@ -156,20 +156,53 @@ constexpr const char* kWords =
     "a/2 floor1/20 /run/secrets/other /profiles /tls/b.crt /tls/b.key /tls/b-ca.crt /tls/b.crl "
     "optional TLSv1.3 read two mqtt coils 127.0.0.1:503 allow 20MiB continue 2028-01-31 ";
 
-/// Alternative values, likely ones first.
-std::vector<std::string> others(const yaml::Node& value) {
-    const std::string& now = value.scalar;
-    std::vector<std::string> all{now == "true" ? "false" : "true", "1" + now, now + "1"};
-    std::istringstream words(kWords);
-    for (std::string word; words >> word;) all.push_back(word);
-    std::erase(all, now);
-    return all;
-}
-
 struct Leaf {
     std::string key;  ///< "lines/stations/id": without list indices
     yaml::Node* value;
 };
+
+/// "10.0.0.0/8" is "0.0.0.0/0", and "20ms" is "0a": what looks alike is likely to be accepted.
+std::string look_of(const std::string& text) {
+    std::string look;
+    for (const char c : text) {
+        const char sign = c >= '0' && c <= '9'                     ? '0'
+                          : (c | 0x20) >= 'a' && (c | 0x20) <= 'z' ? 'a'
+                                                                   : c;
+        if (look.empty() || look.back() != sign) look += sign;
+    }
+    return look;
+}
+
+/// What the table says that a key may be called.
+const std::vector<std::string>& words_of(const std::string& key) {
+    static const auto kWordsOf = [] {
+        std::map<std::string, std::vector<std::string>> all;
+        for (const yaml::KeyShape& shape : config::describe().keys) all[shape.path] = shape.words;
+        return all;
+    }();
+    static const std::vector<std::string> kNone;
+    const auto found = kWordsOf.find(key);
+    return found == kWordsOf.end() ? kNone : found->second;
+}
+
+/// Alternative values, likely ones first: each that is not accepted costs a load.
+std::vector<std::string> others(const Leaf& leaf) {
+    const std::string& now = leaf.value->scalar;
+    std::vector<std::string> all = words_of(leaf.key);
+    std::vector<std::string> unlike;
+    const std::string look = look_of(now);
+    const auto add = [&](const std::string& word) {
+        (look_of(word) == look ? all : unlike).push_back(word);
+    };
+    add(now == "true" ? "false" : "true");
+    add("1" + now);
+    add(now + "1");
+    std::istringstream words(kWords);
+    for (std::string word; words >> word;) add(word);
+    all.insert(all.end(), unlike.begin(), unlike.end());
+    std::erase(all, now);
+    return all;
+}
 
 /// Templates and merges show by their effect.
 void find_leaves(yaml::Node& node, const std::string& key, std::vector<Leaf>& leaves) {
@@ -215,7 +248,7 @@ bool makes_a_difference(const yaml::Node& tree, const Leaf& leaf, const config::
     yaml::Node& value = *leaf.value;
     const yaml::Node kept = value;
     bool differs = false;
-    for (const std::string& other : others(kept)) {
+    for (const std::string& other : others(leaf)) {
         value.scalar = other;
         const auto after = load(yaml_text(tree));
         differs = after && !differences(before, *after).empty();
