@@ -87,7 +87,7 @@ MapReader::MapReader(const Node& node, Problems& problems, std::string what,
 }
 
 const Node* MapReader::find(std::string_view key) {
-    if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.emplace_back(key);
+    known_.emplace_back(key);
     return node_->find(key);
 }
 

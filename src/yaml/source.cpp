@@ -93,6 +93,7 @@ Source::Source(std::string all) : text_(std::move(all)), lines_{0} {
 }
 
 std::size_t Source::characters(std::size_t from, std::size_t to) const {
+    if (inside_.back() == 0) return to - from;  // ASCII alone
     const auto inside_before = [this](std::size_t at) {
         const std::size_t stride = at / kStride;
         return inside_[stride] + count_inside(text().substr(stride * kStride, at % kStride));
@@ -109,7 +110,10 @@ Mark Source::mark(std::size_t offset) const {
 
 Mark Source::mark(int line, int column) const {
     if (line < 0 || static_cast<std::size_t>(line) >= lines_.size()) return mark(text_.size());
-    return mark(lines_[static_cast<std::size_t>(line)] + static_cast<std::size_t>(column));
+    const std::size_t begin = lines_[static_cast<std::size_t>(line)];
+    const std::size_t at = begin + static_cast<std::size_t>(column);
+    if (at > text_.size()) return mark(at);
+    return {line + 1, static_cast<int>(characters(begin, at)) + 1};
 }
 
 std::string_view Source::line(int number) const {
