@@ -52,7 +52,10 @@ class SettingWriter {
         : settings_(&settings), map_(std::make_shared<const SettingMap>(std::move(map))) {}
 
     static std::string joined(const std::string& path, std::string_view key) {
-        return path.empty() ? std::string(key) : path + '/' + std::string(key);
+        std::string made;
+        made.reserve(path.size() + 1 + key.size());
+        if (!path.empty()) made.append(path).append(1, '/');
+        return made.append(key);
     }
     SettingWriter with_entry() const {
         settings_->push_back({map_->path, "", false, {}, true, map_, {}});
