@@ -34,6 +34,15 @@ std::string who_members(const Who& who) {
     return std::string(record.body().substr(begin));
 }
 
+/// Where it is, as members of a record.
+std::string place_members(const Station& station) {
+    Composer record;
+    record.begin({}, Kind::write);
+    const std::size_t begin = record.body().size();
+    record.text("line", station.line).text("station", station.name).number("id", station.id);
+    return std::string(record.body().substr(begin));
+}
+
 /// How a write ended, for somebody who asks whether the panel has changed.
 std::string_view outcome_of(const bus::WriteEnd& end) {
     if (end.outcome == Outcome::refused) return "refused";
@@ -196,6 +205,7 @@ void AuditBook::show(std::shared_ptr<const Snapshot> snapshot) {
     for (const Station& station : snapshot->plant.stations()) {
         Known& known = next[station.line][station.id];
         known.station = &station;
+        known.members = place_members(station);
         if (const Known* before = find(station.line, station.id)) known.written = before->written;
     }
     known_ = std::move(next);
@@ -252,9 +262,10 @@ void AuditBook::write(const std::string& line, const bus::WriteEnd& end) {
 void AuditBook::add_write(const std::string& line, const bus::WriteEnd& end, Known* known) {
     Composer& record = begin(Kind::write);
     add_who(end.who);
-    record.text("line", line);
-    if (known != nullptr) record.text("station", known->station->name);
-    record.number("id", end.station);
+    if (known != nullptr)
+        record.members(known->members);
+    else
+        record.text("line", line).number("id", end.station);
     if (end.items) record.text("at", place_of(known, *end.items));
     if (!end.pdu.empty()) record.number("function", end.pdu[0]);
     if (end.items) {

@@ -109,6 +109,7 @@ class AuditBook {
     /// A station as records name it.
     struct Known {
         const Station* station = nullptr;
+        std::string members{};  ///< of a record, that tell where it is
         std::unordered_map<std::uint32_t, std::string> notations{};  ///< by table and address
         std::optional<TimePoint> written{};  ///< the last write that may have had an effect
     };

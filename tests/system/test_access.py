@@ -317,6 +317,18 @@ class OwnRoles(unittest.TestCase):
                 self.assertNotIn("WU105", said)
             self.assertIn("WU105", ask(program, "GET", "/api/v1/reload")[1])
 
+    def test_a_stream_ends_when_its_role_may_no_longer_read(self):
+        with plant(OWN_ROLES, roles={"caller": "caller"}) as program:
+            url = program.url("/api/v1/events")
+            command = ["curl", "-sN", "--max-time", str(harness.PATIENCE), "-H", "Authorization: Bearer token-of-caller-0123456789", url]
+            with subprocess.Popen(command, stdout=subprocess.PIPE) as stream:
+                self.assertTrue(stream.stdout.readline())
+                # The least default role that has all its rights is the same.
+                program.file.write_text(program.file.read_text().replace("rights: [read, raw]", "rights: [raw]"))
+                self.assertEqual(ask(program, "POST", "/api/v1/reload")[0], 200)
+                stream.stdout.read()
+                self.assertNotEqual(stream.wait(harness.PATIENCE), 28, "it was not ended, but its time was over")
+
     def test_a_rollback_says_that_a_role_of_the_same_name_has_more_rights(self):
         with plant(OWN_ROLES, roles={"keeper": "keeper"}) as program:
             text = program.file.read_text()

@@ -17,12 +17,13 @@ CPU = "CPU us a transaction"
 SHARE = "CPU of 200 rules and the audit, share"
 USED = "utilisation that 200 rules and the audit cost"
 BAUD, RULES, IN_FLIGHT, READS = 115200, 200, 2, 10
+PLACES = 5  # that are written: each reload makes anew what is kept of a place, and here there is one each second
 MIX, WRITES = "1 write to 9 reads", "writes alone"
 CASES = {MIX: 10, WRITES: 1}  # of so many requests one is a write
 MOST_CPU, MOST_USED = 0.03, 0.002
 BARS = [Bar(SHARE, set(CASES), most=MOST_CPU), Bar(USED, set(CASES), most=MOST_USED)]
 BARE, LADEN = "without", "with 200 rules and the audit"
-PAIRS, MOST_PAIRS, WINDOW, SETTLED = 60, 300, 1.0, 0.3
+PAIRS, MOST_PAIRS, WINDOW, SETTLED = 60, 300, 1.0, 0.5
 
 
 class Asking(threading.Thread):
@@ -35,7 +36,7 @@ class Asking(threading.Thread):
 
     def request(self, number):
         if number % self.every == 0:
-            return rig.harness.write_register(number % 100, number % 65536)
+            return rig.harness.write_register(number // self.every % PLACES, number % 65536)
         return rig.harness.read_registers(number * 37 % 900, READS)
 
     def run(self):

@@ -187,7 +187,7 @@ TEST(Weaker, ARoleOfTheSameNameThatHasMoreRights) {
                "access: {roles: [{name: maint, rights: [" + list + "]}]}\n";
     };
     EXPECT_EQ(told(rights, "read", "read, raw"),
-              "http: anonymous maint has more rights, http: token a: role maint has more rights, "
+              "http: anonymous maint has more rights; http: token a: role maint has more rights; "
               "access: role maint has more rights");
 }
 
