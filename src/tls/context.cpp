@@ -3,11 +3,12 @@
 #include <openssl/err.h>
 #include <openssl/ssl.h>
 #include <openssl/x509_vfy.h>
-#include <set>
+#include <algorithm>
 #include <string>
 #include <utility>
 
 #include "native.hpp"
+#include "proof.hpp"
 
 namespace panelgate::tls {
 namespace {
@@ -22,8 +23,8 @@ constexpr const char* kSuites13 =
     "TLS_AES_128_GCM_SHA256:TLS_AES_256_GCM_SHA384:TLS_CHACHA20_POLY1305_SHA256";
 constexpr const char* kGroups = "X25519:P-256:P-384";
 
-/// A list that is overdue still says who is revoked: its age locks nobody out. Leaves the name of
-/// whoever is refused for the log, where SSL_set_app_data() says.
+/// A list that is overdue still says who is revoked: its age locks nobody out. Leaves for the
+/// log whose certificate is refused, where SSL_set_app_data() says.
 int judge_chain(int good, X509_STORE_CTX* chain) {
     if (good != 0) return good;
     const int why = X509_STORE_CTX_get_error(chain);
@@ -34,10 +35,23 @@ int judge_chain(int good, X509_STORE_CTX* chain) {
     const auto* const ssl = static_cast<const SSL*>(
         X509_STORE_CTX_get_ex_data(chain, SSL_get_ex_data_X509_STORE_CTX_idx()));
     if (ssl == nullptr) return 0;  // not in a handshake
-    auto* const subject = static_cast<std::string*>(SSL_get_app_data(ssl));
-    const X509* const judged = X509_STORE_CTX_get_current_cert(chain);
-    if (subject != nullptr && judged != nullptr) *subject = subject_of(judged);
+    auto* const refused = static_cast<std::string*>(SSL_get_app_data(ssl));
+    if (refused != nullptr) *refused = blamed(chain);
     return 0;
+}
+
+/// CAs may have the same name: only those lists count that the CA in the chain has signed.
+STACK_OF(X509_CRL) * lists_of_ca(const X509_STORE_CTX* judging, const X509_NAME* name) {
+    STACK_OF(X509_CRL)* const found = X509_STORE_CTX_get1_crls(judging, name);
+    const STACK_OF(X509)* const chain = X509_STORE_CTX_get0_chain(judging);
+    const int depth = X509_STORE_CTX_get_error_depth(judging);
+    const X509* const ca = sk_X509_value(chain, std::min(depth + 1, sk_X509_num(chain) - 1));
+    for (int i = sk_X509_CRL_num(found) - 1; ca != nullptr && i >= 0; --i) {
+        if (X509_CRL_verify(sk_X509_CRL_value(found, i), X509_get0_pubkey(ca)) == 1) continue;
+        X509_CRL_free(sk_X509_CRL_delete(found, i));
+    }
+    ERR_clear_error();
+    return found;
 }
 
 /// A file that is being written holds the first objects only.
@@ -163,17 +177,12 @@ void Context::use_crl(const Settings& settings) {
                                   "(-----BEGIN X509 CRL-----)");
     check_whole("crl", settings.crl, settings.material.crl, "CRL", lists.size());
     X509_STORE* const store = SSL_CTX_get_cert_store(context_.get());
-    std::set<std::string> issuers;
-    for (const auto& list : lists) {
-        X509_STORE_add_crl(store, list.get());
-        char* const name = X509_NAME_oneline(X509_CRL_get_issuer(list.get()), nullptr, 0);
-        issuers.insert(name);
-        OPENSSL_free(name);
-    }
+    for (const auto& list : lists) X509_STORE_add_crl(store, list.get());
     unsigned long flags = X509_V_FLAG_CRL_CHECK;
-    if (issuers.size() >= certificates_of(settings.material.ca).size())
+    if (without_list(certificates_of(settings.material.ca), lists).empty())
         flags |= X509_V_FLAG_CRL_CHECK_ALL;
     X509_STORE_set_flags(store, flags);
+    X509_STORE_set_lookup_crls(store, lists_of_ca);
 }
 
 }  // namespace panelgate::tls
