@@ -4,7 +4,10 @@
 #include <openssl/ssl.h>
 #include <openssl/x509_vfy.h>
 #include <algorithm>
+#include <array>
+#include <limits>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "native.hpp"
@@ -61,6 +64,26 @@ void check_whole(const char* key, const std::string& file, std::string_view cont
         throw Unusable(key, file +
                                 " is damaged or cut off: not all that it holds can be read; "
                                 "copy it again, and under its name in one step (mv)");
+}
+
+/// RFC 8446 4.2.3: what clients offer.
+bool is_spoken(const EVP_PKEY* key) {
+    switch (EVP_PKEY_get_base_id(key)) {
+        case EVP_PKEY_RSA:
+        case EVP_PKEY_RSA_PSS:
+        case EVP_PKEY_ED25519:
+        case EVP_PKEY_ED448:
+            return true;
+        case EVP_PKEY_EC:
+            break;
+        default:
+            return false;
+    }
+    std::array<char, 32> curve{};
+    std::size_t size = 0;
+    if (EVP_PKEY_get_group_name(key, curve.data(), curve.size(), &size) != 1) return false;
+    constexpr std::array<std::string_view, 3> kSpoken{"prime256v1", "secp384r1", "secp521r1"};
+    return std::ranges::count(kSpoken, std::string_view(curve.data(), size)) > 0;
 }
 
 std::string last_reason() {
@@ -130,7 +153,9 @@ void Context::use_certificate(const Settings& settings) {
                                           "more, and SHA-256");
     for (std::size_t i = 1; i < chain.size(); ++i)
         SSL_CTX_add1_chain_cert(context_.get(), chain[i].get());
-    expiry_ = seconds_of(X509_get0_notAfter(chain.front().get()));
+    expiry_ = std::numeric_limits<std::int64_t>::max();
+    for (const auto& one : chain)
+        expiry_ = std::min(expiry_, seconds_of(X509_get0_notAfter(one.get())));
 }
 
 void Context::use_key(const Settings& settings) {
@@ -146,6 +171,11 @@ void Context::use_key(const Settings& settings) {
                                   " does not belong to the certificate in " + settings.certificate +
                                   "; give the key that it was made with");
     }
+    if (!is_spoken(key.get()))
+        throw Unusable("key",
+                       "the key in " + settings.key +
+                           " is of a kind that TLS clients do not speak; make one with ECDSA "
+                           "P-256, or RSA of 2048 bits or more");
     if (SSL_CTX_use_PrivateKey(context_.get(), key.get()) != 1)
         throw Unusable("key", "the key in " + settings.key + " cannot be used" + last_reason() +
                                   "; make one with ECDSA P-256, or RSA of 2048 bits or more");

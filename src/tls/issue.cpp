@@ -81,7 +81,8 @@ class Draft {
         check(certificate_ != nullptr, "no memory");
         X509_set_version(get(), X509_VERSION_3);
         set_serial(X509_get_serialNumber(get()));
-        const std::int64_t end = std::min(validity.now + validity.days * kDay, latest);
+        const std::int64_t end =
+            std::min(validity.now - kHour + validity.days * kDay - 1, latest);  // both ends count
         ASN1_TIME_set(X509_getm_notBefore(get()), static_cast<time_t>(validity.now - kHour));
         ASN1_TIME_set(X509_getm_notAfter(get()), static_cast<time_t>(end));
         const auto* const text = reinterpret_cast<const unsigned char*>(name.c_str());

@@ -37,6 +37,12 @@ class Judge {
         X509* const own = chain.front().get();
         const std::string what = "the certificate in " + settings_.certificate;
         judge_dates(own, what, "clients refuse it");
+        for (const auto& one : chain)
+            if (one != chain.front())
+                judge_dates(one.get(),
+                            "the certificate " + subject_of(one.get()) +
+                                ", which stands behind the gateway's in " + settings_.certificate,
+                            "clients refuse the gateway's");
         if ((X509_get_extended_key_usage(own) & XKU_SSL_SERVER) == 0)
             say(what + " is not one of a server (extended key usage): clients refuse it");
         judge_names(own, what, names);

@@ -117,8 +117,8 @@ class Comparison {
     std::string judge() const {
         if (used_chain_.empty() || fresh_chain_.empty()) return "";
         for (const auto part :
-             {&Comparison::judge_dates, &Comparison::judge_names, &Comparison::judge_ca_of_pair,
-              &Comparison::judge_ca, &Comparison::judge_lists})
+             {&Comparison::judge_dates, &Comparison::judge_kind, &Comparison::judge_names,
+              &Comparison::judge_ca_of_pair, &Comparison::judge_ca, &Comparison::judge_lists})
             if (std::string why = (this->*part)(); !why.empty()) return why;
         return "";
     }
@@ -135,6 +135,22 @@ class Comparison {
         if (end <= now_) return pair() + " has expired on " + date_text(end);
         return pair() + " is valid from " + date_text(seconds_of(X509_get0_notBefore(own()))) +
                " only; compare the clock of the machine that made it";
+    }
+    /// Not all that is worse: what no client takes.
+    std::string judge_kind() const {
+        if (!is_pair_new() || !is_used_one_good()) return "";
+        const auto serves = [](const auto& one) {
+            return X509_check_purpose(one.get(), X509_PURPOSE_SSL_SERVER, 0) == 1;
+        };
+        if (serves(used_chain_.front()) && !serves(fresh_chain_.front()))
+            return pair() + " is not one of a server (key usage): every client would refuse it";
+        const auto valid = [&](const auto& one) { return is_valid(one.get(), now_); };
+        if (!std::ranges::all_of(used_chain_, valid)) return "";
+        const auto bad = std::ranges::find_if_not(fresh_chain_, valid);
+        if (bad == fresh_chain_.end()) return "";
+        return "the certificate " + subject_of(bad->get()) +
+               ", which stands behind the gateway's in " + fresh_.certificate +
+               ", is not valid now: every client would refuse the gateway's";
     }
     std::string judge_names() const {
         if (!noticed_ || !is_pair_new() || !is_used_one_good()) return "";

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import ssl
+import subprocess
 import unittest
 
 import harness
@@ -77,6 +78,14 @@ class Noticed(unittest.TestCase):
         self.assertEqual(reload(self.made, self.program).returncode, 0)
         self.assertNotEqual(shown(self.program), self.good)
         self.program.log.wait_for("certificate renewed .*subject=.CN=other.plant. issuer=.CN=Plant CA")
+
+    def test_a_key_on_a_curve_that_clients_do_not_speak(self):
+        for command in (["ecparam", "-genkey", "-name", "secp256k1", "-out", self.made.path("odd.key")],
+                        ["req", "-new", "-x509", "-key", self.made.path("odd.key"), "-subj", "/CN=localhost",
+                         "-out", self.made.path("odd.crt")]):
+            subprocess.run(["openssl", *command], check=True, capture_output=True)
+        self.put_pair(self.made, "odd")
+        self.kept("localhost.key is of a kind that TLS clients do not speak")
 
     def test_a_pair_of_another_ca(self):
         self.put_pair(self.other)
