@@ -140,6 +140,20 @@ class Asking(unittest.TestCase):
             done = harness.run("health", *at, "--ca", "/nowhere.crt")
             self.assertIn("cannot read --ca /nowhere.crt", done.stderr)
 
+    def test_a_name_is_looked_up_and_must_be_the_certificates(self):
+        with plant() as made:
+            made.cert("new-server", "127.0.0.1")
+            by_address = made.tls().replace("localhost.", "127.0.0.1.")
+            for tls, address, name in ((made.tls(), 0, 0), (by_address, 0, 1)):
+                with served(made, http=tls) as program:
+                    for host, code in (("127.0.0.1", address), ("localhost", name)):
+                        done = harness.run("health", "-c", "/nowhere.yaml", "--http",
+                                           f"https://{host}:{program.http_port()}",
+                                           "--ca", made.path("ca.crt"))
+                        self.assertEqual(done.returncode, code, (host, done.stderr))
+                        if code:
+                            self.assertRegex(done.stderr, "(?i)hostname mismatch")
+
     def test_who_is_shut_out_by_tls_is_told_of_tls(self):
         with plant() as made, served(made, http=made.tls("required")) as program:
             at = ["-c", made.path("panelgate.yaml"), "--http", f"127.0.0.1:{program.http_port()}"]
