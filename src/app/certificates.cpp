@@ -169,17 +169,35 @@ void CertificateWatch::follow(const config::Config& config) {
     const std::vector<Served> before = std::exchange(served_, served_by(config));
     for (const Served& now : served_) {
         const auto was = std::ranges::find(before, now.listener, &Served::listener);
-        if (was != before.end() && was->settings.material != now.settings.material)
-            log_renewed(now.listener, was->settings.material, now.settings.material);
+        if (was == before.end() || was->settings.material == now.settings.material) continue;
+        ++renewals_[now.listener].replaced;
+        log_renewed(now.listener, was->settings.material, now.settings.material);
     }
     seen_.assign(served_.size(), std::nullopt);
     missing_.assign(served_.size(), "");
     told_missing_.assign(served_.size(), false);
-    std::erase_if(refused_, [&](const auto& one) {
+    const auto is_gone = [&](const auto& one) {
         return std::ranges::find(served_, one.first, &Served::listener) == served_.end();
-    });
+    };
+    std::erase_if(refused_, is_gone);
+    std::erase_if(renewals_, is_gone);
     ++round_;
     if (idle && !served_.empty()) later();
+}
+
+void CertificateWatch::refused(const Served& files) {
+    refused_[files.listener] = files.settings.material;
+    ++renewals_[files.listener].kept;
+}
+
+std::map<std::string, tls::Renewals> CertificateWatch::renewals() const {
+    std::map<std::string, tls::Renewals> all;
+    for (const Served& one : served_) {
+        const auto count = renewals_.find(one.listener);
+        all[one.listener.substr(one.listener.find(' ') + 1)] =
+            count == renewals_.end() ? tls::Renewals{} : count->second;
+    }
+    return all;
 }
 
 void CertificateWatch::stop() { alarm_->cancel(); }
@@ -210,6 +228,7 @@ void CertificateWatch::judge(Look& look) {
             if (fresh.context) {
                 const tls::Material before = served.settings.material;
                 served.settings = fresh.settings;
+                ++renewals_[served.listener].replaced;
                 renew_(served, fresh.context);
                 log_renewed(served.listener, before, served.settings.material);
                 for (const std::string& doubt : fresh.doubts)
@@ -217,6 +236,7 @@ void CertificateWatch::judge(Look& look) {
                             {{"listener", served.listener}, {"warning", doubt}});
             } else if (std::exchange(refused_[served.listener], fresh.settings.material) !=
                        fresh.settings.material) {
+                ++renewals_[served.listener].kept;
                 rt::log(fresh.level, "certificate not renewed",
                         {{"listener", served.listener}, {"reason", fresh.why}});
             }

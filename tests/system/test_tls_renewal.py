@@ -58,6 +58,12 @@ class Noticed(unittest.TestCase):
         self.assertEqual(shown(self.program), self.good)
         self.assertEqual(get(self.program.http_port(), "/readyz", self.made.context("scada"))[0], 200)
         self.assertEqual(self.program.log.text().count("certificate not renewed"), 1)
+        self.assertEqual(self.renewals("kept"), 1)
+        self.assertEqual(self.renewals("replaced"), 0)
+
+    def renewals(self, outcome):
+        text = get(self.program.http_port(), "/metrics", self.made.context("scada"))[1]
+        return metric(self.program, text, "panelgate_certificate_renewals_total", outcome=outcome)
 
     def put_pair(self, source, name="localhost"):
         for end in ("key", "crt"):
@@ -133,6 +139,7 @@ class Noticed(unittest.TestCase):
             self.made.cert("new-server", "localhost", "127.0.0.1", "--force")
             self.program.log.wait_for("certificate renewed .*files=\"certificate, key\" subject=.CN=localhost. "
                                       "issuer=.CN=Plant CA. serial=.* valid_from=.* expires=", count)
+        self.assertEqual((self.renewals("replaced"), self.renewals("kept")), (7, 0))
 
 
 class TwoCas(unittest.TestCase):
