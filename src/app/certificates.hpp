@@ -61,10 +61,12 @@ class CertificateWatch {
 
   private:
     struct Look;
+    struct Fresh;
 
     void later();
     void look();
     void judge(Look& look);
+    void take_over(const Fresh& fresh);
     void tell_missing(std::size_t at, const std::string& file);
 
     rt::Clock& clock_;
