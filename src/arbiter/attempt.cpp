@@ -186,8 +186,6 @@ void Attempt::collect() {
     std::vector<Unused> parts = framer_.take_unused();
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const bool foreign = begins_with_request(parts[i].bytes, echo_.frame(), orders_);
-        if (foreign && parts[i].bytes[0] == group_.station)
-            foreign_requests_.on_heard({}, parts[i].bytes);
         if (std::ranges::equal(parts[i].bytes, echo_.frame())) on_echo_behind();
         const bool in_front = i + behind < parts.size();
         const bool damaged = parts[i].kind == Unused::Kind::damaged;
