@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -174,7 +175,13 @@ Heading heading_of(const SettingTree& tree) {
 class Writer {
   public:
     Writer(const config::Config& config, const std::vector<Setting>& part) : config_(&config) {
-        for (const Setting& setting : part) places_.emplace(setting.path, &setting);
+        const auto map_of = [](std::string_view path) { return path.substr(0, path.rfind('/')); };
+        std::set<std::string_view> owners;  // maps from which others inherit
+        for (const Setting& setting : part)
+            if (!setting.otherwise.empty()) owners.insert(map_of(setting.otherwise));
+        for (const Setting& setting : part)
+            if (!setting.map->in_list || owners.contains(setting.map->path))
+                places_.emplace(setting.path, &setting);
     }
 
     std::string text(const SettingTree& top) {
@@ -213,9 +220,10 @@ std::string Writer::rest_of(const SettingTree& tree, std::string_view told,
         if (!more.empty()) text += (text.empty() ? "" : ", ") + more;
     };
     for (const Setting* setting : tree.settings) {
-        const std::string key = above + std::string(setting->key());
         const bool is_set = !setting->secret && setting->applies && !setting->value.empty();
-        if (is_set && !is_told(key) && !is_default(*setting, find)) add(key + ' ' + setting->value);
+        if (!is_set || is_default(*setting, find)) continue;
+        const std::string key = above + std::string(setting->key());
+        if (!is_told(key)) add(key + ' ' + setting->value);
     }
     for (const auto& one : tree.below) {
         const std::string key = above + std::string(one->key());

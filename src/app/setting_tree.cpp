@@ -49,17 +49,21 @@ std::string_view SettingTree::name() const {
 SettingTree tree_of(const std::vector<config::Setting>& settings) {
     SettingTree top;
     Planting planting(top);
+    const SettingMap* map = nullptr;
+    SettingTree* node = nullptr;
     for (const config::Setting& setting : settings) {
-        SettingTree& node = planting.node(*setting.map);
-        if (!setting.is_entry()) node.settings.push_back(&setting);
+        if (node == nullptr || map != setting.map.get()) node = &planting.node(*setting.map);
+        map = setting.map.get();
+        if (!setting.is_entry()) node->settings.push_back(&setting);
     }
     return top;
 }
 
 bool is_default(const config::Setting& setting,
                 const std::function<const config::Setting*(std::string_view)>& find) {
-    if (const config::Setting* owner = find(setting.otherwise))
-        return owner->value == setting.value;
+    const config::Setting* owner = setting.otherwise.empty() ? nullptr : find(setting.otherwise);
+    if (owner != nullptr) return owner->value == setting.value;
+    if (setting.initial) return *setting.initial == setting.value;
     const yaml::KeyShape* key = config::describe().of(setting);
     return key != nullptr && !key->initial.empty() && key->initial == setting.value;
 }

@@ -147,12 +147,12 @@ class Keys {
     }
     void show(const SettingWriter& out, const V& of) const {
         for (const Row<S, V>& row : rows_)
-            if (row.shown) out.put(row.key, row.shown(of));
+            if (row.shown) out.put(row.key, row.shown(of), row.initial);
     }
     /// The same; each is inherited from `owner`.
     void show(const SettingWriter& out, const V& of, const SettingWriter& owner) const {
         for (const Row<S, V>& row : rows_)
-            if (row.shown) out.put(row.key, row.shown(of), owner);
+            if (row.shown) out.put(row.key, row.shown(of), owner, row.initial);
     }
 
   private:

@@ -19,8 +19,9 @@ using points::Type;
 using yaml::MapReader;
 using yaml::Node;
 
-template <class Fits>
-std::vector<std::string_view> words_of(const Fits& fits) {
+using Fits = bool (*)(Type);
+
+std::vector<std::string_view> words_of(Fits fits) {
     std::vector<std::string_view> words;
     for (const Type type : points::kTypes)
         if (fits(type)) words.push_back(label(type));
@@ -30,15 +31,28 @@ std::vector<std::string_view> words_of(const Fits& fits) {
 bool is_number(Type type) { return type != Type::boolean && type != Type::string; }
 bool is_of_registers(Type type) { return type != Type::boolean; }
 
-/// Reports keys that are not for the point's type; `what` is what they are for: "numbers".
-template <class Fits>
-void check_type(MapReader& in, const Point& point, std::initializer_list<std::string_view> keys,
-                const Fits& fits, const std::string& what) {
-    for (const std::string_view key : keys) {
-        in.belongs(key, "type", words_of(fits), true);
-        if (in.has(key) && !fits(point.type))
-            in.problem(key, std::string(key) + (key.ends_with('s') ? " are for " : " is for ") +
-                                what + ", not for type " + std::string(label(point.type)));
+/// Keys that are not for all types.
+struct OfTypes {
+    std::vector<std::string_view> keys;
+    Fits fits;
+    std::string_view what;  ///< what they are for
+    std::vector<std::string_view> types = words_of(fits);
+};
+
+/// Reports keys that are not for the point's type.
+void check_type(MapReader& in, const Point& point) {
+    static const std::array<OfTypes, 3> kOfTypes{
+        {{{"word_order"}, is_of_registers, "values of registers"},
+         {{"scale", "offset", "min", "max", "no_value"}, is_number, "numbers"},
+         {{"labels"}, points::is_integer, "integers"}}};
+    for (const OfTypes& of : kOfTypes) {
+        for (const std::string_view key : of.keys) {
+            in.belongs(key, "type", of.types, true);
+            if (in.has(key) && !of.fits(point.type))
+                in.problem(key, std::string(key) + (key.ends_with('s') ? " are for " : " is for ") +
+                                    std::string(of.what) + ", not for type " +
+                                    std::string(label(point.type)));
+        }
     }
 }
 
@@ -55,8 +69,8 @@ void load_type(MapReader& in, Point& point) {
     if (bit && bits) in.problem("bit", point.at + " is a bit already; remove bit");
     if (bit && !bits) point.bit = static_cast<unsigned>(*bit);
     point.type = bits || point.bit ? Type::boolean : Type::u16;
-    const auto words = words_of([](Type) { return true; });
-    if (const auto chosen = in.choice_index("type", words, order_hint)) {
+    static const std::vector<std::string_view> kWords = words_of([](Type) { return true; });
+    if (const auto chosen = in.choice_index("type", kWords, order_hint)) {
         const Type type = points::kTypes[*chosen];
         if (point.type == Type::boolean && type != Type::boolean) {
             in.problem("type", point.at + (bits ? " is a bit" : " with bit: is one bit") +
@@ -76,9 +90,7 @@ void load_type(MapReader& in, Point& point) {
         in.problem("length", "length is for type: string only");
     if (point.type == Type::string) point.length = static_cast<unsigned>(length.value_or(1));
     point_keys().read(in, point);
-    check_type(in, point, {"word_order"}, is_of_registers, "values of registers");
-    check_type(in, point, {"scale", "offset", "min", "max", "no_value"}, is_number, "numbers");
-    check_type(in, point, {"labels"}, points::is_integer, "integers");
+    check_type(in, point);
 }
 
 /// Reads a number; more digits than a double holds are a problem.

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
+#include <span>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -61,8 +62,9 @@ void show_line(const SettingWriter& top, const Line& line) {
     show_port(section, line.device);
     const bool is_ascii = line.device.serial.mode == SerialMode::ascii;
     const bool any_case = line.arbiter.ascii_digits == modbus::HexDigits::any_case;
-    section.below("serial").put("mode", is_ascii ? "ascii" : "rtu");
-    section.below("serial").put("ascii_lower_case", any_case ? "take" : "refuse");
+    const SettingWriter serial = section.below("serial");
+    serial.put("mode", is_ascii ? "ascii" : "rtu");
+    serial.put("ascii_lower_case", any_case ? "take" : "refuse");
     line_keys().show(section, line);
     show_timing(section.below("timing"), line.arbiter.unlisted, line.automatic_gap, line.think_time,
                 nullptr);
@@ -120,28 +122,29 @@ void show_servers(const SettingWriter& top, const Config& config) {
     }
 }
 
-/// The rules by which a key may not be beside a value of its map.
-std::vector<const yaml::KeyRule*> rules_of(const SettingMap& map) {
-    std::vector<const yaml::KeyRule*> all;
-    for (const yaml::KeyRule& rule : describe().rules)
-        if (!rule.needs && rule.map == map.keys) all.push_back(&rule);
-    return all;
+/// Of the settings of one map; nullptr if it has none of that name.
+Setting* named(std::span<Setting> map, std::string_view key) {
+    const auto found = std::ranges::find(map, key, &Setting::key);
+    return found == map.end() ? nullptr : &*found;
 }
 
-/// Finds what a file cannot have beside the values of its neighbours, which are shown before it.
+/// Finds what a file cannot have beside the values of its neighbours, which are shown together.
 void find_idle(std::vector<Setting>& all) {
-    std::unordered_map<std::string_view, std::string_view> values;
-    const SettingMap* map = nullptr;
-    std::vector<const yaml::KeyRule*> rules;
-    for (Setting& setting : all) {
-        values.emplace(setting.path, setting.value);
-        if (std::exchange(map, setting.map.get()) != setting.map.get()) rules = rules_of(*map);
-        for (const yaml::KeyRule* rule : rules) {
-            if (rule->key != setting.key()) continue;
-            const auto other = values.find(map->path + '/' + rule->other);
-            const bool is_free = other == values.end() ||
-                                 std::ranges::find(rule->words, other->second) != rule->words.end();
-            setting.applies = setting.applies && is_free;
+    std::map<std::string_view, std::vector<const yaml::KeyRule*>> rules;  // by map
+    for (const yaml::KeyRule& rule : describe().rules)
+        if (!rule.needs) rules[rule.map].push_back(&rule);
+    for (std::size_t first = 0, end = 0; first < all.size(); first = end) {
+        while (end < all.size() && all[end].map == all[first].map) ++end;
+        const auto own = rules.find(all[first].map->keys);
+        if (own == rules.end()) continue;
+        const std::span<Setting> map = std::span(all).subspan(first, end - first);
+        std::string_view asked;
+        const Setting* other = nullptr;
+        for (const yaml::KeyRule* rule : own->second) {
+            if (std::exchange(asked, rule->other) != rule->other) other = named(map, rule->other);
+            Setting* key = other == nullptr ? nullptr : named(map, rule->key);
+            if (key != nullptr && std::ranges::find(rule->words, other->value) == rule->words.end())
+                key->applies = false;
         }
     }
 }

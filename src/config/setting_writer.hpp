@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -16,10 +17,17 @@ class SettingWriter {
     explicit SettingWriter(std::vector<Setting>& settings)
         : settings_(&settings), map_(std::make_shared<const SettingMap>()) {}
 
-    void put(std::string_view key, std::string value) const { add(key, std::move(value)); }
+    /// `initial`: Row::initial.
+    void put(std::string_view key, std::string value,
+             std::optional<std::string_view> initial = {}) const {
+        add(key, std::move(value)).initial = initial;
+    }
     /// Inherited from the same key of `owner` unless given itself.
-    void put(std::string_view key, std::string value, const SettingWriter& owner) const {
-        add(key, std::move(value)).otherwise = joined(owner.map_->path, key);
+    void put(std::string_view key, std::string value, const SettingWriter& owner,
+             std::optional<std::string_view> initial = {}) const {
+        Setting& made = add(key, std::move(value));
+        made.initial = initial;
+        made.otherwise = joined(owner.map_->path, key);
     }
     void put_secret(std::string_view key, std::string value) const {
         add(key, std::move(value)).secret = true;
@@ -44,15 +52,18 @@ class SettingWriter {
         : settings_(&settings), map_(std::make_shared<const SettingMap>(std::move(map))) {}
 
     static std::string joined(const std::string& path, std::string_view key) {
-        return path.empty() ? std::string(key) : path + '/' + std::string(key);
+        std::string made;
+        made.reserve(path.size() + 1 + key.size());
+        if (!path.empty()) made.append(path).append(1, '/');
+        return made.append(key);
     }
     SettingWriter with_entry() const {
-        settings_->push_back({map_->path, "", false, {}, true, map_});
+        settings_->push_back({map_->path, "", false, {}, true, map_, {}});
         return *this;
     }
     Setting& add(std::string_view key, std::string value) const {
         return settings_->emplace_back(
-            Setting{joined(map_->path, key), std::move(value), false, {}, true, map_});
+            Setting{joined(map_->path, key), std::move(value), false, {}, true, map_, {}});
     }
 
     std::vector<Setting>* settings_;

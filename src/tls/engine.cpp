@@ -66,6 +66,13 @@ int Engine::read(char* into, int size) {
         }
         return static_cast<int>(given);
     }
+    if (ahead_taken_ < ahead_size_) {
+        const std::size_t given =
+            std::min(static_cast<std::size_t>(size), ahead_size_ - ahead_taken_);
+        std::memcpy(into, ahead_.data() + ahead_taken_, given);
+        ahead_taken_ += given;
+        return static_cast<int>(given);
+    }
     if (socket_ < 0) return -1;
     const auto got = ::recv(socket_, into, static_cast<std::size_t>(size), MSG_DONTWAIT);
     if (got < 0) return is_passing(errno) ? -1 : -2;
@@ -82,6 +89,10 @@ int Engine::write(const char* bytes, int size) {
         ::send(socket_, bytes, static_cast<std::size_t>(size), MSG_DONTWAIT | MSG_NOSIGNAL);
     if (sent < 0) return is_passing(errno) ? -1 : -2;
     return static_cast<int>(sent);
+}
+
+bool Engine::holds_input() const {
+    return taken < input.size() || ahead_taken_ < ahead_size_ || SSL_has_pending(ssl_.get()) == 1;
 }
 
 void Engine::create(SSL_CTX* context) {

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <openssl/ssl.h>
+#include <array>
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -36,6 +38,14 @@ class Engine {
     void use_socket(int socket) { socket_ = socket; }
     SSL* native() const { return ssl_.get(); }
 
+    /// True if something is here that SSL_read() has not given out: it is read before the socket.
+    bool holds_input() const;
+    /// Where the owner may put the socket's next bytes, while holds_input() is false or SSL_read()
+    /// wants more: whoever waits for them gets them by the same step. Larger records are read on
+    /// from the socket.
+    std::span<char> room() { return ahead_; }
+    void arrived(std::size_t size) { ahead_taken_ = 0, ahead_size_ = size; }
+
     // Not Bytes, whose pool is the loop's.
     std::string input;
     std::string output;
@@ -53,6 +63,9 @@ class Engine {
     std::shared_ptr<const Context> context_;
     Owned<SSL> ssl_;
     int socket_ = -1;
+    std::array<char, 1024> ahead_;  ///< a request's record, encrypted
+    std::size_t ahead_size_ = 0;
+    std::size_t ahead_taken_ = 0;
     bool ended_ = false;  ///< the socket's input
     Outcome outcome_ = Outcome::broken;
     std::string why_;

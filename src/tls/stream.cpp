@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <boost/asio/error.hpp>
 #include <cerrno>
+#include <span>
 
 #include "engine.hpp"
 #include "proof.hpp"
@@ -16,6 +17,15 @@ namespace panelgate::tls {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
+
+namespace {
+
+/// What others left would be taken for this connection's. Looking is cheaper than clearing.
+void forget_errors() {
+    if (ERR_peek_error() != 0) ERR_clear_error();
+}
+
+}  // namespace
 
 Stream::Stream(tcp::socket socket) : socket_(std::move(socket)), timer_(socket_.get_executor()) {
     error_code ignored;
@@ -34,11 +44,20 @@ std::shared_ptr<const Proof> Stream::proof() const {
     return engine_ ? std::make_shared<const Proof>(engine_->native()) : nullptr;
 }
 
+bool Stream::holds_input() const { return engine_->holds_input(); }
+
+asio::mutable_buffer Stream::room() {
+    const std::span<char> room = engine_->room();
+    return {room.data(), room.size()};
+}
+
+void Stream::arrived(std::size_t size) { engine_->arrived(size); }
+
 /// Of SSL_read, SSL_peek and SSL_write.
 Stream::Step Stream::step_of(int result) {
     if (result > 0) return {static_cast<std::size_t>(result), {}, Need::nothing};
     const int why = SSL_get_error(engine_->native(), result);
-    ERR_clear_error();
+    forget_errors();
     if (why == SSL_ERROR_WANT_READ) return {0, {}, Need::readable};
     if (why == SSL_ERROR_WANT_WRITE) return {0, {}, Need::writable};
     if (why == SSL_ERROR_ZERO_RETURN) return {0, asio::error::eof, Need::nothing};
@@ -48,7 +67,7 @@ Stream::Step Stream::step_of(int result) {
 Stream::Step Stream::read_secure(asio::mutable_buffer into) {
     if (!socket_.is_open()) return {0, asio::error::bad_descriptor, Need::nothing};
     if (into.size() == 0) return {};
-    ERR_clear_error();
+    forget_errors();
     constexpr std::size_t kMost = 1 << 20;
     return step_of(
         SSL_read(engine_->native(), into.data(), static_cast<int>(std::min(into.size(), kMost))));
@@ -57,7 +76,7 @@ Stream::Step Stream::read_secure(asio::mutable_buffer into) {
 Stream::Step Stream::write_secure(asio::const_buffer bytes) {
     if (!socket_.is_open()) return {0, asio::error::bad_descriptor, Need::nothing};
     if (bytes.size() == 0) return {};
-    ERR_clear_error();
+    forget_errors();
     constexpr std::size_t kMost = 1 << 20;
     return step_of(SSL_write(engine_->native(), bytes.data(),
                              static_cast<int>(std::min(bytes.size(), kMost))));
@@ -73,7 +92,7 @@ std::size_t Stream::write_some(asio::const_buffer bytes, error_code& error) {
 Stream::Input Stream::look() {
     char byte = 0;
     if (engine_) {
-        ERR_clear_error();
+        forget_errors();
         const Step step = step_of(SSL_peek(engine_->native(), &byte, 1));
         if (step.need != Need::nothing) return Input::none;
         if (step.error == asio::error::eof) return Input::end;
@@ -108,9 +127,9 @@ void Stream::expires_after(Duration patience) {
 void Stream::shutdown_send() {
     error_code ignored;
     if (engine_) {
-        ERR_clear_error();
+        forget_errors();
         SSL_shutdown(engine_->native());
-        ERR_clear_error();
+        forget_errors();
     }
     socket_.shutdown(tcp::socket::shutdown_send, ignored);
 }
@@ -118,9 +137,9 @@ void Stream::shutdown_send() {
 void Stream::close() {
     if (!socket_.is_open()) return;
     if (engine_) {
-        ERR_clear_error();
+        forget_errors();
         SSL_shutdown(engine_->native());
-        ERR_clear_error();
+        forget_errors();
         engine_->use_socket(-1);
     }
     error_code ignored;

@@ -197,8 +197,9 @@ std::string MapReader::unknown(std::size_t entry) const {
     if (!near.empty()) return message + "; did you mean '" + near + "'?";
     if (const std::string place = place_of(typed, false); !place.empty()) return message + place;
     std::string list;
-    for (const std::string_view word : known)
-        list += (list.empty() ? "" : ", ") + std::string(word);
+    for (auto word = known.begin(); word != known.end(); ++word)
+        if (std::find(known.begin(), word, *word) == word)  // not asked for before
+            list += (list.empty() ? "" : ", ") + std::string(*word);
     return message + "; known keys are " + list;
 }
 

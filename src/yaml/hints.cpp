@@ -88,21 +88,6 @@ bool is_group(std::string_view text) {
     return text.size() == 3 && text.find_first_not_of(kDecimalDigits) == text.npos;
 }
 
-/// Expands 9.6k, 38k4 and 9600 kBd; returns nothing for anything else.
-std::optional<std::string> kilo(std::string_view text) {
-    const std::size_t k = std::min(text.find_first_of("kK"), text.size());
-    const std::string_view thousands = text.substr(0, text.find_last_not_of(' ', k - 1) + 1);
-    const std::string_view behind = text.substr(std::min(k + 1, text.size()));
-    const bool has_digit = !behind.empty() && kDecimalDigits.find(behind[0]) != kDecimalDigits.npos;
-    const auto value =
-        parse_number(std::string(thousands) + (has_digit ? '.' + std::string(behind) : ""));
-    constexpr double kMost = 1e9;
-    if (k == text.size() || !value || *value <= 0 || *value >= kMost) return std::nullopt;
-    const double all = *value * 1000;
-    if (std::fabs(all - std::round(all)) > 1e-6) return std::nullopt;
-    return std::to_string(std::llround(all));
-}
-
 /// Removes a plus, leading zeros, group separators and a unit; uses a decimal point.
 std::string bare(std::string_view text, bool whole) {
     std::string all;
@@ -120,23 +105,6 @@ std::string bare(std::string_view text, bool whole) {
            kDecimalDigits.find(all[sign + 1]) != kDecimalDigits.npos)
         all.erase(sign, 1);
     return all;
-}
-
-/// 1/10, /10, x0.1 and 10^-1
-std::optional<std::string> calculated(std::string_view text) {
-    const std::size_t sign = text.find_first_of("/^");
-    std::optional<double> value;
-    if (text.starts_with('x') || text.starts_with('*')) {
-        value = parse_number(trim(text.substr(1)));
-    } else if (sign != text.npos) {
-        if (sign == 0 && text[0] == '^') return std::nullopt;
-        const auto left = sign == 0 ? std::optional(1.0) : parse_number(text.substr(0, sign));
-        const auto right = parse_number(text.substr(sign + 1));
-        if (!left || !right) return std::nullopt;
-        value = text[sign] == '/' ? *left / *right : std::pow(*left, *right);
-    }
-    if (!value || !std::isfinite(*value)) return std::nullopt;
-    return number_text(*value);
 }
 
 std::string write(std::string_view text) { return "; write " + std::string(text); }
@@ -194,8 +162,6 @@ std::string number_hint(std::string_view text, bool whole) {
         if (text.starts_with(minus)) return write('-' + std::string(text.substr(minus.size())));
     if (std::string hint = comma_hint(text, whole); !hint.empty()) return hint;
     auto meant = hexadecimal(text);
-    if (!meant && !whole) meant = calculated(text);
-    if (!meant && whole) meant = kilo(text);
     if (!meant) meant = plain_number(bare(text, whole), whole);
     return meant && *meant != text ? write(*meant) : "";
 }
@@ -267,68 +233,6 @@ std::string blank_hint(std::string_view text) {
         return "; write " + std::string(text.substr(0, colon)) + ": " +
                std::string(trim(text.substr(colon + 1)));
     return "; a blank is missing after " + quote(key);
-}
-
-namespace {
-
-using Kind = Token::Kind;
-
-}  // namespace
-
-bool is_word(std::string_view text) {
-    if (text.empty()) return false;
-    for (const char c : text) {
-        const bool letter = std::isalnum(static_cast<unsigned char>(c)) != 0;
-        if (!letter && c != '_' && c != '-') return false;
-    }
-    return std::isalpha(static_cast<unsigned char>(text[0])) != 0;
-}
-
-std::optional<Finding> missing_colon(const Scanned& text, std::size_t token) {
-    const Token& line = text.tokens[token];
-    const std::string_view word = text.text(line);
-    if (line.kind != Kind::plain) return std::nullopt;
-    if (word.starts_with("//") || word.starts_with("/*") || word.starts_with(';') ||
-        word.starts_with("-- "))
-        return Finding{line.begin, "a comment begins with '#'"};
-    const std::size_t end = std::min(word.find_first_of(":= \t\xEF"), word.size());
-    const std::string_view key = word.substr(0, end);
-    const std::string_view rest = word.substr(end);
-    if (!is_word(key) && key != "<<") return std::nullopt;
-    constexpr std::string_view kWide = "\xEF\xBC\x9A";  // U+FF1A, as Asian keyboards type it
-    const auto shown = [&](std::string_view value) {
-        value.remove_prefix(std::min(value.find_first_not_of(" \t:="), value.size()));
-        return "write '" + std::string(key) + (value.empty() ? ":" : ": ") +
-               std::string(clip(value, 60)) + '\'';
-    };
-    if (rest.starts_with(kWide))
-        return Finding{line.begin + end, "U+FF1A is no colon; " + shown(rest.substr(3))};
-    if (rest.starts_with("://")) return std::nullopt;
-    if (rest.starts_with(':'))
-        return Finding{line.begin + end + 1, "a blank is missing after '" + std::string(key) +
-                                                 ":'; " + shown(rest.substr(1))};
-    const std::size_t sign = std::min(rest.find_first_not_of(" \t"), rest.size());
-    if (rest.substr(sign).starts_with('='))
-        return Finding{line.begin + end + sign,
-                       "a key is followed by ':', not '='; " + shown(rest)};
-    return Finding{line.begin + end,
-                   "a ':' is missing after '" + std::string(key) + "'; " + shown(rest)};
-}
-
-std::string second_colon(const Scanned& text, std::size_t key, std::size_t value) {
-    const std::string name(clip(text.text(text.tokens[key]), 60));
-    const std::string_view word = text.text(text.tokens[value]);
-    const std::string all(clip(text.rest(value), 60));
-    if (const std::string address = address_hint(word, all); !address.empty()) return address;
-    const std::string_view last = word.substr(word.find_last_of(" \t") + 1);
-    const std::string quotes = "; one text that holds ': ' must be in quotes: \"" + all + '"';
-    if (is_word(word))
-        return "two keys on one line; begin a deeper line for '" + std::string(word) +
-               "', or write " + name + ": {" + all + '}' + quotes;
-    if (is_word(last))
-        return "two keys on one line; begin a new line for '" + std::string(last) + '\'' + quotes;
-    return "a text that holds ': ' must be in quotes; write \"" + all +
-           "\", or begin a new line for a second key";
 }
 
 }  // namespace panelgate::yaml

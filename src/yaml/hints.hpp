@@ -5,7 +5,6 @@
 #include <string>
 #include <string_view>
 
-#include "lint.hpp"
 #include "panelgate/yaml/document.hpp"
 
 namespace panelgate::yaml {
@@ -31,12 +30,5 @@ std::string blank_hint(std::string_view text);
 
 /// Parses a number, all of the text; nothing for one that is not finite.
 std::optional<double> parse_number(std::string_view text);
-/// True for letters, digits, '_' and '-', with a letter first.
-bool is_word(std::string_view text);
-/// Returns how to correct a line without ': ' that begins like a key; `token` is its first.
-std::optional<Finding> missing_colon(const Scanned& text, std::size_t token);
-/// Returns the fault and the correction of `listen: 127.0.0.1: 502`, `serial: baud: 9600`, `name:
-/// press profile: x`. Tokens of one line.
-std::string second_colon(const Scanned& text, std::size_t key, std::size_t value);
 
 }  // namespace panelgate::yaml

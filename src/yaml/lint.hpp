@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,16 +19,15 @@ struct Scanned {
     std::string_view text(const Token& token) const {
         return source.text().substr(token.begin, token.end - token.begin);
     }
-    /// Returns the rest of the line from this token on, without a comment, and with the blanks
-    /// between tokens.
+    std::string_view text(std::size_t token) const { return text(tokens[token]); }
+    /// Returns the line from this token on, without a comment; cut, as lines may be long.
     std::string_view rest(std::size_t token) const;
-    /// Counts characters from 0.
-    std::size_t column(const Token& token) const {
-        return static_cast<std::size_t>(source.mark(token.begin).column) - 1;
-    }
-    int line(const Token& token) const { return source.mark(token.begin).line; }
+    int line(std::size_t token) const { return source.mark(tokens[token].begin).line; }
     /// True if token `i` exists and is on the line of the one before.
     bool follows(std::size_t i) const { return i < tokens.size() && !tokens[i].first; }
+    bool follows(std::size_t i, Token::Kind kind) const {
+        return follows(i) && tokens[i].kind == kind;
+    }
 
     const Source& source;
     std::vector<Token> tokens;
@@ -40,30 +40,18 @@ Findings find_traps(const Scanned& text);
 /// below. Empty if none is found.
 Findings find_causes(const Scanned& text);
 
-/// True if the indentation of its line cannot be counted in columns.
-bool has_wrong_indent(const Scanned& text, const Token& first);
-
-/// Returns the fault and the correction of `127.0.0.1: 502`, whose first part is `word`; empty if
-/// it is no address.
-std::string address_hint(std::string_view word, std::string_view all);
-
-/// `*name` allows no keys beside it: returns how to write it with the keys `more`.
-std::string alias_and_more(std::string_view alias, std::string_view more);
-
 /// Returns `bytes`, which have the offsets of the text, with blanks for the tabs on empty lines and
 /// lines with only a comment.
 std::string without_blank_tabs(const Scanned& text, std::string bytes);
 
+/// True if the indentation of its line cannot be counted in columns.
+bool has_wrong_indent(const Scanned& text, const Token& first);
+/// Returns what is wrong with a line that has no ': ', but begins like a key; `token` is its first.
+std::optional<Finding> missing_colon(const Scanned& text, std::size_t token);
+
 // Each finds one kind of mistake, in the order of the text.
-void find_open_quotes(const Scanned& text, Findings& findings);
-void find_wrong_blanks(const Scanned& text, Findings& findings);
-void find_wrong_dashes(const Scanned& text, Findings& findings);
-void find_typeset_quotes(const Scanned& text, Findings& findings);
-void find_quote_ends(const Scanned& text, Findings& findings);
-void find_placeholders(const Scanned& text, Findings& findings);
 void find_brackets(const Scanned& text, Findings& findings);
-void find_directives(const Scanned& text, Findings& findings);
-void find_wrong_starts(const Scanned& text, Findings& findings);
+/// The first line that is not in the column of its neighbours, and lines that lack a colon.
 void find_columns(const Scanned& text, Findings& findings);
 
 }  // namespace panelgate::yaml

@@ -87,7 +87,7 @@ MapReader::MapReader(const Node& node, Problems& problems, std::string what,
 }
 
 const Node* MapReader::find(std::string_view key) {
-    if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.emplace_back(key);
+    known_.emplace_back(key);
     return node_->find(key);
 }
 
@@ -150,6 +150,7 @@ std::optional<std::int64_t> MapReader::integer(std::string_view key, std::int64_
         shape.min = min;
         shape.max = max;
     });
+    if (!has(key)) return std::nullopt;
     const std::string wanted =
         "a whole number from " + std::to_string(min) + " to " + std::to_string(max);
     const Node* node = scalar(key, wanted);
@@ -227,6 +228,7 @@ std::optional<std::size_t> MapReader::choice_index(std::string_view key,
         shape.kind = KeyShape::Kind::word;
         shape.words.assign(words.begin(), words.end());
     });
+    if (!has(key)) return std::nullopt;
     const Node* node = scalar(key, join(words));
     if (node == nullptr) return std::nullopt;
     for (std::size_t i = 0; i < words.size(); ++i) {

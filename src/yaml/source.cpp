@@ -93,6 +93,7 @@ Source::Source(std::string all) : text_(std::move(all)), lines_{0} {
 }
 
 std::size_t Source::characters(std::size_t from, std::size_t to) const {
+    if (inside_.back() == 0) return to - from;  // ASCII alone
     const auto inside_before = [this](std::size_t at) {
         const std::size_t stride = at / kStride;
         return inside_[stride] + count_inside(text().substr(stride * kStride, at % kStride));
@@ -109,7 +110,10 @@ Mark Source::mark(std::size_t offset) const {
 
 Mark Source::mark(int line, int column) const {
     if (line < 0 || static_cast<std::size_t>(line) >= lines_.size()) return mark(text_.size());
-    return mark(lines_[static_cast<std::size_t>(line)] + static_cast<std::size_t>(column));
+    const std::size_t begin = lines_[static_cast<std::size_t>(line)];
+    const std::size_t at = begin + static_cast<std::size_t>(column);
+    if (at > text_.size()) return mark(at);
+    return {line + 1, static_cast<int>(characters(begin, at)) + 1};
 }
 
 std::string_view Source::line(int number) const {
@@ -211,31 +215,17 @@ class Scanner {
         const bool marker = at_ == line_ && blank(3) &&
                             (text_.substr(at_, 3) == "---" || text_.substr(at_, 3) == "...");
         if (marker) return add(Kind::document, at_ + 3);
-        if (is_conflict()) return add(Kind::plain, content_end());
         if (c == '-' && blank(1)) return add_parent(Kind::dash, 1);
         if (const std::size_t dash = wrong_dash()) return add_parent(Kind::dash, dash);
         if (c == ':' && (blank(1) || (inside && (is_bracket(peek(1)) || follows_quote()))))
             return add(Kind::colon, at_ + 1);
+        if (text_.substr(at_).starts_with("{{")) return add(Kind::odd, placeholder_end());
         if (c == '[' || c == '{') return open();
         if (c == ']' || c == '}') return close(c);
         if (c == ',' && inside) return add(Kind::comma, at_ + 1);
         if (c == '"' || c == '\'') return quoted(c);
         if ((c == '|' || c == '>') && !inside) return block();
         word(c);
-    }
-
-    /// True for <<<<<<<, |||||||, ======= or >>>>>>> of a merge.
-    bool is_conflict() const {
-        constexpr std::size_t kLength = 7;
-        const char c = peek();
-        return at_ == line_ && std::string_view("<|=>").find(c) != std::string_view::npos &&
-               text_.substr(at_, kLength) == std::string(kLength, c) && blank(kLength);
-    }
-    /// Returns the end of the line without trailing blanks.
-    std::size_t content_end() const {
-        std::size_t end = line_end(at_);
-        while (end > at_ && is_space(text_[end - 1])) --end;
-        return end;
     }
 
     void word(char c) {
@@ -268,6 +258,13 @@ class Scanner {
 
     bool follows_quote() const {
         return !tokens_.empty() && tokens_.back().kind == Kind::quoted && tokens_.back().end == at_;
+    }
+
+    /// {{ name }}, as other programs have it
+    std::size_t placeholder_end() const {
+        const std::size_t line = line_end(at_);
+        const std::size_t end = text_.substr(0, line).find("}}", at_);
+        return end == std::string_view::npos ? at_ + 2 : end + 2;
     }
 
     std::size_t name_end() const {
@@ -319,7 +316,7 @@ class Scanner {
     /// True for a line that cannot be inside the brackets: an item, or a key no deeper than the
     /// line that opened them.
     bool ends_brackets() const {
-        if ((peek() == '-' && blank(1)) || is_conflict()) return true;
+        if (peek() == '-' && blank(1)) return true;
         const std::size_t indent = at_ - line_;
         if (indent > outermost_) return false;
         const std::size_t end = text_.find_first_of(":\n,[]{}\"'", at_);

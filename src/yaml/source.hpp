@@ -57,7 +57,7 @@ struct Token {
         alias,    ///< *name
         anchor,   ///< &name
         tag,      ///< !name
-        odd,      ///< begins with a character that cannot begin a text: % @ ` ,
+        odd,      ///< begins with what cannot begin a text: % @ ` , {{
         document  ///< --- or ...
     };
     /// unclosed: an `open` or a `quoted`; stray: an unmatched `close`, a `dash` that is another

@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,7 +31,8 @@ struct Setting {
     std::string otherwise = {};
     /// False: a file cannot have it beside the value of a neighbour; it has its default then.
     bool applies = true;
-    std::shared_ptr<const SettingMap> map = {};  ///< that it is in; of an entry, the entry itself
+    std::shared_ptr<const SettingMap> map = {};    ///< that it is in; of an entry, the entry itself
+    std::optional<std::string_view> initial = {};  ///< Row::initial; nothing of what has no row
 
     bool is_entry() const { return path == map->path; }
     /// The last part of its path; "" of an entry.

@@ -4,6 +4,7 @@
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/compose.hpp>
+#include <boost/asio/error.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -82,6 +83,11 @@ class Stream {
     template <class Buffers, class Way>
     struct Transfer;
 
+    // The encrypted bytes that a read waits for: see Engine.
+    bool holds_input() const;
+    boost::asio::mutable_buffer room();
+    void arrived(std::size_t size);
+
     Step read_secure(boost::asio::mutable_buffer into);
     Step write_secure(boost::asio::const_buffer bytes);
     Step step_of(int result);
@@ -117,6 +123,12 @@ struct Stream::Reading {
     static void plain(boost::asio::ip::tcp::socket& socket, const Buffers& into, Self&& self) {
         socket.async_read_some(into, std::forward<Self>(self));
     }
+    /// It waits by reading: one call of the system fewer than by waiting until something is there.
+    static bool takes(Need need) { return need == Need::readable; }
+    template <class Buffers>
+    static bool must_wait(const Stream& on, const Buffers& into) {
+        return boost::asio::buffer_size(into) > 0 && !on.holds_input();
+    }
     template <class Buffers>
     Step secure(Stream& on, const Buffers& into) {
         return on.read_secure(first_of<boost::asio::mutable_buffer>(into));
@@ -132,6 +144,11 @@ struct Stream::Writing {
     template <class Buffers, class Self>
     static void plain(boost::asio::ip::tcp::socket& socket, const Buffers& from, Self&& self) {
         socket.async_write_some(from, std::forward<Self>(self));
+    }
+    static bool takes(Need) { return false; }
+    template <class Buffers>
+    static bool must_wait(const Stream&, const Buffers&) {
+        return false;
     }
     template <class Buffers>
     Step secure(Stream& on, const Buffers& from) {
@@ -153,7 +170,7 @@ struct Stream::Writing {
 /// One read or write, as `Way` does it.
 template <class Buffers, class Way>
 struct Stream::Transfer {
-    enum class At : std::uint8_t { begin, plain, waited, posted };
+    enum class At : std::uint8_t { begin, plain, waited, filled, posted };
 
     Stream& stream;
     Buffers buffers;
@@ -171,15 +188,25 @@ struct Stream::Transfer {
         }
         if (at == At::plain) return end(self, error, size);
         if (at == At::posted) return end(self, step.error, step.bytes);
-        if (error) return end(self, error, 0);
+        if (at == At::begin && Way::must_wait(on, buffers)) return fill(self);
+        if (at == At::filled) on.arrived(size);
+        // The end of the socket's input is one for OpenSSL to judge.
+        if (error && error != boost::asio::error::eof) return end(self, error, 0);
         step = way.secure(on, buffers);
+        if (Way::takes(step.need)) return fill(self);
         if (step.need != Need::nothing) {
             at = At::waited;
             return on.wait(step.need, std::move(self));
         }
-        if (at == At::waited) return end(self, step.error, step.bytes);
+        if (at != At::begin) return end(self, step.error, step.bytes);
         at = At::posted;  // no handler may run inside of the call that begins it
         boost::asio::post(on.get_executor(), std::move(self));
+    }
+    template <class Self>
+    void fill(Self& self) {
+        at = At::filled;
+        Stream& on = stream;
+        on.socket_.async_read_some(boost::asio::buffer(on.room()), std::move(self));
     }
     template <class Self>
     void end(Self& self, boost::system::error_code error, std::size_t size) {

@@ -88,10 +88,10 @@ constexpr Row kTraps[] = {
 /// Why a parser fails.
 constexpr Row kCauses[] = {
     {"a:\n  \u2022 b: 1\n    c: 2\n", "2:3 "},
-    // a misplaced dash
-    {"a:\n   - b: 1\n    c: 2\n", "2:4 "},
-    {"a:\n - b: 1\n    c: 2\n    d: 3\n", "2:2 "},
-    {"a:\n  -  b: 1\n    c: 2\nd: 3\n", "2:3 "},
+    // a misplaced dash: the first line that does not agree with it
+    {"a:\n   - b: 1\n    c: 2\n", "3:5 "},
+    {"a:\n - b: 1\n    c: 2\n    d: 3\n", "3:5 "},
+    {"a:\n  -  b: 1\n    c: 2\nd: 3\n", "3:5 "},
     {"a:\n  - b: 1\n   c: 2\n    d: 3\n", "3:4 "},  // the others agree with it
     {"a:\n  - b: 1\n   c: 2\n  - b: 2\n", "3:4 "},
     {"a:\n  - b: 1\n     c: 2\n  - b: 2\n", "3:6 "},
@@ -213,12 +213,10 @@ TEST(Hints, WriteADurationAsItIsRead) {
 TEST(Hints, WriteANumberAsItIsRead) {
     const HintOf fraction = [](std::string_view text) { return number_hint(text, false); };
     const HintOf whole = [](std::string_view text) { return number_hint(text, true); };
-    expect_hints(fraction, {"0,1 -> 0.1", "+5 -> 5", "400 C -> 400", "10% -> 0.1", "1/10 -> 0.1",
-                            "/10 -> 0.1", "x0.1 -> 0.1", "*0.1 -> 0.1", "10^-1 -> 0.1"});
+    expect_hints(fraction, {"0,1 -> 0.1", "+5 -> 5", "400 C -> 400", "10% -> 0.1"});
     expect_none(fraction, {"", "ten", "-", ".", "/", "1/0", "x", "^2"});
-    expect_hints(whole,
-                 {"0x1F -> 31", "38.400 -> 38400", "1.0 -> 1", "9600 baud -> 9600", "9.6e3 -> 9600",
-                  "9,600 -> 9600", "9.6k -> 9600", "38k4 -> 38400", "\u22125 -> -5"});
+    expect_hints(whole, {"0x1F -> 31", "38.400 -> 38400", "1.0 -> 1", "9600 baud -> 9600",
+                         "9.6e3 -> 9600", "9,600 -> 9600", "\u22125 -> -5"});
     expect_none(whole, {"1.5", "1.5.600", "k", "ten", "1/0"});
 }
 
