@@ -141,7 +141,7 @@ Verdict Attempt::feed(ByteView bytes, const Ends& ends) {
 Verdict Attempt::accept(std::optional<Bytes> reply) {
     collect();
     if (!reply) return Verdict::open;
-    if (own_.may_be_echo(echo_, adu_of(*reply))) return Verdict::open;
+    if (own_.may_be_echo(echo_, *reply)) return Verdict::open;
     // Two equal replies cannot be distinguished.
     if (const auto candidate = std::exchange(candidate_, std::nullopt);
         candidate && candidate != reply) {

@@ -96,6 +96,7 @@ Claims OutstandingRequests::claims(TimePoint now, std::uint8_t station, ByteView
                                    const Windows& windows, ByteView open) const {
     Claims claims;
     for (const Asked& one : of(station).asked) add_claim(claims, one, now, reply, windows, open);
+    if (!open.empty()) return claims;
     const Asked* const last = last_reply(station);
     claims.has_last_form = last != nullptr && is_recent_reply(*last, now) &&
                            reply.size() == last->reply.size() && reply[0] == last->reply[0];
@@ -114,6 +115,7 @@ std::optional<Duration> OutstandingRequests::behind_broadcast(TimePoint now, Byt
 
 const Asked* OutstandingRequests::first(std::uint8_t station, ByteView reply,
                                         TimePoint open) const {
+    if (!any(station)) return nullptr;
     const Asked* last = nullptr;
     for (const Asked& one : of(station).asked) {
         if (!outstanding_for(reply)(one)) continue;
@@ -307,12 +309,6 @@ Asked OutstandingRequests::take_closed(std::uint8_t station, ByteView reply, Tim
     return taken;
 }
 
-void OutstandingRequests::take_first(std::uint8_t station) {
-    Page& page = at(station);
-    page.asked.erase(std::ranges::find_if(page.asked, is_outstanding));
-    --page.outstanding;
-}
-
 void OutstandingRequests::lapse(std::uint8_t station, TimePoint before) {
     if (any(station)) close(at(station), State::lapsed, TimePoint::min(), before);
 }
@@ -341,28 +337,25 @@ OutstandingRequests::Page& OutstandingRequests::at(std::uint8_t station) {
 }
 
 void OutstandingRequests::enter(Page& page, Asked one, std::size_t most) {
-    const auto of_its_state = [state = one.state](const Asked& other) {
-        return other.state == state;
-    };
-    const bool outstanding = is_outstanding(one);
-    const auto count = std::ranges::count_if(page.asked, of_its_state);
-    if (std::cmp_less(count, most)) {
-        page.outstanding += outstanding ? 1 : 0;
-        page.asked.push_back(std::move(one));
+    std::size_t count = 0;
+    Asked* oldest = nullptr;
+    for (Asked& other : page.asked) {
+        if (other.state != one.state) continue;
+        ++count;
+        if (oldest == nullptr || other.since() < oldest->since()) oldest = &other;
+    }
+    if (count >= most && !is_outstanding(one)) {
+        *oldest = std::move(one);  // only those have an order
         return;
     }
-    auto oldest = std::ranges::find_if(page.asked, of_its_state);
-    if (!outstanding) {  // whose order is that of their times
-        for (auto other = oldest; other != page.asked.end(); ++other) {
-            const bool older =
-                std::max(other->sent, other->replied) < std::max(oldest->sent, oldest->replied);
-            if (of_its_state(*other) && older) oldest = other;
-        }
-        *oldest = std::move(one);
-        return;
-    }
-    page.asked.erase(oldest);
+    if (count >= most) take_first(page);
+    page.outstanding += is_outstanding(one) ? 1 : 0;
     page.asked.push_back(std::move(one));
+}
+
+void OutstandingRequests::take_first(Page& page) {
+    page.asked.erase(std::ranges::find_if(page.asked, is_outstanding));
+    --page.outstanding;
 }
 
 void OutstandingRequests::close(Page& page, State state, TimePoint since, TimePoint before) {

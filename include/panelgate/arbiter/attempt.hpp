@@ -225,7 +225,7 @@ class Attempt {
     /// True if the reply to a write equals the echo of its request: only timing distinguishes them.
     bool may_be_its_echo() const {
         return !group_.request.is_read() && !echo_.complete() && !own_.seen &&
-               std::ranges::equal(adu_of(*reply_), echo_.frame());
+               echo_.is_own(*reply_);
     }
     /// Rejects a reply that also answers another master's request; the station was not silent.
     void reject_contested() {

@@ -31,6 +31,9 @@ struct Asked {
     TimePoint replied{};
     Bytes reply{};          ///< of a broadcast: the normal one
     bool followed = false;  ///< a frame of the form of its reply came behind that
+
+    /// When it came to be what it is.
+    TimePoint since() const { return sent < replied ? replied : sent; }
 };
 
 /// What a good frame of a station may be, as far as the book can tell.
@@ -166,7 +169,7 @@ class OutstandingRequests {
     /// this; there must be one.
     Asked take_closed(std::uint8_t station, ByteView reply, TimePoint open);
     /// Takes out the oldest outstanding.
-    void take_first(std::uint8_t station);
+    void take_first(std::uint8_t station) { take_first(at(station)); }
     /// No reply can come any more to what left before this, as far as is known.
     void lapse(std::uint8_t station, TimePoint before = TimePoint::max());
     /// All outstanding replies have come.
@@ -184,6 +187,7 @@ class OutstandingRequests {
     Page& at(std::uint8_t station);
     /// Enters one; of its state the page keeps `most`, and forgets the oldest beyond that.
     static void enter(Page& page, Asked one, std::size_t most);
+    static void take_first(Page& page);
     /// The outstanding ones that left before `before`, and not before `since`, are so now.
     static void close(Page& page, Asked::State state, TimePoint since, TimePoint before);
 
