@@ -368,19 +368,19 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
                (!wanted.in_budget || stations.may_spend(now, job));
     };
     const JobQueue& queue = backlog_.queue();
-    const Job* next = queue.peek(test);
+    JobQueue::Choice next = queue.choose(test);
     // A failing station waits for its share only while others want the line.
-    wanted.in_budget = next != nullptr;
-    if (next == nullptr) next = queue.peek(test);
+    wanted.in_budget = next.job() != nullptr;
+    if (next.job() == nullptr) next = queue.choose(test);
+    if (next.job() == nullptr) return {};
     // P9: in the turn of a station's write its read goes first, and the write is next.
-    if (next != nullptr && !next->request.is_read() && stations.has_read_turn(next->station)) {
-        wanted.reads_of = next->station;
-        if (const Job* read = queue.peek(test)) next = read;
-        if (!next->request.is_read()) wanted.reads_of.reset();
+    if (!next.job()->request.is_read() && stations.has_read_turn(next.job()->station)) {
+        wanted.reads_of = next.job()->station;
+        if (const auto read = queue.choose(test); read.job() != nullptr) next = read;
     }
-    if (next == nullptr || !gap_is_over(now, next->station, stations, quiet)) return {};
-    if (auto read = read_before(now, *next, stations, echo)) return std::move(*read);
-    Job job = *backlog_.queue().pop(test);
+    if (!gap_is_over(now, next.job()->station, stations, quiet)) return {};
+    if (auto read = read_before(now, *next.job(), stations, echo)) return std::move(*read);
+    Job job = backlog_.queue().take(next);
     take_turn(job);
     if (job.station == kBroadcast) {
         Group group{.request = job.request};

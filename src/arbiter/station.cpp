@@ -38,7 +38,7 @@ Station::Heard Station::on_unsolicited_frame(OutstandingRequests& book, TimePoin
                                              ByteView pdu, bool asked) {
     Heard heard{replies_.on_unsolicited(book, now, done, pdu, asked)};
     if (done == Done::duplicate) trail_.on_unsolicited(now);
-    if (done != Done::late && done != Done::disorder) return heard;
+    if (!is_late(done)) return heard;
     if (heard.needed) slowest_.add(*heard.needed);
     heard.back = health_.on_late_reply(now);
     missed_ = false;

@@ -15,7 +15,6 @@ namespace panelgate::arbiter {
 
 using modbus::Unused;
 using Kind = StationEvent::Kind;
-using Part = Outbox::Part;
 using fact::when;
 
 namespace {
@@ -26,18 +25,6 @@ bool is_request(ByteView adu) {
     const bool fits_reply =
         as_reply.kind == modbus::ReplyLength::Kind::known && as_reply.length == adu.size();
     return !fits_reply && modbus::request_adu_length(adu) == adu.size();
-}
-
-/// What a frame that was judged so is counted as.
-Part part_of(Done done) {
-    static constexpr std::pair<Done, Part> kParts[] = {
-        {Done::echo, Part::echo},        {Done::request, Part::request},
-        {Done::damaged, Part::damaged},  {Done::late, Part::late},
-        {Done::disorder, Part::late},    {Done::duplicate, Part::duplicate},
-        {Done::second, Part::duplicate}, {Done::broadcast, Part::broadcast_reply},
-        {Done::unasked, Part::unasked},  {Done::nobodys, Part::unknown},
-    };
-    return std::ranges::find(kParts, done, &std::pair<Done, Part>::first)->second;
 }
 
 bool is_exception(ByteView adu) { return modbus::exception_of(modbus::pdu_of(adu)).has_value(); }
@@ -80,13 +67,12 @@ void UnsolicitedFrames::note(TimePoint now, const std::vector<modbus::Unused>& p
     for (const Unused& part : parts) {
         const bool damaged = part.kind == Unused::Kind::damaged;
         const Done done = judge(facts_of(heard_at, part.bytes, damaged, stations));
-        const Part counted = part_of(done);
-        if (done == Done::unasked || counted == Part::late || counted == Part::duplicate) {
+        if (is_reply(done)) {
             const bool asked = !idle && part.station == quiet.station();
             note_reply(now, part, done, asked, stations, quiet, outbox);
             continue;
         }
-        outbox.on_unsolicited(now, part, counted, quiet.station());
+        outbox.on_unsolicited(now, part, done, quiet.station());
         if (done == Done::damaged) stations.on_damaged(heard_at, part.bytes);
         if (done == Done::damaged && idle) stations.on_trail(heard_at, replied_);
         if (done == Done::request) stations.book().on_foreign(heard_at, part.bytes, false);
@@ -104,9 +90,8 @@ void UnsolicitedFrames::note_reply(TimePoint now, const Unused& part, Done done,
     const Station::Heard heard = stations.of(part.station)
                                      .on_unsolicited_frame(stations.book(), heard_at, done,
                                                            modbus::pdu_of(part.bytes), asked);
-    const Part counted = part_of(done);
-    outbox.on_unsolicited(now, part, counted, quiet.station(), heard.lateness);
-    if (counted == Part::late) outbox.event(Kind::late, part.station, heard.lateness);
+    outbox.on_unsolicited(now, part, done, quiet.station(), heard.lateness);
+    if (is_late(done)) outbox.event(Kind::late, part.station, heard.lateness);
     if (heard.back) {
         stations.on_recovery();
         outbox.event(Kind::online, part.station);
@@ -133,12 +118,11 @@ bool UnsolicitedFrames::is_wrong_reply(TimePoint now, ByteView adu, const Statio
                                        Duration heard_after) const {
     const Done done = judge(facts_of(now, adu, false, stations));
     if (done == Done::unasked) return true;
-    const Part counted = part_of(done);
-    if ((counted != Part::late && done != Done::duplicate) || !is_exception(adu)) return false;
+    if ((!is_late(done) && done != Done::duplicate) || !is_exception(adu)) return false;
     // An exception for another function may be meant for this request, even if it is outstanding:
     // asking again decides sooner than waiting. One that repeats an earlier one may be, too, where
     // the answer was due; a duplicate comes at any time.
-    return counted == Part::late || !stations.find(adu[0])->is_quicker_than_ever(heard_after);
+    return is_late(done) || !stations.find(adu[0])->is_quicker_than_ever(heard_after);
 }
 
 }  // namespace panelgate::arbiter

@@ -62,6 +62,14 @@ enum class Done : std::uint8_t {
     unasked,    ///< ends the attempt as wrong
 };
 
+/// It is the reply to an earlier request.
+constexpr bool is_late(Done done) { return done == Done::late || done == Done::disorder; }
+/// It is a reply of the station that it names, though not to the open request.
+constexpr bool is_reply(Done done) {
+    return is_late(done) || done == Done::duplicate || done == Done::second ||
+           done == Done::unasked;
+}
+
 /// The table of README, "Outstanding replies": of any frame, what it is and what is done with it.
 /// The first row of which all is true decides.
 struct JudgeRow {

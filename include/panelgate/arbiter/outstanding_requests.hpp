@@ -47,8 +47,9 @@ struct Claims {
     bool repeats = false;            ///< a recent reply once more
     bool repeats_other = false;      ///< ... to a request that is not the open one
     bool repeats_refusal = false;    ///< a recent exception that nobody had asked for
-    bool has_last_form = false;      ///< of the form of the last reply, soon after it
-    TimePoint repeated{};            ///< when the latest reply that it repeats came
+    bool has_last_form =
+        false;             ///< of that of the last reply, soon after it; false with an open request
+    TimePoint repeated{};  ///< when the latest reply that it repeats came
 };
 
 /// The book of one line: every request that may still be answered, or was answered lately, by
