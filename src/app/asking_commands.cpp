@@ -67,7 +67,7 @@ class Adder {
         command->add_option("-c,--config", typed->at.file, "its file, which says where it listens")
             ->capture_default_str();
         command->add_option("--http", typed->at.http,
-                            "ADDR:PORT of its REST API; without: what the configuration file says, "
+                            "HOST:PORT of its REST API; without: what the configuration file says, "
                             "or 127.0.0.1:8080");
         command->add_option("--token-file", typed->at.token_file,
                             "a file whose first line is a token");

@@ -14,13 +14,16 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "load.hpp"
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/tls/issue.hpp"
+#include "panelgate/tls/judge.hpp"
 #include "panelgate/tls/peer.hpp"
+#include "panelgate/tls/replacement.hpp"
 
 namespace panelgate::app {
 namespace {
@@ -65,6 +68,11 @@ class Files {
 
     /// Writes it under another name; false, and errno, if that fails.
     bool write(const std::string& path, const std::string& text, mode_t mode) {
+        struct stat there{};
+        if (::stat(path.c_str(), &there) == 0 && S_ISDIR(there.st_mode)) {
+            errno = EISDIR;
+            return false;
+        }
         const int file =
             ::open(fresh(path).c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode);
         if (file < 0) return false;
@@ -116,8 +124,9 @@ ExitCode write_pair(const CertificateOptions& options, const std::string& name,
     if (!files.write(key, issued.key, kSecret)) return cannot("write", key, kUnavailable);
     if (!files.write(certificate, issued.certificate, kPublic))
         return cannot("write", certificate, kUnavailable);
-    return files.keep("wrote " + certificate + " and " + key + ", valid for " +
-                      std::to_string(options.days) + " days\n" + advice);
+    // A CA's end is that of what it has signed.
+    return files.keep("wrote " + certificate + " and " + key + ", valid until " +
+                      tls::date_text(tls::summary_of(issued.certificate).end) + '\n' + advice);
 }
 
 std::optional<tls::Issued> read_ca(const CertificateOptions& options, ExitCode& code) {
@@ -215,16 +224,29 @@ ExitCode new_client_certificate(const CertificateOptions& options) {
 
 ExitCode revoke_certificate(const CertificateOptions& options) {
     return with_ca(options, [&](const tls::Issued& ca) {
-        const auto given = config::RealFiles::read_any(options.names.front());
-        if (!given) return cannot("read", options.names.front(), kNoInput);
+        std::optional<std::string> given;
+        if (!options.names.empty()) {
+            given = config::RealFiles::read_any(options.names.front());
+            if (!given) return cannot("read", options.names.front(), kNoInput);
+        }
         const std::string path = in_folder(options, "crl.pem");
         const auto former = config::RealFiles::read_any(path);
-        const std::string list = tls::revoke(ca, former.value_or(""), *given, validity_of(options));
+        if (!former && errno != ENOENT) return cannot("read", path, kNoInput);
+        if (former && former->empty())
+            throw tls::CannotIssue(path +
+                                   " is empty, though it should name who is revoked already: bring "
+                                   "back a copy, such as a gateway's; or remove it, and revoke all "
+                                   "of them again");
+        const std::string list = tls::revoke(
+            ca, former.value_or(""), given ? std::optional<std::string_view>(*given) : std::nullopt,
+            validity_of(options));
         Files files;
         if (!files.write(path, list, kPublic)) return cannot("write", path, kUnavailable);
         return files.keep("wrote " + path +
                           "\nIt goes to every gateway (`tls: crl`), which takes it without a "
-                          "restart, and closes the connections of this certificate.\n");
+                          "restart" +
+                          (given ? ", and closes the connections of this certificate" : "") +
+                          ".\n");
     });
 }
 
@@ -290,7 +312,8 @@ void add_certificate_commands(CLI::App& cli, ExitCode& code) {
     auto lost = std::make_shared<CertificateOptions>();
     CLI::App* revoke =
         adder.add("revoke", "add a certificate to the list of revoked ones, crl.pem", 365, lost);
-    revoke->add_option("FILE", lost->names, "the certificate")->required()->expected(1);
+    revoke->add_option("FILE", lost->names, "the certificate; without it the list is made anew")
+        ->expected(0, 1);
     adder.on_call(revoke, revoke_certificate, lost);
 }
 

@@ -123,6 +123,7 @@ struct CertificateWatch::Look {
         std::shared_ptr<const tls::Context> context;  ///< null: `why`
         std::string why;
         rt::LogLevel level = rt::LogLevel::error;
+        std::vector<std::string> doubts{};  ///< that must not keep it back
     };
     std::vector<Fresh> fresh;
 
@@ -148,6 +149,7 @@ struct CertificateWatch::Look {
                 tls::why_kept(served[at].settings, made.settings, tls::Arrival::noticed, now);
             made.level = rt::LogLevel::warn;
             if (made.why.empty()) made.context = made.settings.made;
+            made.doubts = tls::doubts(made.settings, {}, now);
         } catch (const tls::Unusable& why) {
             made.why = why.what();
         }
@@ -210,6 +212,9 @@ void CertificateWatch::judge(Look& look) {
                 served.settings = fresh.settings;
                 renew_(served, fresh.context);
                 log_renewed(served.listener, before, served.settings.material);
+                for (const std::string& doubt : fresh.doubts)
+                    rt::log(rt::LogLevel::warn, "certificate",
+                            {{"listener", served.listener}, {"warning", doubt}});
             } else if (std::exchange(refused_[served.listener], fresh.settings.material) !=
                        fresh.settings.material) {
                 rt::log(fresh.level, "certificate not renewed",

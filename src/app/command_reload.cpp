@@ -154,7 +154,7 @@ ExitCode reload(const ReloadOptions& options) {
     std::cerr << "panelgate: not reloaded: " << door.url() << ": " << why << '\n';
     if (reply.text.empty() && options.http.empty())
         std::cerr << "  (if it runs with another `http: listen` than " << options.file
-                  << " has now: --http ADDR:PORT, or kill -HUP its process)\n";
+                  << " has now: --http HOST:PORT, or kill -HUP its process)\n";
     return kNotReady;
 }
 

@@ -167,7 +167,7 @@ ExitCode GatewayClient::explain(const GatewayAnswer& answer, const std::string& 
     std::cerr << "panelgate: " << what << reason(answer) << '\n';
     if (answer.status != 0) return kNotReady;
     std::cerr << "  (`panelgate run` and `panelgate demo` start one; where another listens: --http "
-                 "ADDR:PORT)\n";
+                 "HOST:PORT)\n";
     return kUnavailable;
 }
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <atomic>
 #include <boost/asio/buffer.hpp>
+#include <boost/asio/connect.hpp>
 #include <boost/asio/error.hpp>
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/write.hpp>
@@ -24,10 +24,12 @@
 #include "panelgate/base/text.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/config/real_files.hpp"
+#include "panelgate/line/settings.hpp"
 #include "panelgate/metrics/process.hpp"
 #include "panelgate/tls/stream.hpp"
 #include "panelgate/web/http/gzip.hpp"
 #include "panelgate/yaml/document.hpp"
+#include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::app {
 
@@ -246,7 +248,7 @@ struct Known {
 };
 
 Known nowhere(const std::string& why, ExitCode code = kNotReady) {
-    return {std::nullopt, {why + "; --http ADDR:PORT says where", code}};
+    return {std::nullopt, {why + "; --http HOST:PORT says where", code}};
 }
 
 /// Where `http` has `tls`, nothing is asked in plain.
@@ -306,12 +308,22 @@ Known known_by(const std::string& file) {
 constexpr std::string_view kPlainScheme = "http://";
 constexpr std::string_view kSecureScheme = "https://";
 
-/// ADDR:PORT of http://ADDR:PORT/, as it is copied from a browser.
+/// HOST:PORT of http://HOST:PORT/, as it is copied from a browser.
 std::string without_scheme(std::string http) {
     for (const std::string_view scheme : {kPlainScheme, kSecureScheme})
         if (http.starts_with(scheme)) http.erase(0, scheme.size());
     if (http.ends_with('/')) http.pop_back();
     return http;
+}
+
+/// An address, or a name that is looked up when it is asked.
+std::optional<config::Endpoint> door_typed(const std::string& http) {
+    const std::string typed = without_scheme(http);
+    auto found = config::parse_endpoint(typed);
+    const auto named = line::parse_tcp_device("tcp://" + typed);
+    if (!found && named)
+        found = {named->host, static_cast<std::uint16_t>(*yaml::parse_integer(named->port))};
+    return found && found->port != 0 ? found : std::nullopt;
 }
 
 }  // namespace
@@ -325,10 +337,12 @@ std::variant<HttpDoor, NoHttpDoor> http_door(const GatewayOptions& options) {
     const std::string& http = options.http;
     Known known = known_by(options.file);
     if (!http.empty()) {
-        known.endpoint = config::parse_endpoint(without_scheme(http));
-        if (!known.endpoint || known.endpoint->port == 0)
-            return NoHttpDoor{"--http '" + http + "' is not ADDR:PORT, such as 127.0.0.1:8080",
-                              kUsage};
+        known.endpoint = door_typed(http);
+        if (!known.endpoint)
+            return NoHttpDoor{
+                "--http '" + http +
+                    "' is not HOST:PORT, such as 127.0.0.1:8080 or gateway.plant:8080",
+                kUsage};
     }
     if (!known.endpoint) return known.why;
     HttpDoor door{{config::reachable(known.endpoint->address), known.endpoint->port}, known.trust};
@@ -361,21 +375,30 @@ class Question {
              const std::optional<tls::Trust>& trust)
         : request_(request), most_(most), enough_(enough), trust_(trust) {}
 
-    HttpReply put(const asio::ip::tcp::endpoint& target, Duration patience) {
-        stream_.socket().async_connect(target, [this, target](const error_code& error) {
-            if (error) return end(error);
-            if (!trust_) return send_request();
-            tls::connect(stream_, *trust_, target.address(), [this](const std::string& why) {
-                reply_.secure = why.empty();
-                reply_.refused = why;
-                if (why.empty()) send_request();
+    HttpReply put(const config::Endpoint& target, Duration patience) {
+        using asio::ip::tcp;
+        resolver_.async_resolve(
+            target.address, std::to_string(target.port), tcp::resolver::numeric_service,
+            [&](const error_code& error, const tcp::resolver::results_type& found) {
+                if (error) return end(error);
+                asio::async_connect(stream_.socket(), found,
+                                    [&](const error_code& failed, const tcp::endpoint&) {
+                                        failed ? end(failed) : greet(target.address);
+                                    });
             });
-        });
         io_.run_for(patience);
         return reply_;
     }
 
   private:
+    void greet(const std::string& server) {
+        if (!trust_) return send_request();
+        tls::connect(stream_, *trust_, server, [this](const std::string& why) {
+            reply_.secure = why.empty();
+            reply_.refused = why;
+            if (why.empty()) send_request();
+        });
+    }
     void send_request() {
         asio::async_write(stream_, asio::buffer(request_),
                           [this](const error_code& error, std::size_t) {
@@ -397,6 +420,7 @@ class Question {
     std::size_t most_;
     const std::function<bool(const HttpReply&)>& enough_;
     asio::io_context io_{1};
+    asio::ip::tcp::resolver resolver_{io_};
     const std::optional<tls::Trust>& trust_;
     tls::Stream stream_{asio::ip::tcp::socket(io_)};
     char buffer_[4096]{};
@@ -440,8 +464,7 @@ std::string HttpReply::failure() const {
 
 HttpReply ask(const HttpDoor& door, const std::string& request, Duration patience, std::size_t most,
               const std::function<bool(const HttpReply&)>& enough) {
-    return Question(request, most, enough, door.trust)
-        .put({asio::ip::make_address(door.endpoint.address), door.endpoint.port}, patience);
+    return Question(request, most, enough, door.trust).put(door.endpoint, patience);
 }
 
 namespace {

@@ -84,12 +84,12 @@ struct NoHttpDoor {
 };
 /// Where a gateway is asked, and by whose certificate it is known.
 struct HttpDoor {
-    config::Endpoint endpoint;        ///< with an address that can be connected to
+    config::Endpoint endpoint;        ///< with an address that can be connected to, or a name
     std::optional<tls::Trust> trust;  ///< nothing: it is asked by plain HTTP
 
     std::string url() const;  ///< "https://127.0.0.1:8443"
 };
-/// The door that `options.http` names (ADDR:PORT, also with http:// or https://), or, if that is
+/// The door that `options.http` names (HOST:PORT, also with http:// or https://), or, if that is
 /// "", the one in the file, even if the file has faults. Whom to trust is what the file says, and
 /// `options.ca`. If the default file does not exist, the default door, which `panelgate demo` has.
 std::variant<HttpDoor, NoHttpDoor> http_door(const GatewayOptions& options);

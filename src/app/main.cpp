@@ -391,7 +391,7 @@ class CommandLine {
             cli_.add_subcommand("health", "ask a running gateway whether it is ready (/readyz)");
         add_file(command);
         command->add_option("--http", http_,
-                            "ADDR:PORT of its REST API; without: what the configuration file says, "
+                            "HOST:PORT of its REST API; without: what the configuration file says, "
                             "or 127.0.0.1:8080");
         command->add_option("--ca", ca_, kCa);
         command->footer(
@@ -404,7 +404,7 @@ class CommandLine {
             "reload", "have a running gateway read its file again, and print its verdict");
         command->add_option("-c,--config", reload_.file, "its file, which says where it listens")
             ->capture_default_str();
-        command->add_option("--http", reload_.http, "ADDR:PORT of its REST API");
+        command->add_option("--http", reload_.http, "HOST:PORT of its REST API");
         command->add_option("--token-file", reload_.token_file,
                             "a file whose first line is a token of the role admin");
         command->add_option("--ca", reload_.ca, kCa);

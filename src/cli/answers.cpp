@@ -80,9 +80,15 @@ std::string reading_text(const json::object& answer, std::string_view type) {
     const std::uint64_t width = type.ends_with("64") ? 4 : type.ends_with("32") ? 2 : 1;
     std::string place = printable(text_of(answer, "notation"));
     const bool kept = text_of(answer, "source") == "cache";
+    const json::value* all = answer.if_contains("notations");
+    const json::array notations =
+        all != nullptr && all->is_array() ? all->get_array() : json::array();
     TextTable rows({"", "", ""});
     for (std::uint64_t i = 0; i < count; ++i) {
-        if (i > 0 || place.empty()) place = table + '/' + std::to_string(first + i * width);
+        if (i < notations.size())
+            place = value_text(notations[i]);
+        else if (i > 0 || place.empty())
+            place = table + '/' + std::to_string(first + i * width);
         rows.add({place, value_text(values[i]), kept ? ago(answer) : ""});
     }
     return rows.text(false);

@@ -32,7 +32,7 @@ int judge_server(X509_STORE_CTX* chain, void* pinned) {
 
 class Connecting : public std::enable_shared_from_this<Connecting> {
   public:
-    Connecting(Stream& stream, const Trust& trust, const asio::ip::address& server,
+    Connecting(Stream& stream, const Trust& trust, const std::string& server,
                std::function<void(const std::string&)> done)
         : stream_(stream), done_(std::move(done)) {
         const std::shared_ptr<SSL_CTX> context(SSL_CTX_new(TLS_client_method()), SSL_CTX_free);
@@ -47,8 +47,10 @@ class Connecting : public std::enable_shared_from_this<Connecting> {
         SSL_CTX_set_cert_verify_callback(context.get(), judge_server, pinned_.get());
         SSL_CTX_set_verify(context.get(), SSL_VERIFY_PEER, nullptr);
         engine_ = std::make_shared<Engine>(context);
-        X509_VERIFY_PARAM_set1_ip_asc(SSL_get0_param(engine_->native()),
-                                      server.to_string().c_str());
+        if (X509_VERIFY_PARAM_set1_ip_asc(SSL_get0_param(engine_->native()), server.c_str()) != 1) {
+            SSL_set1_host(engine_->native(), server.c_str());
+            SSL_set_tlsext_host_name(engine_->native(), server.c_str());
+        }
         kept_ = context;
     }
 
@@ -96,7 +98,7 @@ class Connecting : public std::enable_shared_from_this<Connecting> {
 
 }  // namespace
 
-void connect(Stream& stream, const Trust& trust, const asio::ip::address& server,
+void connect(Stream& stream, const Trust& trust, const std::string& server,
              std::function<void(const std::string&)> done) {
     std::make_shared<Connecting>(stream, trust, server, std::move(done))->step();
 }

@@ -152,6 +152,12 @@ constexpr Explained kExplained[] = {
     {SSL_R_TLSV1_ALERT_UNKNOWN_CA, Outcome::refused, kNotTaken},
     {SSL_R_SSLV3_ALERT_BAD_CERTIFICATE, Outcome::refused, kNotTaken},
     {SSL_R_SSLV3_ALERT_CERTIFICATE_UNKNOWN, Outcome::refused, kNotTaken},
+    {SSL_R_SSLV3_ALERT_UNSUPPORTED_CERTIFICATE, Outcome::refused,
+     "the client says that the gateway's certificate is of a kind that it does not take; is it one "
+     "of a server?"},
+    {SSL_R_SSLV3_ALERT_CERTIFICATE_REVOKED, Outcome::refused,
+     "the client says that the gateway's certificate is revoked"},
+    {SSL_R_TLSV1_ALERT_ACCESS_DENIED, Outcome::refused, "the client ended it"},
     {SSL_R_SSLV3_ALERT_CERTIFICATE_EXPIRED, Outcome::refused,
      "the client says that the gateway's certificate has expired"},
     {SSL_R_SSLV3_ALERT_HANDSHAKE_FAILURE, Outcome::refused, "the client ended it"},

@@ -310,8 +310,11 @@ void Handshakes::make_room(const std::string& address) {
     } else if (running_.size() >= settings_.max_handshakes) {
         std::map<std::string, std::size_t> counts;
         for (const auto& one : running_) ++counts[one->address];
-        from =
-            std::ranges::max_element(counts, {}, [](const auto& one) { return one.second; })->first;
+        const auto most = std::ranges::max_element(counts, {}, [](const auto& one) {
+                              return one.second;
+                          })->second;
+        const auto has_most = [&](const Conversation* one) { return counts[one->address] == most; };
+        from = (*std::ranges::find_if(running_, has_most))->address;
     } else {
         return;
     }

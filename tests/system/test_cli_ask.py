@@ -29,7 +29,9 @@ class Asking(unittest.TestCase):
         self.assertEqual(self.ask(0, "read", "press", "UW1"), "UW1  20\n")
         self.assertEqual(self.ask(0, "read", "31", "holding-registers/4"), "UW4  50\n")
         self.assertEqual(self.ask(0, "read", "floor1/31", "UW0", "--count", "2"),
-                         "UW0                  10\nholding-registers/1  20\n")
+                         "UW0  10\nUW1  20\n")
+        self.http = self.http.replace("127.0.0.1", "localhost")
+        self.assertEqual(self.ask(0, "read", "press", "UW1"), "UW1  20\n")
         self.assertEqual(json.loads(self.ask(0, "read", "press/UW0", "--format", "json"))["values"], [10])
         self.gateway.values("/api/v1/stations/oven/devices/GDT300")
         self.assertRegex(self.ask(0, "read", "oven/temperature"),

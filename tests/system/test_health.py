@@ -95,7 +95,7 @@ class Health(unittest.TestCase):
 
     def test_a_configuration_that_tells_no_port_is_told(self):
         self.configure("127.0.0.1:0")
-        self.assertIn("--http ADDR:PORT", self.ask("-c", str(self.file), code=1))
+        self.assertIn("--http HOST:PORT", self.ask("-c", str(self.file), code=1))
         self.file.write_text(config.gateway(config.line(), http=None))
         self.assertIn("has no http", self.ask("-c", str(self.file), code=1))
 
@@ -106,7 +106,7 @@ class Health(unittest.TestCase):
                 self.file.write_text(text)
             told = self.ask("-c", str(self.file), code=1)
             self.assertIn(str(self.file), told)
-            self.assertIn("--http ADDR:PORT", told)
+            self.assertIn("--http HOST:PORT", told)
 
     def test_a_file_with_faults_says_where_its_gateway_listens_all_the_same(self):
         with harness.configured(config.gateway(config.line(), modbus=None)) as program:

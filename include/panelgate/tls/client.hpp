@@ -1,6 +1,5 @@
 #pragma once
 
-#include <boost/asio/ip/address.hpp>
 #include <functional>
 #include <string>
 
@@ -9,15 +8,16 @@ namespace panelgate::tls {
 class Stream;
 
 /// Whom a client believes, in PEM form: the server that has this very certificate, whatever its
-/// name and dates, or one that the CA has signed for the address.
+/// name and dates, or one that the CA has signed for the server's name or address.
 struct Trust {
     std::string certificate;
     std::string ca;
 };
 
 /// Makes a connected stream secure, from the client's side, in the loop: for programs that ask one
-/// server. `done` is called once with why it failed, "" if it did not. The stream outlives it.
-void connect(Stream& stream, const Trust& trust, const boost::asio::ip::address& server,
+/// server, by its name or its address. `done` is called once with why it failed, "" if it did not.
+/// The stream outlives it.
+void connect(Stream& stream, const Trust& trust, const std::string& server,
              std::function<void(const std::string& why)> done);
 
 }  // namespace panelgate::tls

@@ -299,21 +299,34 @@ Parsed<View> prepare_read(Items& items, const ValueFormat& format, unsigned max_
     return view;
 }
 
+namespace {
+
+/// As a technician writes the item `behind` the first; "" if the panel is not known.
+std::string notation_of(const Items& items, std::size_t behind) {
+    const auto address = static_cast<std::uint16_t>(items.address() + behind);
+    if (items.area != nullptr) return profile::format_notation(*items.area, address);
+    if (items.station.unknown_panel) return "";
+    return profile::format_notation(*items.station.profile, items.span.table, address);
+}
+
+}  // namespace
+
 json::object describe(const Items& items, const View& view, const Reading& reading) {
-    std::string notation;
-    if (items.area != nullptr) {
-        notation = profile::format_notation(*items.area, items.address());
-    } else if (!items.station.unknown_panel) {
-        notation =
-            profile::format_notation(*items.station.profile, items.span.table, items.address());
-    }
+    const std::string notation = notation_of(items, 0);
+    json::array values = values_of(view, reading.items);
     json::object body;
     body["station"] = items.station.name;
     body["table"] = label(items.span.table);
     body["address"] = items.span.first;
     body["notation"] = nullptr;
     if (!notation.empty()) body["notation"] = notation;
-    body["values"] = values_of(view, reading.items);
+    if (!notation.empty() && values.size() > 1) {
+        json::array notations;
+        for (std::size_t i = 0; i < values.size(); ++i)
+            notations.emplace_back(notation_of(items, i * items.span.count / values.size()));
+        body["notations"] = std::move(notations);
+    }
+    body["values"] = std::move(values);
     if (view.raw) body["raw"] = json::array(reading.items.begin(), reading.items.end());
     body["age_ms"] = whole_ms(reading.age);
     body["source"] = reading.cached ? "cache" : "bus";

@@ -29,6 +29,10 @@ TEST(ReadingText, NamesEachPlace) {
                            "f32"),
               "GDT108                 1.5  read 0.4 s ago\n"
               "holding-registers/110  -2   read 0.4 s ago\n");
+    EXPECT_EQ(reading_text(object(R"({"table":"holding-registers","address":0,"notation":"UW0",
+        "notations":["UW0","UW2"],"values":[1.5,2.5]})"),
+                           "f32"),
+              "UW0  1.5\nUW2  2.5\n");
     EXPECT_EQ(reading_text(object(R"({"table":"coils","address":3,"values":[true]})"), ""),
               "coils/3  true\n");
 }

@@ -44,8 +44,8 @@ TEST_F(ApiBatch, ReadsNeighboursInOneRequestWithOneResultEach) {
     EXPECT_EQ(reply.status(), 200u);
     EXPECT_EQ(reply.json(),
               json_of(R"({"results":[{"status":200,"station":"press","table":"holding-registers",
-        "address":10,"notation":"UW10","values":[10,11],"age_ms":0,"source":"bus",
-        "item":{"station":"press","device":"UW10","count":2}},
+        "address":10,"notation":"UW10","notations":["UW10","UW11"],"values":[10,11],"age_ms":0,
+        "source":"bus","item":{"station":"press","device":"UW10","count":2}},
         {"status":200,"station":"press","name":"oil","value":3.5,"unit":"bar","quality":"good",
          "age_ms":0,"source":"bus","item":{"point":"press/oil"}}],"transactions":1})"));
     EXPECT_EQ(last_pdu(), "03 00 07 00 05");

@@ -33,15 +33,16 @@ TEST_F(ApiRead, GivesItemsWithWhereTheyCameFrom) {
         EXPECT_EQ(reply.status(), 200u);
         EXPECT_EQ(reply.header("Content-Type"), "application/json");
         EXPECT_EQ(reply.json(), json_of(R"({"station":"press","table":"holding-registers",
-            "address":100,"notation":"UW100","values":[100,101],"age_ms":0,"source":"bus"})"));
+            "address":100,"notation":"UW100","notations":["UW100","UW101"],"values":[100,101],
+            "age_ms":0,"source":"bus"})"));
         EXPECT_EQ(last_pdu(), "03 00 64 00 02");
     }
     EXPECT_EQ(bus.requests[0].station, 31);
     EXPECT_FALSE(bus.requests[0].poll);
     EXPECT_NE(bus.requests[0].client, 0u);
     EXPECT_EQ(
-        status_and(get("/api/v1/stations/press/coils/0x120?count=3"), "values notation address"),
-        "200 [false,true,false] UB180 288");
+        status_and(get("/api/v1/stations/press/coils/0x120?count=3"), "values notations address"),
+        "200 [false,true,false] [\"UB180\",\"UB181\",\"UB182\"] 288");
 }
 
 TEST_F(ApiRead, SaysHowOldACachedValueIs) {
