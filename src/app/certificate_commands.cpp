@@ -1,6 +1,7 @@
 #include "certificate_commands.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <CLI/CLI.hpp>
@@ -110,6 +111,24 @@ class Files {
     std::vector<std::string> paths_;
 };
 
+/// One at a time works in a folder: two that add to one list would lose one's addition.
+class Turn {
+  public:
+    explicit Turn(const std::string& folder)
+        : folder_(
+              ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+        if (folder_ >= 0) ::flock(folder_, LOCK_EX);
+    }
+    ~Turn() {
+        if (folder_ >= 0) ::close(folder_);
+    }
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+
+  private:
+    int folder_;
+};
+
 /// Writes NAME.key and NAME.crt; says so, and what to do with them.
 ExitCode write_pair(const CertificateOptions& options, const std::string& name,
                     const tls::Issued& issued, const std::string& advice) {
@@ -151,7 +170,8 @@ std::string file_name(std::string name) {
     std::ranges::replace_if(
         name,
         [](unsigned char c) { return std::isalnum(c) == 0 && c != '.' && c != '-' && c != '_'; },
-        '-');
+        '_');
+    if (name.starts_with('-')) name.front() = '_';  // commands would take it for an option
     return name.substr(0, kLongest);
 }
 
@@ -170,6 +190,7 @@ ExitCode explained(const Make& make) try {
 template <class Make>
 ExitCode with_ca(const CertificateOptions& options, const Make& make) {
     return explained([&] {
+        const Turn turn(options.dir);
         ExitCode code = kFine;
         const auto ca = read_ca(options, code);
         return ca ? make(*ca) : code;
@@ -178,6 +199,7 @@ ExitCode with_ca(const CertificateOptions& options, const Make& make) {
 
 ExitCode new_certificate_authority(const CertificateOptions& options) {
     return explained([&] {
+        const Turn turn(options.dir);
         const std::string name = options.names.empty() ? "Plant CA" : options.names.front();
         return write_pair(
             options, "ca", tls::issue_ca(name, validity_of(options)),

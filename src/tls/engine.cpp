@@ -140,7 +140,8 @@ constexpr const char* kNotTaken =
 constexpr const char* kNoneShown =
     "the client shows no certificate; give it one that the CA of `ca` signed";
 constexpr const char* kVersions =
-    "the client speaks no version that is allowed; TLS 1.2 with AEAD suites, and TLS 1.3, are";
+    "the client speaks no version that is allowed: TLS 1.3, and TLS 1.2 with AEAD suites unless "
+    "`min_version` rules it out";
 
 constexpr Explained kExplained[] = {
     {SSL_R_PEER_DID_NOT_RETURN_A_CERTIFICATE, Outcome::no_certificate, kNoneShown},

@@ -133,12 +133,12 @@ class Handshakes::Conversation : public std::enable_shared_from_this<Conversatio
 };
 
 void Handshakes::Conversation::listen() {
-    stream_.socket().async_wait(tcp::socket::wait_read,
-                                [self = shared_from_this()](const error_code& error) {
-                                    if (!self->done_) return;
-                                    if (!error) return self->on_readable();
-                                    self->finish(Outcome::displaced, "another connection came");
-                                });
+    stream_.socket().async_wait(
+        tcp::socket::wait_read, [self = shared_from_this()](const error_code& error) {
+            if (!self->done_) return;
+            if (!error) return self->on_readable();
+            self->finish(Outcome::displaced, "the gateway needed its place, or ends");
+        });
 }
 
 void Handshakes::Conversation::on_readable() {

@@ -79,6 +79,8 @@ class Draft {
   public:
     Draft(const std::string& name, EVP_PKEY* key, const Validity& validity, std::int64_t latest) {
         check(certificate_ != nullptr, "no memory");
+        if (latest <= validity.now)
+            throw CannotIssue("the CA's certificate has expired; make a new one with new-ca");
         X509_set_version(get(), X509_VERSION_3);
         set_serial(X509_get_serialNumber(get()));
         const std::int64_t end =
@@ -323,7 +325,8 @@ std::string revoke(const Issued& ca, std::string_view list,
                    const std::optional<std::string_view>& certificate, const Validity& validity) {
     const Signer signer(ca);
     const Owned<X509_CRL> made = former_list(signer, list);
-    ASN1_TIME* const time = ASN1_TIME_set(nullptr, static_cast<time_t>(validity.now));
+    // As of certificates: clocks differ.
+    ASN1_TIME* const time = ASN1_TIME_set(nullptr, static_cast<time_t>(validity.now - kHour));
     if (certificate) add_revoked(made.get(), revocable(signer, *certificate).get(), time);
     X509_CRL_set1_lastUpdate(made.get(), time);
     ASN1_TIME_set(time, static_cast<time_t>(validity.now + validity.days * kDay));

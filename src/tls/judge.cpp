@@ -65,6 +65,13 @@ class Judge {
                     "without a file makes a list, and crl takes those of several CAs, one behind "
                     "the other");
         for (const auto& one : lists) {
+            const std::int64_t begin = seconds_of(X509_CRL_get0_lastUpdate(one.get()));
+            if (begin > now_)
+                say("the list of revoked certificates in " + settings_.crl + " is valid from " +
+                    date_text(begin) +
+                    " only, which is still to come: every client is refused until then; compare "
+                    "the "
+                    "clock of the machine that made it");
             const ASN1_TIME* const next = X509_CRL_get0_nextUpdate(one.get());
             if (next == nullptr || seconds_of(next) > now_) continue;
             say("the list of revoked certificates in " + settings_.crl + " is overdue since " +

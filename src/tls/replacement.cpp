@@ -213,11 +213,15 @@ class Comparison {
     std::string judge_list(const X509_CRL& before, X509_CRL* now) const {
         const std::string what = "the list of revoked certificates in " + fresh_.crl;
         if (now == nullptr) return what + " is not of the CA whose list is in use";
+        const std::int64_t begin = seconds_of(X509_CRL_get0_lastUpdate(now));
+        if (begin > now_)
+            return what + " is valid from " + date_text(begin) +
+                   " only, which is still to come: every client would be refused; compare the "
+                   "clock of the machine that made it";
         if (is_overdue(now, now_) && !is_overdue(&before, now_))
             return what + " is overdue since " +
                    date_text(seconds_of(X509_CRL_get0_nextUpdate(now)));
-        if (noticed_ && seconds_of(X509_CRL_get0_lastUpdate(now)) <
-                            seconds_of(X509_CRL_get0_lastUpdate(&before)))
+        if (noticed_ && begin < seconds_of(X509_CRL_get0_lastUpdate(&before)))
             return what + " is older than the one in use" + kAsk;
         return "";
     }

@@ -82,6 +82,21 @@ class Cert(unittest.TestCase):
         self.assertEqual((done.returncode, done.stdout), (69, ""))
         self.assertIn("scada.key: Is a directory", done.stderr)
 
+    def test_revocations_at_the_same_time_are_all_in_the_list(self):
+        names = [f"p{number}" for number in range(8)]
+        for name in names:
+            self.cert("new-client", name)
+        started = [subprocess.Popen([harness.PANELGATE, "cert", "revoke", str(self.folder / f"{name}.crt"),
+                                     "--dir", str(self.folder)], stdout=subprocess.DEVNULL) for name in names]
+        self.assertEqual([one.wait(harness.PATIENCE) for one in started], [0] * 8)
+        text = subprocess.run(["openssl", "crl", "-in", str(self.folder / "crl.pem"), "-noout", "-text"],
+                              capture_output=True, text=True, check=True).stdout
+        self.assertEqual(text.count("Serial Number"), 8)
+
+    def test_files_of_a_wildcard_are_no_options(self):
+        self.assertIn("_.plant.example.crt", self.cert("new-server", "*.plant.example").stdout)
+        self.assertIn("__1.crt", self.cert("new-server", "::1").stdout)
+
     def test_a_list_that_cannot_be_read_is_not_made_anew(self):
         for name in ("one", "two"):
             self.cert("new-client", name)

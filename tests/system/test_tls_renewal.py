@@ -58,6 +58,12 @@ class Noticed(unittest.TestCase):
         self.assertEqual(shown(self.program), self.good)
         self.assertEqual(get(self.program.http_port(), "/readyz", self.made.context("scada"))[0], 200)
         self.assertEqual(self.program.log.text().count("certificate not renewed"), 1)
+        self.assertEqual(self.renewals("kept"), 1)
+        self.assertEqual(self.renewals("replaced"), 0)
+
+    def renewals(self, outcome):
+        text = get(self.program.http_port(), "/metrics", self.made.context("scada"))[1]
+        return metric(self.program, text, "panelgate_certificate_renewals_total", outcome=outcome)
 
     def put_pair(self, source, name="localhost"):
         for end in ("key", "crt"):
@@ -133,6 +139,41 @@ class Noticed(unittest.TestCase):
             self.made.cert("new-server", "localhost", "127.0.0.1", "--force")
             self.program.log.wait_for("certificate renewed .*files=\"certificate, key\" subject=.CN=localhost. "
                                       "issuer=.CN=Plant CA. serial=.* valid_from=.* expires=", count)
+        self.assertEqual((self.renewals("replaced"), self.renewals("kept")), (7, 0))
+
+
+class EachForItself(unittest.TestCase):
+    """A file that is kept back, or gone, holds back no other."""
+
+    def setUp(self):
+        self.stack = contextlib.ExitStack()
+        self.addCleanup(self.stack.close)
+        self.made = self.stack.enter_context(plant())
+        self.made.cert("new-client", "lost", "--role", "operator")
+        self.made.cert("new-client", "gone")
+        self.made.cert("revoke", self.made.path("gone.crt"))
+        self.program = self.stack.enter_context(
+            served(self.made, self.made.tls("required", crl=self.made.path("crl.pem"))))
+
+    def loses_its_place(self):
+        with SecureClient(self.program.modbus_port(), self.made.context("lost")) as client:
+            self.assertEqual(client.ask(31, READ)[0], 3)
+            self.made.cert("revoke", self.made.path("lost.crt"))
+            self.program.log.wait_for("certificate renewed .*files=crl")
+            self.program.log.wait_for("connection closed .*CN=lost is revoked")
+            self.assertTrue(client.is_closed_by_peer())
+
+    def test_a_revocation_beside_a_pair_that_is_kept_back(self):
+        self.made.cert("new-server", "localhost", "--force")
+        self.program.log.wait_for("certificate not renewed .*is not for 127.0.0.1")
+        self.loses_its_place()
+        self.made.cert("new-server", "localhost", "127.0.0.1", "--force")
+        self.program.log.wait_for("certificate renewed .*files=.certificate, key.")
+
+    def test_a_revocation_beside_a_key_that_is_gone(self):
+        os.rename(self.made.path("localhost.key"), self.made.path("away"))
+        self.program.log.wait_for("certificate file missing")
+        self.loses_its_place()
 
 
 class TwoCas(unittest.TestCase):
