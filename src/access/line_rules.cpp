@@ -28,20 +28,6 @@ std::optional<Span> with_items(std::optional<Span> span) {
     return span;
 }
 
-constexpr Right right_of(Act act) {
-    switch (act) {
-        case Act::read:
-            return Right::read;
-        case Act::write:
-            return Right::write;
-        case Act::broadcast:
-            return Right::broadcast;
-        case Act::raw:
-            return Right::raw;
-    }
-    std::abort();
-}
-
 /// Default roles are what doors want; what an own one lacks is refused wherever it comes in.
 bool lacks(const WhoRef& who, Act act) {
     return who && who->standing.own && !who->standing.own->rights.has(right_of(act));
@@ -49,16 +35,13 @@ bool lacks(const WhoRef& who, Act act) {
 
 Verdict by_role(const WhoRef& who, Act act) { return {false, nullptr, act, who->standing.own->name}; }
 
-/// What this request does.
-Acts acts_of(const LineRules::Question& question) {
-    Acts acts;
-    const modbus::Access access = question.asked->access();
-    const bool reads = access.read || (!access.write && question.asked->is_read());
-    if (reads) acts.add(Act::read);
-    if (access.write || !reads) acts.add(Act::write);
-    if (question.station == 0) acts.add(Act::broadcast);
-    if (question.raw) acts.add(Act::raw);
-    return acts;
+/// What functions that name no items do.
+Acts acts_without_items(const modbus::Request& request) {
+    if (request.is_read()) return {Act::read};
+    const std::uint8_t function = request.function();
+    if (function == modbus::kDiagnostics || function == modbus::kWriteFileRecord)
+        return {Act::write};
+    return {Act::read, Act::write};  // only its vendor knows
 }
 
 modbus::Function function_for(Act act, modbus::Table table) {
@@ -74,10 +57,27 @@ bool can_be(Act act, modbus::Table table) {
 
 }  // namespace
 
+Acts LineRules::Question::acts() const {
+    const modbus::Access access = asked->access();
+    Acts acts;
+    if (!access.read && !access.write) acts = acts_without_items(*asked);
+    if (access.read) acts.add(Act::read);
+    if (access.write) acts.add(Act::write);
+    if (station == 0) acts.add(Act::broadcast);
+    if (raw) acts.add(Act::raw);
+    return acts;
+}
+
 LineRules::LineRules(std::shared_ptr<const Settings> settings, std::string line,
                      std::vector<std::uint8_t> listed)
-    : settings_(std::move(settings)), line_(std::move(line)), listed_(std::move(listed)) {
+    : settings_(std::move(settings)),
+      line_(std::move(line)),
+      listed_(std::move(listed)),
+      known_(listed_) {
+    if (listed_.empty()) known_.push_back(0);  // those that nobody knows
     for (const Rule& rule : settings_->rules) {
+        for (const auto& [on, station] : rule.stations)
+            if (on == line_ && !holds(known_, station)) known_.push_back(station);
         unlisted_items_.emplace_back();
         if (rule.unlisted_items) unlisted_items_.back().push_back(*rule.unlisted_items);
     }
@@ -87,16 +87,14 @@ LineRules::LineRules(std::shared_ptr<const Settings> settings, std::string line,
 Verdict LineRules::judge(const WhoRef& who, const Question& question) const {
     if (is_trusted(who)) return {};
     if (who && who->standing.own) {
-        const Acts acts = acts_of(question);
+        const Acts acts = question.acts();
         for (const Act act : {Act::read, Act::write, Act::broadcast, Act::raw})
             if (acts.has(act) && lacks(who, act)) return by_role(who, act);
     }
     if (is_open()) return {};
     if (question.station != 0) return judge_request(who, question.station, question);
-    // It reaches everybody: without a listed station, those that nobody knows.
-    if (listed_.empty()) return judge_request(who, 0, question);
     Verdict verdict;
-    for (const std::uint8_t station : listed_) {
+    for (const std::uint8_t station : known_) {  // it reaches all of them
         verdict = judge_request(who, station, question);
         if (!verdict.allowed) return verdict;
     }
@@ -130,7 +128,11 @@ Verdict LineRules::judge_as(const Meeting& meeting, const modbus::Request& reque
         if (verdict.allowed) verdict = decide(meeting, act, function, items);
         if (verdict.allowed && besides) verdict = decide(meeting, *besides, function, items);
     };
-    if (!read && !written) ask(request.is_read() ? Act::read : Act::write, std::nullopt);
+    if (!read && !written) {
+        const Acts acts = acts_without_items(request);
+        for (const Act act : {Act::read, Act::write})
+            if (acts.has(act)) ask(act, std::nullopt);
+    }
     if (read) ask(Act::read, read);
     if (written) ask(Act::write, written);
     return verdict;

@@ -76,6 +76,20 @@ bool is_about(const Rule& rule, const Who& who) {
            is_among(rule.listeners, who.listener) && has_role(rule, who) && comes_from(rule, who);
 }
 
+Right right_of(Act act) {
+    switch (act) {
+        case Act::read:
+            return Right::read;
+        case Act::write:
+            return Right::write;
+        case Act::broadcast:
+            return Right::broadcast;
+        case Act::raw:
+            return Right::raw;
+    }
+    std::abort();
+}
+
 std::string_view label(Act act) {
     switch (act) {
         case Act::read:

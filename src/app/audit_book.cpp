@@ -461,6 +461,13 @@ void AuditBook::tokens(const std::vector<web::Token>& before, const std::vector<
             tell_of(token, "removed");
 }
 
+void AuditBook::expired(const web::Token& token) {
+    if (!trail_) return;
+    begin(Kind::token).text("token", token.name).text("role", token.standing.name());
+    composer_.text("event", "expired").text("expires", web::expiry_text(*token.expires));
+    record();
+}
+
 audit::Counters AuditBook::counters() const {
     return trail_ ? trail_->counters() : audit::Counters{};
 }

@@ -67,8 +67,9 @@ class AuditBook {
     void deed(const web::Deed& deed);
     /// A reload or a rollback, and what it changed.
     void reload(const web::ReloadVerdict& verdict);
-    /// Tokens that came, went, changed or expired.
+    /// Tokens that came, went or changed.
     void tokens(const std::vector<web::Token>& before, const std::vector<web::Token>& now);
+    void expired(const web::Token& token);
 
     /// Zeros without an audit.
     audit::Counters counters() const;

@@ -84,6 +84,7 @@ Gateway::Gateway(boost::asio::any_io_executor executor,
     Lines lines = lines_of(*config);
     for (std::size_t i = 0; i < lines.size(); ++i)
         known_.lines.emplace(std::pair(config->lines[i].name, lines[i]->listens()), lines[i]);
+    doors_.open(config);
     show(make_snapshot(std::move(config), std::move(lines)));
     relays_ = std::make_unique<points::Relays>(clock_, routes_of(*snapshot_));
     relay_listener_ = relays_->write_listener();
@@ -111,6 +112,7 @@ LineWatch Gateway::watch() {
         audit_.write(line, end);
     };
     watch.refuses_writes = [this] { return audit_.refuses_writes(); };
+    watch.admit = [this](const WhoRef& who) { return doors_.admit(who, rt::wall_now()); };
     return watch;
 }
 
@@ -208,6 +210,7 @@ void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedTex
     // Nothing below throws.
     const bool kept_nothing = line_histories_ == nullptr;
     audit_.tokens(tokens_of(*snapshot_->config), tokens_of(*config));
+    doors_.change(config);
     rest_wires(*config, lines);
     retire_lines(lines);
     apply_lines(*config, lines);
@@ -216,7 +219,36 @@ void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedTex
     relays_->apply(routes_of(*snapshot_));
     servers_.apply(*snapshot_->config, snapshot_->plant, directory_in(snapshot_), shown,
                    longest_answer());
+    judge_waiting();
+    doors_.settle();
     watch_certificates();
+    watch_tokens();
+}
+
+/// Of all lines: what is new at a door is about requests to any.
+void Gateway::judge_waiting() {
+    for (const auto& line : snapshot_->lines) line->bus().judge_waiting();
+}
+
+/// Records tokens that have expired since the last look. The clock on the wall may be set, so it is
+/// looked at often.
+void Gateway::watch_tokens() {
+    using std::chrono::microseconds;  // Duration does not hold the years until some expire
+    const WallTime now = rt::wall_now();
+    microseconds pause = 10s;
+    bool some = false;
+    for (const web::Token& token : tokens_of(*snapshot_->config)) {
+        if (!token.expires) continue;
+        if (*token.expires > now) {
+            pause = std::min<microseconds>(pause, *token.expires - now);
+        } else if (*token.expires > expired_until_) {
+            audit_.expired(token);
+            some = true;
+        }
+    }
+    expired_until_ = now;
+    if (some) judge_waiting();
+    expiry_->arm(clock_.now() + pause, [this] { watch_tokens(); });
 }
 
 void Gateway::watch_certificates() {
@@ -299,6 +331,8 @@ void Gateway::start() {
                    shown_text(*snapshot_->config), longest_answer());
     northbound_.start();
     watch_certificates();
+    expired_until_ = rt::wall_now();
+    watch_tokens();
     ready_ = true;
 }
 
@@ -328,6 +362,7 @@ std::string Gateway::status() const {
 
 void Gateway::stop() {
     lag_.stop();
+    expiry_->cancel();
     if (certificates_) certificates_->stop();
     servers_.close();
     northbound_.stop();

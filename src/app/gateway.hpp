@@ -12,6 +12,7 @@
 #include "audit_book.hpp"
 #include "certificates.hpp"
 #include "discoveries.hpp"
+#include "doors.hpp"
 #include "http_door.hpp"
 #include "northbound.hpp"
 #include "panelgate/base/time.hpp"
@@ -86,6 +87,8 @@ class Gateway {
     void show(const std::shared_ptr<Snapshot>& snapshot);
     web::Providers providers();
     void watch_certificates();
+    void watch_tokens();
+    void judge_waiting();
     bool copy_figures(metrics::Snapshot& figures, PointCopy& points,
                       const Snapshot& snapshot) const;
 
@@ -93,6 +96,7 @@ class Gateway {
     rt::AsioClock clock_;
     rt::LoopLag lag_{clock_};
     AuditBook audit_{executor_, clock_};  ///< lines record in it until they are destroyed
+    Doors doors_;                         ///< lines ask it until they are destroyed
     bool simulate_;
     Reloader* reloads_;
     web::EventHub events_;  ///< buses publish to it until they are destroyed
@@ -113,6 +117,8 @@ class Gateway {
     Servers servers_;
     Northbound northbound_;
     std::unique_ptr<CertificateWatch> certificates_;  ///< null until a listener has `tls`
+    std::unique_ptr<rt::Alarm> expiry_ = clock_.make_alarm();  ///< of a token
+    WallTime expired_until_{};                                 ///< looked at for expiry so far
     bool ready_ = false;
 };
 

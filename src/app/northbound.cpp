@@ -64,6 +64,9 @@ class BrokerSight {
                 rules_[&station] = line.access.rules.get();
         }
     }
+    bool line(const config::Line& one) const {
+        return one.access.rules == nullptr || one.access.rules->may_read_some(who_);
+    }
     bool station(const config::Station& one) const {
         const access::LineRules* rules = rules_.at(&one);
         return rules == nullptr || rules->may_some(who_, one.id, access::Act::read);
@@ -89,7 +92,7 @@ mqtt::Subjects subjects_of(const config::Config& config) {
     const BrokerSight sight(config);
     std::vector<const config::Station*> stations;
     for (const config::Line* line : by_name(config.lines)) {
-        subjects.add_line(line->name);
+        if (sight.line(*line)) subjects.add_line(line->name);
         for (const config::Station& station : line->stations)
             if (sight.station(station)) stations.push_back(&station);
     }

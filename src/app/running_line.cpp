@@ -254,6 +254,7 @@ bus::Settings RunningLine::settings_of(const config::Line& line) {
         };
     }
     settings.refuses_writes = watch_.refuses_writes;
+    settings.admit = watch_.admit;
     return settings;
 }
 

@@ -95,7 +95,7 @@ struct Publisher {
 
     void operator()(const bus::LineEvent& event) const {
         if (!hub.announce("line")) return;
-        hub.publish({"line", line, {}, {}},
+        hub.publish({"line", line, {}, {}, plant.name_of(line, event.station)},
                     web::line_event(line, event.up ? "up" : "down", event.why));
     }
     void operator()(const arbiter::StationEvent& event) const {

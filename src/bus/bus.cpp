@@ -106,10 +106,21 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
 /// Rules before the station's own rights, everywhere.
 std::optional<Refusal> Bus::State::refusal_of(const Request& request,
                                               const std::optional<modbus::Request>& sent) const {
-    if (auto refusal = rights.judge(request.who, question_of(request, sent))) return refusal;
+    if (auto refusal = judge(request.who, question_of(request, sent))) return refusal;
     if (auto refusal = rights.judge(request.station, request.request)) return refusal;
     if (request.request.is_read()) return std::nullopt;
     return unrecordable(settings, request.station);
+}
+
+std::optional<Refusal> Bus::State::judge(const WhoRef& who,
+                                         const access::LineRules::Question& question) const {
+    std::optional<Admission> now;
+    if (settings.admit) now = settings.admit(who);
+    if (!now) return rights.judge(who, question);
+    const std::uint8_t id = question.station;
+    std::string name = id == 0 ? std::string() : name_of(settings.stations, id);
+    if (auto refusal = refusal_at_door(*now, question.acts(), std::move(name))) return refusal;
+    return rights.judge(now->who, question);
 }
 
 void Bus::State::refuse(Pending entry, Result<Bytes> pdu, std::optional<Refusal> refusal) {
@@ -225,6 +236,12 @@ void Bus::apply(Settings settings, std::unique_ptr<line::Line> line,
                 std::shared_ptr<void> far_end) {
     state_->call([&] {
         state_->apply(with_explanations(std::move(settings)), std::move(line), std::move(far_end));
+    });
+}
+
+void Bus::judge_waiting() {
+    state_->call([&] {
+        state_->drive.tell([&](TimePoint now) { state_->deny_forbidden(now); });
     });
 }
 

@@ -50,10 +50,10 @@ std::optional<Refusal> Bus::State::judge_again(const arbiter::Job& job,
         auto original = modbus::Request::make(entry.original_pdu, modbus::QuantityCheck::wide);
         if (original) asked = std::move(*original);
     }
-    auto refusal = rights.judge(job.who, {.station = job.station,
-                                          .asked = asked ? &*asked : &job.request,
-                                          .sent = asked ? &job.request : nullptr,
-                                          .raw = job.raw});
+    auto refusal = judge(job.who, {.station = job.station,
+                                   .asked = asked ? &*asked : &job.request,
+                                   .sent = asked ? &job.request : nullptr,
+                                   .raw = job.raw});
     if (refusal || job.request.is_read()) return refusal;
     return rights.judge_write(job.station);
 }

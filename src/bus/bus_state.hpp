@@ -62,6 +62,9 @@ struct Bus::State final : public line::Line::Events {
     void adopt(Settings next);
     /// Refuses what waits and is forbidden by the changed settings (P2).
     void deny_forbidden(TimePoint now);
+    /// By the doors as they are now, and by the rules.
+    std::optional<Refusal> judge(const WhoRef& who,
+                                 const access::LineRules::Question& question) const;
     std::optional<Refusal> judge_again(const arbiter::Job& job, const Pending& entry) const;
     void schedule_line_change();
     void change_line();

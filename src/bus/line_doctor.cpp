@@ -81,7 +81,8 @@ void LineDoctor::report_change(const doctor::Finding& finding, bool is_new) cons
     }
     if (!settings_.observe) return;
     const std::string what = is_new ? "finding: " : "finding gone: ";
-    settings_.observe(LineEvent{true, what + cause + ", station " + station});
+    settings_.observe(
+        LineEvent{true, what + cause + ", station " + station, finding.station.value_or(0)});
 }
 
 std::vector<FindingReport> LineDoctor::report() const {

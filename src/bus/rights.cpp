@@ -62,7 +62,7 @@ modbus::ExceptionCode code_of(Rule rule) {
 }
 
 Refusal refusal_by(Rule rule, std::string station, std::string why = {}) {
-    return {rule, std::move(station), code_of(rule), std::move(why), {}};
+    return {rule, std::move(station), code_of(rule), std::move(why), {}, {}};
 }
 
 }  // namespace
@@ -71,6 +71,21 @@ Refusal denial(const access::Verdict& verdict, std::string station) {
     Refusal made = refusal_by(Rule::denied, std::move(station), std::string(verdict.rule_name()));
     if (!verdict.role.empty()) made.lacking = access::label(verdict.act);
     return made;
+}
+
+std::optional<Refusal> refusal_at_door(const Admission& now, access::Acts acts,
+                                       std::string station) {
+    using access::Act;
+    for (const Act act : {Act::read, Act::write, Act::broadcast, Act::raw}) {
+        if (!acts.has(act) || now.may.has(access::right_of(act))) continue;
+        if (now.rule.empty())
+            return denial({.allowed = false, .act = act, .role = now.who->standing.name()},
+                          std::move(station));
+        Refusal made = refusal_by(Rule::denied, std::move(station), std::string(now.rule));
+        made.door = now.why;
+        return made;
+    }
+    return std::nullopt;
 }
 
 Refusal unrecorded(std::string station) { return refusal_by(Rule::unrecorded, std::move(station)); }

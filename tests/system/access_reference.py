@@ -10,7 +10,8 @@ ADDRESSED = {1: (("read", COILS, 1, 3),), 2: (("read", DISCRETE, 1, 3),), 3: (("
              4: (("read", INPUT, 1, 3),), 5: (("write", COILS, 1, None),), 6: (("write", HOLDING, 1, None),),
              15: (("write", COILS, 1, 3),), 16: (("write", HOLDING, 1, 3),), 22: (("write", HOLDING, 1, None),),
              23: (("read", HOLDING, 1, 3), ("write", HOLDING, 5, 7))}
-READS = (7, 11, 12, 17, 20, 24, 43)  # of those that name no items; the rest may change something
+READS = (7, 11, 12, 17, 20, 24, 43)  # of those that name no items
+WRITES = (8, 21)  # the rest may do both: only their vendors know
 
 
 @dataclasses.dataclass(frozen=True)
@@ -125,7 +126,8 @@ def touches(pdu):
     word = lambda at: int.from_bytes(pdu[at:at + 2], "big")
     done = [(act, (table, word(at) + i)) for act, table, at, count in ADDRESSED.get(pdu[0], ())
             for i in range(max(1, word(count) if count else 1))]
-    return done or [("read" if pdu[0] in READS else "write", None)]
+    acts = ("read",) if pdu[0] in READS else ("write",) if pdu[0] in WRITES else ("read", "write")
+    return done or [(act, None) for act in acts]
 
 
 def denying(rules, default, who, stations, pdu, besides=()):

@@ -55,6 +55,12 @@ class Gateway:
     def stations_of(self, line):
         return [one for one in self.of.stations if one.line == line]
 
+    def reached(self, line):
+        """By a broadcast: one that is not listed counts where a rule names it."""
+        far = self.of.unlisted
+        is_named = far.line == line and any(far.place in rule.places for rule in self.of.rules)
+        return self.stations_of(line) + ([far] if is_named else [])
+
     # What is asked
 
     def modbus(self):
@@ -65,7 +71,7 @@ class Gateway:
                   "aliased": lambda: self.plant.client("modbus", ALIASED, source), "serial": lambda: self.plant.client("serial")}[kind]()
         if kind != "serial" and random.random() < 0.12:
             pdu = self.of.pdu(self.of.stations[1], broadcast=True)
-            return Ask(client, (0, pdu), [(self.stations_of("floor1"), pdu)], ("broadcast",))
+            return Ask(client, (0, pdu), [(self.reached("floor1"), pdu)], ("broadcast",))
         station, unit = self.target(kind)
         pdu = self.of.pdu(station)
         return Ask(client, (unit, pdu), [([station], pdu)])
@@ -112,7 +118,7 @@ class Gateway:
         alone = count == 1 and line == "floor2"  # most panels of the other have 15 and 16 only
         body = {"table": table, "address": first, "values": values}
         return Ask(client, ("POST", f"/api/v1/lines/{line}/broadcast", body),
-                   [(self.stations_of(line), written(table, first, values, alone))], ("broadcast",), "engineer")
+                   [(self.reached(line), written(table, first, values, alone))], ("broadcast",), "engineer")
 
     def place(self, writes):
         """(path, entry of a batch, part) of items of a station, by table or in its notation."""

@@ -52,10 +52,12 @@ class LineRules {
 
     /// A request as it was asked and, where it was translated, as it is sent.
     struct Question {
-        std::uint8_t station = 0;  ///< 0: a broadcast, judged at each listed station
+        std::uint8_t station = 0;  ///< 0: a broadcast, judged at each station that is known
         const modbus::Request* asked = nullptr;
         const modbus::Request* sent = nullptr;  ///< null: as asked
         bool raw = false;
+        /// What it does. A function that only its vendor knows may read as well as write.
+        Acts acts() const;
     };
     /// The gateway's own requests are allowed. Nobody (null) is somebody without role and address.
     Verdict judge(const WhoRef& who, const Question& question) const;
@@ -107,6 +109,7 @@ class LineRules {
     std::shared_ptr<const Settings> settings_;
     std::string line_;
     std::vector<std::uint8_t> listed_;
+    std::vector<std::uint8_t> known_;  ///< the listed ones, and others that a rule names
     /// By address; a rule's items of stations that are not listed.
     std::vector<std::vector<modbus::Span>> unlisted_items_;
     mutable std::vector<Meetings> meetings_;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "panelgate/base/network.hpp"
+#include "panelgate/base/role.hpp"
 #include "panelgate/base/who.hpp"
 #include "panelgate/modbus/function.hpp"
 
@@ -21,6 +22,8 @@ namespace panelgate::access {
 enum class Act : std::uint8_t { read, write, broadcast, raw };
 /// Returns its name in the configuration.
 std::string_view label(Act act);
+/// Returns the right of a role that it takes.
+Right right_of(Act act);
 
 /// A set of them.
 class Acts {

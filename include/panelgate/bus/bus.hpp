@@ -29,6 +29,7 @@ namespace panelgate::bus {
 struct LineEvent {
     bool up = false;
     std::string why;  ///< cause, when the line is down; or the finding
+    std::uint8_t station = 0;  ///< that the finding is about; 0: none alone
 };
 /// A request was answered.
 struct TransactionEvent {
@@ -71,6 +72,7 @@ struct Settings {
     /// True while no write may be sent, as it could not be recorded. May be empty.
     std::function<bool()> refuses_writes{};
     std::shared_ptr<const access::LineRules> access{};  ///< null: everybody may do everything
+    Admit admit{};  ///< what doors say now; empty: what they said. Must not call the bus
 };
 
 /// Drives one line with one arbiter. Not thread-safe: use it only on the executor's thread.
@@ -87,6 +89,7 @@ class Bus final : public LineBus {
     void stop() override;
     void apply(Settings settings, std::unique_ptr<line::Line> line,
                std::shared_ptr<void> far_end) override;
+    void judge_waiting() override;
 
     void transact(Request request, AnswerHandler handler) override;
     void count_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) override;

@@ -258,6 +258,8 @@ class LineBus : public BusClient {
     /// line is closed. A null `line` keeps the current one: only where is_same_wire().
     virtual void apply(Settings settings, std::unique_ptr<line::Line> line,
                        std::shared_ptr<void> far_end) = 0;
+    /// Doors have changed (Settings::admit): refuses what waits and would not be let in now.
+    virtual void judge_waiting() {}
     /// Returns when no request sent on this wire can still be answered (P1).
     virtual TimePoint clear_at() const { return {}; }
     /// Sends no request before `until`.

@@ -13,6 +13,7 @@
 #include "panelgate/access/line_rules.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
+#include "panelgate/base/role.hpp"
 #include "panelgate/base/who.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
@@ -85,12 +86,28 @@ struct Refusal {
     /// the role that lacks a right.
     std::string why{};
     std::string_view lacking{};  ///< the right that a role lacks; empty: something else refuses
+    std::string_view door{};     ///< why its door lets it in no more, a clause; empty: it does
 
     friend bool operator==(const Refusal&, const Refusal&) = default;
 };
 
 /// Refuses what rules deny, or what the client's role may not.
 Refusal denial(const access::Verdict& verdict, std::string station);
+
+/// What somebody who has come in may do now, where that is less than all that was asked of his door
+/// when he came: doors change while requests wait.
+struct Admission {
+    WhoRef who{};               ///< with the role that he would have now
+    panelgate::Rights may{};    ///< of what reaches a line
+    std::string_view rule{};    ///< what keeps him out: "token", "allow", "access"; empty: his role
+    std::string_view why{};     ///< a clause for the user
+};
+/// Nothing: he may what he could when he came in.
+using Admit = std::function<std::optional<Admission>(const WhoRef&)>;
+
+/// Returns why the door would not let this request in any more, if so.
+std::optional<Refusal> refusal_at_door(const Admission& now, access::Acts acts,
+                                       std::string station);
 
 /// Refuses a write that could not be recorded: a client should try again later.
 Refusal unrecorded(std::string station);

@@ -123,9 +123,8 @@ Handling get_line(HttpRequest request, const Api* api) {
     json::object body = describe(**line, status);
     body["findings"] = describe(status.findings);
     std::vector<bus::ClientShare> clients = (*line)->bus->clients();
-    // Polls and relays are called by their stations.
-    if (!sight.whole(**line))
-        std::erase_if(clients, [](const bus::ClientShare& one) { return !one.address; });
+    // Whom they ask, and what they get, is about all stations.
+    if (!sight.whole(**line)) clients.clear();
     body["clients"] = describe(clients);
     co_return json_response(200, body);
 }

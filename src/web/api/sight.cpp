@@ -160,6 +160,7 @@ bool Sight::named(std::string_view line_name, std::string_view station_name,
 
 bool Sight::event(const EventTopic& topic) const {
     if (!topic.station.empty()) return named(topic.line, topic.station, topic.point);
+    if (!topic.about.empty()) return named(topic.line, topic.about, "");
     const LineEntry* on = directory_.find_line(topic.line);
     if (on == nullptr) return everything();
     // What others tell may be about any of the line's stations.
@@ -177,6 +178,7 @@ void Sight::mask(const LineEntry& line, bus::TracePart& part) const {
         }
         frame.bytes.clear();
         frame.why.clear();
+        frame.hidden = true;
     }
     for (bus::TraceDecision& decision : part.decisions) decision.text = kHidden;
     for (bus::TraceTransaction& one : part.transactions) {
@@ -187,6 +189,8 @@ void Sight::mask(const LineEntry& line, bus::TracePart& part) const {
         one.reply.clear();
         one.client.clear();
         one.reason = kHidden;
+        one.hidden = true;
+        one.first_byte_in = one.last_byte_in = one.answered = std::nullopt;
         if (!station(line, one.station)) one.station = 0;
     }
 }
@@ -205,8 +209,10 @@ std::optional<Problem> check_line(const HttpRequest& request, const Directory& d
     const LineEntry* line = directory.find_line(request.path[3]);
     const bool discovers = request.path.size() > 4 && request.path[4] == "discover";
     if (line == nullptr || (request.method == "POST" && !discovers)) return std::nullopt;
+    // What it records of the line is of all stations.
+    const bool of_all = discovers || (request.path.size() > 4 && request.path[4] == "history");
     const Sight sight(directory, discovers ? as_reader(request, Right::discover) : who);
-    if (discovers ? sight.whole(*line) : sight.line(*line)) return std::nullopt;
+    if (of_all ? sight.whole(*line) : sight.line(*line)) return std::nullopt;
     const auto hidden = std::ranges::find_if(directory.stations, [&](const StationEntry& one) {
         return one.line == line->name && !sight.whole(*line, one.id);
     });
@@ -283,7 +289,8 @@ std::string_view label_in(std::string_view line, std::string_view name) {
 bool is_seen(std::string_view line, const Sight& sight) {
     if (line.starts_with('#')) return true;
     if (!label_in(line, "relay").empty()) return false;
-    if (!label_in(line, "rule").empty()) return sight.everything();
+    for (const std::string_view whose : {"rule", "token"})
+        if (!label_in(line, whose).empty()) return sight.everything();
     return sight.named(label_in(line, "line"), label_in(line, "station"), label_in(line, "point"));
 }
 

@@ -142,6 +142,7 @@ Parsed<modbus::Table> table_to_read(const Items& items) {
 namespace {
 
 std::string why_denied(const bus::Refusal& refusal) {
+    if (!refusal.door.empty()) return std::string(refusal.door);
     if (!refusal.lacking.empty())
         return "the role '" + refusal.why + "' does not have the right " +
                std::string(refusal.lacking);

@@ -113,6 +113,8 @@ namespace asio = boost::asio;
 namespace json = boost::json;
 namespace {
 
+constexpr std::string_view kHidden = "hidden";
+
 double seconds(TimePoint at) { return to_seconds(at.time_since_epoch()); }
 
 json::value seconds(const std::optional<TimePoint>& at) {
@@ -152,7 +154,7 @@ json::object trace_json(const bus::TraceFrame& frame) {
     object["station"] = nullptr;
     if (!frame.bytes.empty()) object["station"] = frame.bytes.front();
     object["bytes"] = upper_hex(frame.bytes);
-    object["note"] = label(frame.kind);
+    object["note"] = frame.hidden ? kHidden : label(frame.kind);
     if (!frame.why.empty()) object["why"] = frame.why;
     if (frame.transaction != 0) object["transaction"] = frame.transaction;
     return object;
@@ -177,7 +179,7 @@ json::object trace_json(const bus::TraceTransaction& transaction) {
     object["reason"] = transaction.reason;
     object["client"] = nullptr;
     if (!transaction.client.empty()) object["client"] = transaction.client;
-    object["outcome"] = label(transaction.end);
+    object["outcome"] = transaction.hidden ? kHidden : label(transaction.end);
     object["arrived"] = seconds(transaction.arrived);
     object["granted"] = seconds(transaction.granted);
     object["first_bit_out"] = seconds(transaction.first_bit_out);

@@ -134,6 +134,26 @@ TEST(LineRules, ABroadcastWritesToEveryListedStation) {
     EXPECT_EQ(refused(settings, kScada, 0, "06 0064 0001"_hex), "") << "another line";
 }
 
+TEST(LineRules, ABroadcastWritesToAStationThatOnlyARuleKnows) {
+    Settings settings;
+    settings.rules = {{.name = "far", .acts = {Act::write}, .stations = {{"floor1", 44}}}};
+    EXPECT_EQ(refused(settings, kScada, 0, "06 0064 0001"_hex), "far");
+    settings.rules[0].tokens = {"ops"};
+    EXPECT_EQ(refused(settings, kScada, 0, "06 0064 0001"_hex), "") << "about somebody else";
+    settings.rules = {{.name = "far", .acts = {Act::write}, .stations = {{"floor2", 44}}}};
+    EXPECT_EQ(refused(settings, kScada, 0, "06 0064 0001"_hex), "") << "another line";
+}
+
+TEST(LineRules, AFunctionThatOnlyItsVendorKnowsReadsAndWrites) {
+    for (const Act act : {Act::read, Act::write}) {
+        const Settings settings{.rules = {{.name = "no", .acts = {act}}}};
+        EXPECT_EQ(refused(settings, kScada, 20, "41 01"_hex), "no");
+        EXPECT_EQ(refused(settings, kScada, 20, "41 01"_hex, true), "no") << "raw, too";
+    }
+    const Settings blind{.rules = {{.name = "blind", .acts = {Act::read}}}};
+    EXPECT_EQ(refused(blind, kScada, 20, "08 0000 1234"_hex), "") << "08 tells nothing of a panel";
+}
+
 TEST(LineRules, ARawRequestIsAlsoWhatItDoes) {
     Settings settings;
     settings.rules = {{.name = "no-writes", .acts = {Act::write}}};

@@ -101,7 +101,9 @@ inline std::vector<Touch> touches(const Bytes& pdu) {
     if (!all.empty()) return all;
     const bool reads =
         lists<int>({7, 11, 12, 17, 20, 24}, pdu[0]) || (pdu[0] == 43 && pdu[1] == 14);
-    return {{reads ? Act::read : Act::write, {}, 0}};
+    if (reads) return {{Act::read, {}, 0}};
+    if (lists<int>({8, 21}, pdu[0])) return {{Act::write, {}, 0}};
+    return {{Act::read, {}, 0}, {Act::write, {}, 0}};
 }
 
 inline bool has_item(const Rule& rule, const Place& place, const Touch& one) {

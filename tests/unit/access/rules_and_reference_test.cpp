@@ -1,6 +1,7 @@
 // Generated rules and requests: LineRules decides as the reference does.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <random>
@@ -20,6 +21,7 @@ using modbus::Span;
 using modbus::Table;
 
 constexpr std::uint32_t kNear = 40;  ///< items that ranges and requests share, so that edges meet
+constexpr std::uint8_t kFar = 9;       ///< is not listed
 
 /// Draws rules, clients and requests of two lines. From a seed, so that a case can be seen again.
 class Draw {
@@ -69,7 +71,7 @@ class Draw {
     }
 
   private:
-    std::uint8_t station() { return one_of<std::uint8_t>({1, 2, 3, 9}); }
+    std::uint8_t station() { return one_of<std::uint8_t>({1, 2, 3, kFar}); }
     Span span() {
         const unsigned first = below(kNear);
         return {one_of<Table>({modbus::kTables.begin(), modbus::kTables.end()}), first,
@@ -169,6 +171,12 @@ class Draw {
     std::mt19937 random_;
 };
 
+bool names(const Settings& settings, const Place& place) {
+    return std::ranges::any_of(settings.rules, [&](const Rule& rule) {
+        return reference::lists(rule.stations, place);
+    });
+}
+
 bool judged(const LineRules& rules, const WhoRef& who, const reference::Case& one) {
     const auto asked = test::request_of(one.asked);
     std::optional<modbus::Request> sent;
@@ -195,7 +203,9 @@ TEST(RulesAndReference, DecideAlikeInTwoThousandGeneratedCases) {
         for (unsigned i = 0; i < kRequests; ++i) {
             const bool first = draw.chance(50);
             const WhoRef& who = draw.one_of(people);
-            const reference::Case one = draw.request(first ? "floor1" : "floor2", listed);
+            reference::Case one = draw.request(first ? "floor1" : "floor2", listed);
+            if (one.broadcast && names(*settings, {first ? "floor1" : "floor2", kFar}))
+                one.places.emplace_back(first ? "floor1" : "floor2", kFar);
             const bool allowed = reference::allows(*settings, *who, one);
             denied += allowed ? 0U : 1U;
             ASSERT_EQ(judged(first ? floor1 : floor2, who, one), allowed)

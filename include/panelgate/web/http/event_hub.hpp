@@ -21,6 +21,7 @@ struct EventTopic {
     std::string line;
     std::string station;
     std::string point;
+    std::string about{};  ///< a station that its text is about: for may_see, no filter asks for it
 };
 
 /// Which events a client wants. An empty set allows all; otherwise the event must match an entry,

@@ -1,0 +1,129 @@
+#include "doors.hpp"
+
+#include <algorithm>
+#include <boost/asio/ip/address.hpp>
+#include <boost/system/error_code.hpp>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "panelgate/rt/acceptor.hpp"
+
+namespace panelgate::app {
+
+namespace {
+
+using bus::Admission;
+
+bool is_allowed(const std::vector<Network>& allow, const std::string& address) {
+    if (allow.empty() || address.empty()) return true;
+    boost::system::error_code none;
+    const auto peer = boost::asio::ip::make_address(address, none);
+    return !none && rt::AccessList(allow).allows(peer);
+}
+
+Admission out(const WhoRef& who, std::string_view rule, std::string_view why) {
+    return {.who = who, .rule = rule, .why = why};
+}
+
+Admission not_allowed(const WhoRef& who) {
+    return out(who, "allow", "its address is not in the allow list any more");
+}
+
+/// With another role than he came in with.
+Admission with(const WhoRef& who, Standing standing) {
+    Who now = *who;
+    now.standing = std::move(standing);
+    panelgate::Rights may = now.standing.own ? now.standing.own->rights : rights_of(now.standing.role);
+    return {.who = make_who(std::move(now)), .may = may};
+}
+
+panelgate::Rights rights(std::initializer_list<Right> all) {
+    panelgate::Rights made;
+    for (const Right right : all) made.add(right);
+    return made;
+}
+
+Admission only_reads(const WhoRef& who, std::string_view rule, std::string_view why) {
+    return {.who = who, .may = rights({Right::read}), .rule = rule, .why = why};
+}
+
+}  // namespace
+
+void Doors::change(std::shared_ptr<const config::Config> config) {
+    if (config_ && config_->http && config->http) {
+        for (const web::Token& token : config->http->tokens) {
+            const auto before =
+                std::ranges::find(config_->http->tokens, token.name, &web::Token::name);
+            if (before != config_->http->tokens.end() && before->hash != token.hash)
+                renewed_.insert(token.name);
+        }
+    }
+    config_ = std::move(config);
+}
+
+std::optional<Admission> Doors::admit(const WhoRef& who, WallTime at) const {
+    if (!config_ || !who) return std::nullopt;
+    switch (who->face) {
+        case Face::http:
+            return by_http(who, at);
+        case Face::modbus_tcp:
+        case Face::udp:
+            return by_modbus(who);
+        case Face::serial_master:
+            return by_serial(who);
+        case Face::mqtt:
+            return by_broker(who);
+        case Face::gateway:
+            break;
+    }
+    return std::nullopt;
+}
+
+std::optional<Admission> Doors::by_http(const WhoRef& who, WallTime at) const {
+    if (!config_->http) return std::nullopt;
+    const web::Settings& http = *config_->http;
+    if (!is_allowed(http.allow, who->address)) return not_allowed(who);
+    if (who->token.empty()) {
+        // The listener lets those go whose certificate means something else now.
+        if (!who->certificate.empty() && http.tls && http.tls->role_from_certificate)
+            return std::nullopt;
+        if (http.anonymous == who->standing) return std::nullopt;
+        return with(who, http.anonymous);
+    }
+    const auto token = std::ranges::find(http.tokens, who->token, &web::Token::name);
+    if (token == http.tokens.end() || renewed_.contains(who->token))
+        return out(who, "token", "the token that it was sent with is not known any more");
+    if (token->expires && *token->expires <= at)
+        return out(who, "token", "the token that it was sent with has expired");
+    if (token->standing == who->standing) return std::nullopt;
+    return with(who, token->standing);
+}
+
+std::optional<Admission> Doors::by_modbus(const WhoRef& who) const {
+    const auto listener = std::ranges::find_if(
+        config_->modbus_tcp, [&](const auto& one) { return one.name() == who->listener; });
+    if (listener == config_->modbus_tcp.end()) return std::nullopt;
+    if (!is_allowed(listener->allow, who->address)) return not_allowed(who);
+    if (listener->read_only) return only_reads(who, "access", "its listener is read-only now");
+    if (listener->broadcast == tcp_server::BroadcastMode::deny)
+        return Admission{.who = who,
+                         .may = rights({Right::read, Right::write}),
+                         .rule = "access",
+                         .why = "its listener takes no broadcasts now"};
+    return std::nullopt;
+}
+
+std::optional<Admission> Doors::by_serial(const WhoRef& who) const {
+    const auto master = std::ranges::find(config_->serial_masters, who->listener,
+                                          &serial_server::Settings::name);
+    if (master == config_->serial_masters.end() || !master->access.read_only) return std::nullopt;
+    return only_reads(who, "access", "its port is read-only now");
+}
+
+std::optional<Admission> Doors::by_broker(const WhoRef& who) const {
+    if (config_->mqtt && config_->mqtt->write) return std::nullopt;
+    return only_reads(who, "access", "writes over MQTT are off now");
+}
+
+}  // namespace panelgate::app
