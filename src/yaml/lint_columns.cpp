@@ -380,8 +380,9 @@ class Columns {
                                     "key");
                 return;
             case Edit::What::dash_on:
-                tell(row.token,
-                     "a '- ' is missing before " + word(edit.row) + " (a new item of the list)");
+                tell(row.token, "a '- ' is missing before " + word(edit.row) +
+                                    (edit.by == 0 ? " (a new item of the list)"
+                                                  : "; type it in place of the 2 blanks there"));
                 return;
             case Edit::What::dash_off: {
                 const auto near = neighbour(cause, true);
