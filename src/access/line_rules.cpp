@@ -33,7 +33,9 @@ bool lacks(const WhoRef& who, Act act) {
     return who && who->standing.own && !who->standing.own->rights.has(right_of(act));
 }
 
-Verdict by_role(const WhoRef& who, Act act) { return {false, nullptr, act, who->standing.own->name}; }
+Verdict by_role(const WhoRef& who, Act act) {
+    return {false, nullptr, act, who->standing.own->name};
+}
 
 /// What functions that name no items do.
 Acts acts_without_items(const modbus::Request& request) {

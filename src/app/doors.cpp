@@ -34,7 +34,8 @@ Admission not_allowed(const WhoRef& who) {
 Admission with(const WhoRef& who, Standing standing) {
     Who now = *who;
     now.standing = std::move(standing);
-    panelgate::Rights may = now.standing.own ? now.standing.own->rights : rights_of(now.standing.role);
+    panelgate::Rights may =
+        now.standing.own ? now.standing.own->rights : rights_of(now.standing.role);
     return {.who = make_who(std::move(now)), .may = may};
 }
 
@@ -46,6 +47,17 @@ panelgate::Rights rights(std::initializer_list<Right> all) {
 
 Admission only_reads(const WhoRef& who, std::string_view rule, std::string_view why) {
     return {.who = who, .may = rights({Right::read}), .rule = rule, .why = why};
+}
+
+/// As web::standing_of(): by the certificate where the listener goes by that.
+Standing standing_without_token(const Who& who, const web::Settings& http) {
+    const bool by_certificate =
+        !who.certificate.empty() && http.tls && http.tls->role_from_certificate;
+    if (!by_certificate) return http.anonymous;
+    Standing named = standing_named(who.certificate_role, http.tls->own_roles);
+    if (named != Standing{}) return named;
+    if (!http.anonymous.may(Right::read)) return {};
+    return http.anonymous.exceeds(Role::viewer) ? Standing(Role::viewer) : http.anonymous;
 }
 
 }  // namespace
@@ -85,11 +97,9 @@ std::optional<Admission> Doors::by_http(const WhoRef& who, WallTime at) const {
     const web::Settings& http = *config_->http;
     if (!is_allowed(http.allow, who->address)) return not_allowed(who);
     if (who->token.empty()) {
-        // The listener lets those go whose certificate means something else now.
-        if (!who->certificate.empty() && http.tls && http.tls->role_from_certificate)
-            return std::nullopt;
-        if (http.anonymous == who->standing) return std::nullopt;
-        return with(who, http.anonymous);
+        const Standing now = standing_without_token(*who, http);
+        if (now == who->standing) return std::nullopt;
+        return with(who, now);
     }
     const auto token = std::ranges::find(http.tokens, who->token, &web::Token::name);
     if (token == http.tokens.end() || renewed_.contains(who->token))
@@ -115,8 +125,8 @@ std::optional<Admission> Doors::by_modbus(const WhoRef& who) const {
 }
 
 std::optional<Admission> Doors::by_serial(const WhoRef& who) const {
-    const auto master = std::ranges::find(config_->serial_masters, who->listener,
-                                          &serial_server::Settings::name);
+    const auto master =
+        std::ranges::find(config_->serial_masters, who->listener, &serial_server::Settings::name);
     if (master == config_->serial_masters.end() || !master->access.read_only) return std::nullopt;
     return only_reads(who, "access", "its port is read-only now");
 }

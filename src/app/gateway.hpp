@@ -116,7 +116,7 @@ class Gateway {
     std::unique_ptr<Scrapes> scrapes_;  ///< null until `http:` is configured
     Servers servers_;
     Northbound northbound_;
-    std::unique_ptr<CertificateWatch> certificates_;  ///< null until a listener has `tls`
+    std::unique_ptr<CertificateWatch> certificates_;           ///< null until a listener has `tls`
     std::unique_ptr<rt::Alarm> expiry_ = clock_.make_alarm();  ///< of a token
     WallTime expired_until_{};                                 ///< looked at for expiry so far
     bool ready_ = false;

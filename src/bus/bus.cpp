@@ -240,9 +240,7 @@ void Bus::apply(Settings settings, std::unique_ptr<line::Line> line,
 }
 
 void Bus::judge_waiting() {
-    state_->call([&] {
-        state_->drive.tell([&](TimePoint now) { state_->deny_forbidden(now); });
-    });
+    state_->call([&] { state_->drive.tell([&](TimePoint now) { state_->deny_forbidden(now); }); });
 }
 
 void Bus::transact(Request request, AnswerHandler handler) {

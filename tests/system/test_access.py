@@ -5,7 +5,9 @@ import pathlib
 import subprocess
 import tempfile
 import threading
+import time
 import unittest
+import urllib.request
 
 import config
 import harness
@@ -32,10 +34,10 @@ ILLEGAL = b"\x01"
 
 
 @contextlib.contextmanager
-def plant(rules=RULES, roles=None, **more):
+def plant(rules=RULES, roles=None, line=None, **more):
     with tempfile.TemporaryDirectory() as folder:
         door = config.ADMIN + f", tokens: {tokens(folder, roles or {'eye': 'viewer', 'lab': 'engineer'})}"
-        text = config.gateway(config.line(stations=STATIONS.strip()), http=door, access=rules, **more)
+        text = config.gateway(config.line(stations=STATIONS.strip(), **(line or {})), http=door, access=rules, **more)
         file = pathlib.Path(folder) / "panelgate.yaml"
         file.write_text(text)
         with harness.Program("run", "-c", str(file)) as program:
@@ -43,6 +45,24 @@ def plant(rules=RULES, roles=None, **more):
             program.http_port()  # the last that it opens
             until(lambda: ask(program, "GET", "/api/v1/stations/oven/points/secret-heat")[1].find('"good"') > 0)
             yield program
+
+
+@contextlib.contextmanager
+def stream(program, token, query=""):
+    headers = {"Authorization": f"Bearer token-of-{token}-0123456789"}
+    request = urllib.request.Request(program.url("/api/v1/events" + query), headers=headers)
+    with urllib.request.urlopen(request, timeout=harness.PATIENCE) as heard:
+        yield heard
+
+
+def read_until(heard, word):
+    text = ""
+    while word not in text:
+        part = heard.read1(65536).decode()
+        if not part:
+            raise AssertionError("the stream has ended: " + text)
+        text += part
+    return text
 
 
 def frames(program):
@@ -95,6 +115,45 @@ class Rules(unittest.TestCase):
             items = {"items": [{"point": "press/warmth"}, {"station": "oven", "device": "GDT100"}, {"point": "oven/secret-heat"}]}
             answer = json.loads(ask(program, "POST", "/api/v1/read", "eye", items)[1])
             self.assertEqual([one["status"] for one in answer["results"]], [200, 403, 403], answer)
+
+
+class Waiting(unittest.TestCase):
+    """A right that goes while a request waits for its turn."""
+
+    def answer_after(self, program, name, act, before, now):
+        said = []
+        asking = lambda: sum(one["requests"] for one in program.get("/api/v1/lines/floor1")[1]["clients"] if name in one["name"])
+        count = asking()
+        thread = threading.Thread(target=lambda: said.append(act()))
+        thread.start()
+        until(lambda: asking() > count)
+        text = program.file.read_text()
+        self.assertIn(before, text)
+        program.file.write_text(text.replace(before, now))
+        self.assertEqual(ask(program, "POST", "/api/v1/reload")[0], 200)
+        thread.join()
+        program.file.write_text(text)
+        self.assertEqual(ask(program, "POST", "/api/v1/reload")[0], 200)
+        return said[0]
+
+    def test_nothing_is_sent_for_who_has_lost_it(self):
+        slow = {"timing": "{response_timeout: 8s}", "queue": "{deadline: 30s}"}
+        path = "/api/v1/stations/oven/devices/GDT150"
+        with plant("{rules: []}", roles={"lab": "operator"}, line=slow) as program, program.client() as client:
+            self.assertEqual(ask(program, "PUT", "/api/v1/simulator/press", None, {"slow_ms": 5000})[0], 200)
+            write = lambda: ask(program, "PUT", path, "lab", {"values": [1]})
+            read = lambda: ask(program, "GET", path, "lab")
+            modbus = lambda: (client.ask(20, write_register(150, 1)), "{}")
+            named = "{name: lab, role: operator"
+            for name, act, before, now, expected, rule in (
+                    ("token lab", write, named, "{name: lab, role: viewer", 403, "viewer"),
+                    ("token lab", write, named, "{name: other, role: operator", 403, "token"),
+                    ("token lab", read, named, "{name: lab, expires: 2020-01-01, role: operator", 403, "token"),
+                    ("modbus_tcp", modbus, "modbus_tcp: [{", "modbus_tcp: [{access: read_only, ", b"\x86" + ILLEGAL, None)):
+                status, text = self.answer_after(program, name, act, before, now)
+                self.assertEqual((status, json.loads(text).get("rule")), (expected, rule), (now, text))
+            sent = [one for one in frames(program) if one["station"] == 20 and one["reason"] == "write"]
+            self.assertEqual(sent, [])
 
 
 class Viewer(unittest.TestCase):
@@ -168,7 +227,16 @@ class Viewer(unittest.TestCase):
             self.assertEqual({one["station"] for one in trace["transactions"]}, {31, 0})
             for one in trace["transactions"]:
                 self.assertEqual(one["request"] == "", one["station"] == 0, "that something was there, not what")
+                self.assertEqual(one["outcome"] == "hidden", one["station"] == 0)
             self.assertLessEqual({one["station"] for one in trace["frames"]}, {31, None})
+            hidden = [one for one in trace["frames"] if one["station"] is None]
+            self.assertEqual({(one["note"], one["direction"]) for one in hidden}, {("hidden", "sent")}, "whether it was answered")
+            self.assertEqual(json.loads(ask(program, "GET", "/api/v1/lines/floor1", "eye")[1])["clients"], [])
+            history = lambda token: json.loads(ask(program, "GET", "/api/v1/lines/floor1/history", token)[1])["samples"]
+            until(lambda: any(one["latency_ms"] for one in history("lab")))
+            self.assertEqual({(one["errors"], one["latency_ms"], one["wire_ms"]) for one in history("eye")}, {(None,) * 3})
+            self.assertIn('token="lab"', ask(program, "GET", "/metrics", "lab")[1])
+            self.assertNotIn("token=", metrics)
 
     def test_denials_of_reads_count_by_the_rule_that_decides_and_are_not_shown_to_him(self):
         with plant() as program:
@@ -205,6 +273,32 @@ class Viewer(unittest.TestCase):
             self.assertIn("oven", seen["lab"])
             self.assertIn("press", seen["eye"])
             self.assertNotIn("oven", seen["eye"])
+
+    def test_a_finding_about_another_station_is_no_event_for_him(self):
+        with plant() as program, contextlib.ExitStack() as streams:
+            heard = {token: streams.enter_context(stream(program, token, "?types=line")) for token in ("eye", "lab")}
+            self.assertEqual(ask(program, "PUT", "/api/v1/simulator/oven", "lab", {"dead": True})[0], 200)
+            self.assertIn("station oven", read_until(heard["lab"], "station oven"))
+            file = program.file
+            file.write_text(file.read_text().replace("tokens: [eye], stations: [press]", "tokens: [eye], stations: [press, oven]"))
+            self.assertEqual(ask(program, "PUT", "/api/v1/simulator/oven", "lab", {"dead": False})[0], 200)
+            read_until(heard["lab"], "finding gone")
+            self.assertEqual(ask(program, "POST", "/api/v1/reload")[0], 200)
+            self.assertEqual(ask(program, "PUT", "/api/v1/simulator/oven", "lab", {"dead": True})[0], 200)
+            self.assertEqual(read_until(heard["eye"], "station oven").count("oven"), 1, "the one since he may read it")
+
+    def test_a_stream_ends_with_its_token(self):
+        with tempfile.TemporaryDirectory() as folder, plant(audit=f"{{file: {folder}/audit.jsonl}}") as program:
+            file = program.file
+            end = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(time.time() + 3))
+            file.write_text(file.read_text().replace("name: eye, role: viewer", f'name: eye, role: viewer, expires: "{end}"'))
+            self.assertEqual(ask(program, "POST", "/api/v1/reload")[0], 200)
+            with stream(program, "eye") as heard:
+                while heard.read1(65536):
+                    pass
+            self.assertEqual(ask(program, "GET", "/api/v1/stations", "eye")[0], 401)
+            records = lambda: map(json.loads, pathlib.Path(folder, "audit.jsonl").read_text().splitlines())
+            until(lambda: any((one.get("token"), one.get("event")) == ("eye", "expired") for one in records()))
 
     def test_another_file_changes_what_is_seen_and_nobody_loses_a_stream(self):
         with plant() as program:
@@ -249,6 +343,18 @@ class Mqtt(unittest.TestCase):
                 self.assertTrue(listener.wait_for(f"{topic}/level/set/result")["ok"])
                 self.assertEqual(listener.of(f"{topic}/ramp"), [])
                 self.assertIn('rule="mode-is-fixed"} 1', program.get("/metrics")[1])
+
+
+    def test_does_not_tell_of_a_line_of_which_it_may_read_nothing(self):
+        hidden = config.line("floor2", stations="{id: 5, name: hidden, profile: generic}")
+        rules = "\naccess: {rules: [{name: not-there, deny: [read], faces: [mqtt], stations: [hidden]}]}\n"
+        with mqtt_side.Broker() as broker, mqtt_side.Listener(broker) as listener:
+            text = mqtt_side.plant(broker)
+            with harness.configured(text.replace("mqtt: {", hidden + "mqtt: {", 1) + rules) as program:
+                listener.wait_for(f"{mqtt_side.TOPIC}/line/floor1/state")
+                listener.wait_for(f"{mqtt_side.TOPIC}/press/level")
+                self.assertTrue(program.get("/api/v1/lines/floor2")[1]["up"])
+                self.assertEqual(listener.of(f"{mqtt_side.TOPIC}/line/floor2/state"), [])
 
 
 OWN_ROLES = """{roles: [{name: setter, rights: [read, write]}, {name: caller, rights: [read, raw]}, {name: keeper, rights: [reload]},

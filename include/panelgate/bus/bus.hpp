@@ -28,7 +28,7 @@ namespace panelgate::bus {
 /// The line went up or down, or a finding appeared or disappeared.
 struct LineEvent {
     bool up = false;
-    std::string why;  ///< cause, when the line is down; or the finding
+    std::string why;           ///< cause, when the line is down; or the finding
     std::uint8_t station = 0;  ///< that the finding is about; 0: none alone
 };
 /// A request was answered.

@@ -97,10 +97,10 @@ Refusal denial(const access::Verdict& verdict, std::string station);
 /// What somebody who has come in may do now, where that is less than all that was asked of his door
 /// when he came: doors change while requests wait.
 struct Admission {
-    WhoRef who{};               ///< with the role that he would have now
-    panelgate::Rights may{};    ///< of what reaches a line
-    std::string_view rule{};    ///< what keeps him out: "token", "allow", "access"; empty: his role
-    std::string_view why{};     ///< a clause for the user
+    WhoRef who{};             ///< with the role that he would have now
+    panelgate::Rights may{};  ///< of what reaches a line
+    std::string_view rule{};  ///< what keeps him out: "token", "allow", "access"; empty: his role
+    std::string_view why{};   ///< a clause for the user
 };
 /// Nothing: he may what he could when he came in.
 using Admit = std::function<std::optional<Admission>(const WhoRef&)>;

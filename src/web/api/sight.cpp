@@ -180,6 +180,10 @@ void Sight::mask(const LineEntry& line, bus::TracePart& part) const {
         frame.why.clear();
         frame.hidden = true;
     }
+    // Whether a hidden request was answered is hidden, too.
+    std::erase_if(part.frames, [](const bus::TraceFrame& frame) {
+        return frame.hidden && direction_of(frame.kind) == FrameDirection::received;
+    });
     for (bus::TraceDecision& decision : part.decisions) decision.text = kHidden;
     for (bus::TraceTransaction& one : part.transactions) {
         std::erase_if(one.discarded, [](const auto&) { return true; });
@@ -209,10 +213,8 @@ std::optional<Problem> check_line(const HttpRequest& request, const Directory& d
     const LineEntry* line = directory.find_line(request.path[3]);
     const bool discovers = request.path.size() > 4 && request.path[4] == "discover";
     if (line == nullptr || (request.method == "POST" && !discovers)) return std::nullopt;
-    // What it records of the line is of all stations.
-    const bool of_all = discovers || (request.path.size() > 4 && request.path[4] == "history");
     const Sight sight(directory, discovers ? as_reader(request, Right::discover) : who);
-    if (of_all ? sight.whole(*line) : sight.line(*line)) return std::nullopt;
+    if (discovers ? sight.whole(*line) : sight.line(*line)) return std::nullopt;
     const auto hidden = std::ranges::find_if(directory.stations, [&](const StationEntry& one) {
         return one.line == line->name && !sight.whole(*line, one.id);
     });

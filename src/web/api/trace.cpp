@@ -115,6 +115,14 @@ namespace {
 
 constexpr std::string_view kHidden = "hidden";
 
+std::string_view note_of(const bus::TraceFrame& frame) {
+    return frame.hidden ? kHidden : label(frame.kind);
+}
+
+std::string_view outcome_of(const bus::TraceTransaction& transaction) {
+    return transaction.hidden ? kHidden : label(transaction.end);
+}
+
 double seconds(TimePoint at) { return to_seconds(at.time_since_epoch()); }
 
 json::value seconds(const std::optional<TimePoint>& at) {
@@ -154,7 +162,7 @@ json::object trace_json(const bus::TraceFrame& frame) {
     object["station"] = nullptr;
     if (!frame.bytes.empty()) object["station"] = frame.bytes.front();
     object["bytes"] = upper_hex(frame.bytes);
-    object["note"] = frame.hidden ? kHidden : label(frame.kind);
+    object["note"] = note_of(frame);
     if (!frame.why.empty()) object["why"] = frame.why;
     if (frame.transaction != 0) object["transaction"] = frame.transaction;
     return object;
@@ -179,7 +187,7 @@ json::object trace_json(const bus::TraceTransaction& transaction) {
     object["reason"] = transaction.reason;
     object["client"] = nullptr;
     if (!transaction.client.empty()) object["client"] = transaction.client;
-    object["outcome"] = transaction.hidden ? kHidden : label(transaction.end);
+    object["outcome"] = outcome_of(transaction);
     object["arrived"] = seconds(transaction.arrived);
     object["granted"] = seconds(transaction.granted);
     object["first_bit_out"] = seconds(transaction.first_bit_out);
@@ -261,7 +269,7 @@ std::string_view mark_of(FrameKind kind) {
 std::string row(const bus::TraceTransaction& one) {
     std::string text = rfc3339(one.time) + ' ' + right(std::to_string(one.id), 8) + ' ' +
                        right(std::to_string(one.station), 7) + ' ' + left(one.reason, 11) + ' ' +
-                       left(std::string(label(one.end)), 9);
+                       left(std::string(outcome_of(one)), 9);
     const std::optional<TimePoint> end = one.answered       ? one.answered
                                          : one.last_byte_in ? one.last_byte_in
                                                             : one.last_bit_out;
@@ -274,7 +282,7 @@ std::string row(const bus::TraceTransaction& one) {
     text += frame_row(">", one.request, "");
     if (!one.reply.empty()) text += frame_row("<", one.reply, "");
     for (const bus::TraceFrame& frame : one.discarded)
-        text += frame_row("x", frame.bytes, label(frame.kind));
+        text += frame_row("x", frame.bytes, note_of(frame));
     return text;
 }
 
@@ -285,7 +293,7 @@ std::string row(const bus::TraceDecision& one) {
 /// A row for a frame whose transaction is not in the part.
 std::string row(const bus::TraceFrame& one) {
     return rfc3339(one.time) + "    " + std::string(mark_of(one.kind)) + ' ' +
-           upper_hex(one.bytes) + "  " + std::string(label(one.kind)) + '\n';
+           upper_hex(one.bytes) + "  " + std::string(note_of(one)) + '\n';
 }
 
 }  // namespace

@@ -248,6 +248,14 @@ std::string token_name(const HttpRequest& request, const Settings& settings) {
     return token == nullptr ? std::string() : token->name;
 }
 
+Duration time_of_token(const std::string& name, const Site& site, Duration most) {
+    const auto token = std::ranges::find(site.settings.tokens, name, &Token::name);
+    if (token == site.settings.tokens.end() || !token->expires || !site.wall) return most;
+    const std::chrono::microseconds left = *token->expires - site.wall();  // may be years
+    if (left >= std::chrono::ceil<std::chrono::microseconds>(most)) return most;
+    return std::max(Duration(left), Duration::zero());
+}
+
 namespace asio = boost::asio;
 namespace {
 

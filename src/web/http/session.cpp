@@ -14,7 +14,6 @@
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/write.hpp>
 #include <boost/system/error_code.hpp>
-#include <chrono>
 #include <exception>
 #include <optional>
 #include <string>
@@ -400,19 +399,8 @@ std::string HttpSession::head_of_events() const {
            "Connection: close\r\n\r\n: panelgate\n\n";
 }
 
-Duration HttpSession::time_of_token(Duration most) const {
-    const Site& site = *shared_->site;
-    if (caller_->token().empty() || !site.wall) return most;
-    const auto& tokens = site.settings.tokens;
-    const auto token = std::ranges::find(tokens, caller_->token(), &Token::name);
-    if (token == tokens.end() || !token->expires) return most;
-    const auto left = *token->expires - site.wall();
-    if (left >= std::chrono::ceil<std::chrono::microseconds>(most)) return most;
-    return std::max(Duration(left), Duration::zero());
-}
-
-/// Streams events until the client leaves, its token expires or the server stops. A comment every 15 s keeps
-/// middleboxes from dropping the connection and detects a lost client.
+/// Streams events until the client leaves, its token expires or the server stops. A comment every
+/// 15 s keeps middleboxes from dropping the connection and detects a lost client.
 asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listener> listener) {
     constexpr Duration kHeartbeat = 15s;
     ++shared_->counters.requests[200];
@@ -429,7 +417,8 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
     listener_ = listener;
     std::string text = head_of_events();
     ErrorCode error;
-    while (!error && time_of_token(kHeartbeat) > Duration::zero()) {
+    while (!error &&
+           time_of_token(caller_->token(), *shared_->site, kHeartbeat) > Duration::zero()) {
         stream_.expires_after(time_to_read_);
         co_await asio::async_write(stream_, asio::buffer(text),
                                    asio::redirect_error(asio::use_awaitable, error));
@@ -438,7 +427,7 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
         if (!text.empty()) continue;
         if (listener->ended() || stopping_ || events_end_) break;
         ErrorCode rung;
-        wake_timer.expires_after(time_of_token(kHeartbeat));
+        wake_timer.expires_after(time_of_token(caller_->token(), *shared_->site, kHeartbeat));
         co_await wake_timer.async_wait(asio::redirect_error(asio::use_awaitable, rung));
         text = rung ? listener->take() : listener->heartbeat();
         if (text.empty() && std::exchange(asked, false)) text = listener->heartbeat();

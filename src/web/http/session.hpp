@@ -89,8 +89,6 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     boost::asio::awaitable<bool> secure();
     boost::asio::awaitable<ErrorCode> receive();
     bool speaks_tls() const;
-    /// At most `most`; zero if the token that its client has shown has expired.
-    Duration time_of_token(Duration most) const;
     std::string head_of_events() const;
     boost::asio::awaitable<ErrorCode> receive_body();
     boost::asio::awaitable<bool> serve_one();

@@ -21,7 +21,7 @@ using modbus::Span;
 using modbus::Table;
 
 constexpr std::uint32_t kNear = 40;  ///< items that ranges and requests share, so that edges meet
-constexpr std::uint8_t kFar = 9;       ///< is not listed
+constexpr std::uint8_t kFar = 9;     ///< is not listed
 
 /// Draws rules, clients and requests of two lines. From a seed, so that a case can be seen again.
 class Draw {
@@ -172,9 +172,8 @@ class Draw {
 };
 
 bool names(const Settings& settings, const Place& place) {
-    return std::ranges::any_of(settings.rules, [&](const Rule& rule) {
-        return reference::lists(rule.stations, place);
-    });
+    return std::ranges::any_of(
+        settings.rules, [&](const Rule& rule) { return reference::lists(rule.stations, place); });
 }
 
 bool judged(const LineRules& rules, const WhoRef& who, const reference::Case& one) {

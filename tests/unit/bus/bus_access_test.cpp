@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -115,6 +116,39 @@ TEST_F(BusAccessTest, P2AWriteThatWasSentIsNotRepeatedAfterItIsForbidden) {
     EXPECT_EQ(line->written.size(), before + 1) << "once";
     EXPECT_EQ(end_of(answers[0]), "timeout, sent") << "what became of it nobody knows";
     EXPECT_EQ(rule_of(answers[0]), "");
+}
+
+TEST_F(BusAccessTest, P2WhatWaitsIsJudgedByWhatItsDoorSaysNow) {
+    std::optional<Admission> now;
+    settings.admit = [&](const WhoRef& asker) {
+        return asker == kOperator ? now : std::optional<Admission>();
+    };
+    bus->apply(settings, nullptr, nullptr);
+    panelgate::Rights reads;
+    reads.add(Right::read);
+    const Admission lowered{.who = kViewer, .may = reads};
+    const Admission out{.who = kOperator, .rule = "token", .why = "its token is not known"};
+    const std::pair<Admission, std::vector<std::string>> cases[] = {
+        {lowered, {"viewer", "blind", ""}}, {out, {"token", "token", "token"}}};
+    for (const auto& [changed, expected] : cases) {
+        now.reset();
+        std::vector<Answer> answers[3];
+        std::vector<Answer> first;
+        const std::size_t before = line->written.size();
+        who = kOperator;
+        send(19, kRead, first);  // keeps the line busy
+        send(17, "06 00 02 00 01"_hex, answers[0]);
+        send(17, kRead, answers[1]);
+        send(18, kRead, answers[2]);
+        now = changed;
+        bus->judge_waiting();
+        ASSERT_TRUE(run_until([&] {
+            return std::ranges::all_of(answers, [](const auto& all) { return !all.empty(); });
+        }));
+        for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(rule_of(answers[i][0]), expected[i]) << i;
+        EXPECT_EQ(line->written.size() - before, 1 + std::ranges::count(expected, ""));
+    }
+    EXPECT_EQ(rule_of(ask_as(kOperator, 18, kRead)), "token") << "the rest of a batch";
 }
 
 TEST_F(BusAccessTest, TellsOfWhatMayBeRead) {
