@@ -3,6 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
+#include <charconv>
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -58,6 +62,46 @@ void load_hosts(Loading& loading, yaml::MapReader& in, web::Settings& settings) 
     if (list->items.empty())
         in.problem("hosts",
                    "hosts must name at least one host; leave it out for the machine's names");
+}
+
+namespace {
+
+/// The scheme, host and port of an URL as browsers send them (RFC 6454, 6.2): in lower case,
+/// without the scheme's own port. Nothing if it has none, or more.
+std::optional<std::string> origin_of(std::string text) {
+    std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
+    const bool secure = text.starts_with("https://");
+    if (!secure && !text.starts_with("http://")) return std::nullopt;
+    const std::size_t host = text.find("//") + 2;
+    const auto colon = text.find(':', std::max(host, text.find(']', host) + 1));
+    if (!is_host(without_brackets(text.substr(host, colon - host)))) return std::nullopt;
+    if (colon == text.npos) return text;
+    std::uint16_t port = 0;
+    const char* const end = text.data() + text.size();
+    const auto [stop, wrong] = std::from_chars(text.data() + colon + 1, end, port);
+    if (wrong != std::errc{} || stop != end || port == 0) return std::nullopt;
+    if (port == (secure ? 443 : 80)) text.erase(colon);
+    return text;
+}
+
+}  // namespace
+
+void load_cors(Loading& loading, yaml::MapReader& in, std::vector<std::string>& origins) {
+    const yaml::Node* list = in.sequence("cors");
+    in.looks_like("cors", "^[Hh][Tt][Tt][Pp][Ss]?://\\[?[A-Za-z0-9._:-]+\\]?(:[0-9]{1,5})?$", true);
+    if (list == nullptr) return;
+    for (const yaml::Node& item : list->items) {
+        if (auto origin = origin_of(item.scalar)) {
+            origins.push_back(std::move(*origin));
+            continue;
+        }
+        const auto path = item.scalar.find('/', item.scalar.find("//") + 2);
+        const auto bare = origin_of(item.scalar.substr(0, path));
+        loading.problems.add(item.mark,
+                             "cors lists origins such as https://scada.plant.example, with the "
+                             "scheme, without a path, not '" +
+                                 item.scalar + '\'' + (bare ? "; write " + *bare : ""));
+    }
 }
 
 namespace {

@@ -16,6 +16,8 @@ void refuse_empty_access(yaml::MapReader& in);
 
 /// Reads the key `hosts` of `http`: names and addresses, without ports.
 void load_hosts(Loading& loading, yaml::MapReader& in, web::Settings& settings);
+/// Reads its key `cors`: origins as browsers send them.
+void load_cors(Loading& loading, yaml::MapReader& in, std::vector<std::string>& origins);
 
 /// Reads the key `tokens` of `http`. Secrets are read from their files.
 void load_tokens(Loading& loading, yaml::MapReader& in, std::vector<web::Token>& tokens);

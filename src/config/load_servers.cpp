@@ -401,6 +401,7 @@ void load_http(Loading& loading, MapReader& root) {
         settings.anonymous = std::move(*standing);
     http_keys().read(in, settings);
     load_hosts(loading, in, settings);
+    load_cors(loading, in, settings.cors);
     load_allow(loading, in, settings.allow);
     load_tokens(loading, in, settings.tokens);
     settings.tls = load_tls(loading, in);

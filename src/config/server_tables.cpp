@@ -161,14 +161,16 @@ const Keys<web::Settings>& http_keys() {
                    "Role without a token: none, viewer (reads), operator (reads and writes), "
                    "engineer (also raw, broadcast, discover, simulator), admin (also reload), or "
                    "one of access.roles.",
-                   [](const Settings& settings) {
-                       return std::string(settings.anonymous.name());
-                   })
+                   [](const Settings& settings) { return std::string(settings.anonymous.name()); })
             .initially("viewer")
             .other("hosts",
                    "Its names in URLs, besides its addresses and localhost; another name "
                    "is answered 421. Without it the machine's name.",
                    [](const Settings& settings) { return names_text(settings.hosts); })
+            .other("cors",
+                   "Origins of other sites whose pages may read, such as "
+                   "https://scada.plant.example.",
+                   [](const Settings& settings) { return names_text(settings.cors); })
             .other("allow",
                    "Networks whose clients may connect, such as 192.168.1.0/24. Without it any.",
                    [](const Settings& settings) { return networks_text(settings.allow); })
