@@ -410,12 +410,6 @@ std::optional<bool> load_read_only(MapReader& in) {
     return *chosen == 1;
 }
 
-void refuse_empty(MapReader& in, std::string_view key, std::string_view instead) {
-    in.schema(key).may_be_null = false;
-    if (!in.has(key) || in.child(key) != nullptr || in.is_mistyped(key)) return;
-    in.problem(key, std::string(key) + " has no value; " + std::string(instead));
-}
-
 std::optional<Config> load(std::string_view text, const Files& files, yaml::Problems& problems,
                            const yaml::Environment& environment) {
     yaml::Node tree = yaml::parse(text, problems);

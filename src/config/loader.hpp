@@ -72,10 +72,6 @@ std::optional<bool> load_read_only(yaml::MapReader& in);
 std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
                          std::string_view noun);
 
-/// Reports a key without a value, or with all of it commented out, as it means neither "all" nor
-/// "none"; the message ends with `instead`. Call it after all keys have been read.
-void refuse_empty(yaml::MapReader& in, std::string_view key, std::string_view instead);
-
 /// Reports missing lines, unless a key is probably a mistyped `lines`: then call refuse_no_lines()
 /// if finish() accepted that key.
 void load_lines(Loading& loading, yaml::MapReader& root);
