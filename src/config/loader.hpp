@@ -56,6 +56,17 @@ struct Loading {
     }
 };
 
+/// Reads the map `key`, if it is there, by `load`; its other keys are unknown.
+template <class Load>
+void load_map(yaml::MapReader& in, std::string_view key, std::string_view example,
+              const Load& load) {
+    const yaml::Node* node = in.map(key, example);
+    if (node == nullptr) return;
+    yaml::MapReader inside(*node, in.problems(), std::string(key));
+    load(inside);
+    inside.finish();
+}
+
 /// Line and station names: [a-z0-9-]+.
 bool is_name(std::string_view text);
 /// Returns a regular expression for texts of these letters; a '-' must be the last of them.
