@@ -15,7 +15,7 @@ ADDED = {"log_client": ("info", ["client"]), "shared_->log": ("", ["listener"]),
          "rt::log_collapsed": ("info", []), "say": ("", ["line", "station", "hint"]),
          "warn_once": ("warn", ["device", "why"])}
 # What is put together elsewhere in the file of the call.
-ELSEWHERE = {"write": ("", ["line", "station", "client", "at", "pdu", "outcome", "transaction", "rule"]),
+ELSEWHERE = {"write": ("", ["line", "station", "client", "certificate", "at", "pdu", "outcome", "transaction", "rule"]),
              "listening": ("", ["modbus_tcp", "http"]), "listener waits": ("", ["modbus_tcp", "http"]),
              "log lines left out": ("", ["of", "client", "clients", "count"]),
              "log lines dropped": ("", ["count"]), "tls handshake failed": ("info, warn", []),

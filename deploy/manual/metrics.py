@@ -23,7 +23,8 @@ OTHERS = {"panelgate_findings": "line, station, cause", "panelgate_framing_error
           "panelgate_parity_errors_total": "line", "panelgate_overruns_total": "line",
           "panelgate_breaks_total": "line",
           "panelgate_token_last_use_timestamp_seconds": "token", "panelgate_tls_handshakes_total": "listener, outcome",
-          "panelgate_certificate_expiry_timestamp_seconds": "listener"}
+          "panelgate_certificate_expiry_timestamp_seconds": "listener",
+          "panelgate_certificate_renewals_total": "listener, outcome"}
 # What a program that was built outside of a repository would not have.
 LABELS = {"panelgate_build_info": "version, commit, compiler"}
 GROUPS = [("Requests", ("requests", "translated", "request_duration", "queue"),

@@ -1,6 +1,7 @@
 #include "certificate_commands.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <CLI/CLI.hpp>
@@ -14,13 +15,16 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "load.hpp"
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/tls/issue.hpp"
+#include "panelgate/tls/judge.hpp"
 #include "panelgate/tls/peer.hpp"
+#include "panelgate/tls/replacement.hpp"
 
 namespace panelgate::app {
 namespace {
@@ -65,6 +69,11 @@ class Files {
 
     /// Writes it under another name; false, and errno, if that fails.
     bool write(const std::string& path, const std::string& text, mode_t mode) {
+        struct stat there{};
+        if (::stat(path.c_str(), &there) == 0 && S_ISDIR(there.st_mode)) {
+            errno = EISDIR;
+            return false;
+        }
         const int file =
             ::open(fresh(path).c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode);
         if (file < 0) return false;
@@ -102,6 +111,24 @@ class Files {
     std::vector<std::string> paths_;
 };
 
+/// One at a time works in a folder: two that add to one list would lose one's addition.
+class Turn {
+  public:
+    explicit Turn(const std::string& folder)
+        : folder_(
+              ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+        if (folder_ >= 0) ::flock(folder_, LOCK_EX);
+    }
+    ~Turn() {
+        if (folder_ >= 0) ::close(folder_);
+    }
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+
+  private:
+    int folder_;
+};
+
 /// Writes NAME.key and NAME.crt; says so, and what to do with them.
 ExitCode write_pair(const CertificateOptions& options, const std::string& name,
                     const tls::Issued& issued, const std::string& advice) {
@@ -116,8 +143,9 @@ ExitCode write_pair(const CertificateOptions& options, const std::string& name,
     if (!files.write(key, issued.key, kSecret)) return cannot("write", key, kUnavailable);
     if (!files.write(certificate, issued.certificate, kPublic))
         return cannot("write", certificate, kUnavailable);
-    return files.keep("wrote " + certificate + " and " + key + ", valid for " +
-                      std::to_string(options.days) + " days\n" + advice);
+    // A CA's end is that of what it has signed.
+    return files.keep("wrote " + certificate + " and " + key + ", valid until " +
+                      tls::date_text(tls::summary_of(issued.certificate).end) + '\n' + advice);
 }
 
 std::optional<tls::Issued> read_ca(const CertificateOptions& options, ExitCode& code) {
@@ -142,7 +170,8 @@ std::string file_name(std::string name) {
     std::ranges::replace_if(
         name,
         [](unsigned char c) { return std::isalnum(c) == 0 && c != '.' && c != '-' && c != '_'; },
-        '-');
+        '_');
+    if (name.starts_with('-')) name.front() = '_';  // commands would take it for an option
     return name.substr(0, kLongest);
 }
 
@@ -161,6 +190,7 @@ ExitCode explained(const Make& make) try {
 template <class Make>
 ExitCode with_ca(const CertificateOptions& options, const Make& make) {
     return explained([&] {
+        const Turn turn(options.dir);
         ExitCode code = kFine;
         const auto ca = read_ca(options, code);
         return ca ? make(*ca) : code;
@@ -169,6 +199,7 @@ ExitCode with_ca(const CertificateOptions& options, const Make& make) {
 
 ExitCode new_certificate_authority(const CertificateOptions& options) {
     return explained([&] {
+        const Turn turn(options.dir);
         const std::string name = options.names.empty() ? "Plant CA" : options.names.front();
         return write_pair(
             options, "ca", tls::issue_ca(name, validity_of(options)),
@@ -215,16 +246,29 @@ ExitCode new_client_certificate(const CertificateOptions& options) {
 
 ExitCode revoke_certificate(const CertificateOptions& options) {
     return with_ca(options, [&](const tls::Issued& ca) {
-        const auto given = config::RealFiles::read_any(options.names.front());
-        if (!given) return cannot("read", options.names.front(), kNoInput);
+        std::optional<std::string> given;
+        if (!options.names.empty()) {
+            given = config::RealFiles::read_any(options.names.front());
+            if (!given) return cannot("read", options.names.front(), kNoInput);
+        }
         const std::string path = in_folder(options, "crl.pem");
         const auto former = config::RealFiles::read_any(path);
-        const std::string list = tls::revoke(ca, former.value_or(""), *given, validity_of(options));
+        if (!former && errno != ENOENT) return cannot("read", path, kNoInput);
+        if (former && former->empty())
+            throw tls::CannotIssue(path +
+                                   " is empty, though it should name who is revoked already: bring "
+                                   "back a copy, such as a gateway's; or remove it, and revoke all "
+                                   "of them again");
+        const std::string list = tls::revoke(
+            ca, former.value_or(""), given ? std::optional<std::string_view>(*given) : std::nullopt,
+            validity_of(options));
         Files files;
         if (!files.write(path, list, kPublic)) return cannot("write", path, kUnavailable);
         return files.keep("wrote " + path +
                           "\nIt goes to every gateway (`tls: crl`), which takes it without a "
-                          "restart, and closes the connections of this certificate.\n");
+                          "restart" +
+                          (given ? ", and closes the connections of this certificate" : "") +
+                          ".\n");
     });
 }
 
@@ -290,7 +334,8 @@ void add_certificate_commands(CLI::App& cli, ExitCode& code) {
     auto lost = std::make_shared<CertificateOptions>();
     CLI::App* revoke =
         adder.add("revoke", "add a certificate to the list of revoked ones, crl.pem", 365, lost);
-    revoke->add_option("FILE", lost->names, "the certificate")->required()->expected(1);
+    revoke->add_option("FILE", lost->names, "the certificate; without it the list is made anew")
+        ->expected(0, 1);
     adder.on_call(revoke, revoke_certificate, lost);
 }
 

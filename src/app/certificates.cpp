@@ -1,6 +1,7 @@
 #include "certificates.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <utility>
 
@@ -36,18 +37,67 @@ std::vector<std::string> names_of(const std::string& address, std::vector<std::s
     return hosts;
 }
 
-/// The file that cannot be read, such as while it is replaced; "" if all could.
+/// Reads what can be read into `files`; the first that cannot, such as while it is replaced, or "".
 std::string read_again(const tls::Settings& settings, tls::Material& files) {
-    const auto read = [](const std::string& path, std::string& into) {
-        if (path.empty()) return true;
-        auto text = config::RealFiles::read_any(path);
-        if (text) into = std::move(*text);
-        return text.has_value();
+    std::string missing;
+    const auto read = [&](const std::string& path, std::string& into) {
+        if (path.empty()) return;
+        if (auto text = config::RealFiles::read_any(path))
+            into = std::move(*text);
+        else if (missing.empty())
+            missing = path;
     };
-    if (!read(settings.certificate, files.certificate)) return settings.certificate;
-    if (!read(settings.key, files.key)) return settings.key;
-    if (!read(settings.ca, files.ca)) return settings.ca;
-    return read(settings.crl, files.crl) ? "" : settings.crl;
+    read(settings.certificate, files.certificate);
+    read(settings.key, files.key);
+    read(settings.ca, files.ca);
+    read(settings.crl, files.crl);
+    return missing;
+}
+
+/// What comes into use of new files.
+struct Taken {
+    tls::Settings settings;  ///< `made` is null where no context can be made at all
+    std::string why;         ///< it is not all of them; "" if it is
+    rt::LogLevel level = rt::LogLevel::error;
+};
+
+/// Each kind of file stands for itself: a list of revoked certificates must not wait until a bad
+/// pair is mended. `fresh` has the new files.
+Taken take(const tls::Settings& used, const tls::Settings& fresh, tls::Arrival arrival,
+           std::int64_t now) {
+    Taken taken{fresh, ""};
+    taken.settings.material = used.material;
+    taken.settings.made = nullptr;
+    const auto attempt = [&](const tls::Material& files) {
+        tls::Settings next = fresh;
+        next.material = files;
+        try {
+            next.made = std::make_shared<const tls::Context>(next);
+        } catch (const tls::Unusable& why) {
+            return Taken{std::move(next), why.what()};
+        }
+        const std::string why = tls::why_kept(used, next, arrival, now);
+        return Taken{std::move(next), why, rt::LogLevel::warn};
+    };
+    Taken whole = attempt(fresh.material);
+    if (whole.why.empty()) return whole;
+    using File = std::string tls::Material::*;
+    const std::array<std::vector<File>, 4> parts{
+        {{&tls::Material::ca, &tls::Material::crl},
+         {&tls::Material::crl},
+         {&tls::Material::ca},
+         {&tls::Material::certificate, &tls::Material::key}}};
+    for (const auto& part : parts) {
+        tls::Material files = taken.settings.material;
+        for (const File file : part) files.*file = fresh.material.*file;
+        if (files == taken.settings.material) continue;
+        if (Taken some = attempt(files); some.why.empty())
+            taken.settings = std::move(some.settings);
+    }
+    if (!taken.settings.made) taken.settings = attempt(used.material).settings;
+    taken.why = whole.why;
+    taken.level = whole.level;
+    return taken;
 }
 
 /// A line each time: nobody should have to ask since when a certificate is in use.
@@ -75,21 +125,19 @@ std::vector<ServedCertificate> keep_good_certificates(config::Config& next,
     for_each_tls(next, [&](const std::string& listener, tls::Settings& fresh) {
         const auto used = std::ranges::find(in_use, listener, &ServedCertificate::listener);
         if (used == in_use.end() || used->settings.material == fresh.material) return;
-        const std::string why = tls::why_kept(used->settings, fresh, tls::Arrival::asked_for, now);
-        if (why.empty() && !rollback) return;
-        if (!why.empty()) {
-            warnings.push_back(listener + ": certificate not renewed: " + why +
-                               "; the former one stays in use");
-            kept.push_back({listener, fresh});
+        if (rollback) {
+            tls::Settings stays = fresh;
+            stays.material = used->settings.material;
+            fresh = take(used->settings, stays, tls::Arrival::asked_for, now).settings;
+            return;
         }
-        tls::Settings stays = fresh;
-        stays.material = used->settings.material;
-        try {
-            stays.made = std::make_shared<const tls::Context>(stays);
-            fresh = std::move(stays);
-        } catch (const tls::Unusable&) {  // other keys want what the former files do not have
-            if (!why.empty()) kept.pop_back();
-        }
+        Taken taken = take(used->settings, fresh, tls::Arrival::asked_for, now);
+        // Other keys may want what the former files do not have: then the new ones are in use.
+        if (taken.why.empty() || !taken.settings.made) return;
+        warnings.push_back(listener + ": certificate not renewed: " + taken.why +
+                           "; the former one stays in use");
+        kept.push_back({listener, fresh});
+        fresh = std::move(taken.settings);
     });
     return kept;
 }
@@ -110,6 +158,14 @@ std::vector<std::string> certificate_doubts(const config::Config& config, std::i
     return all;
 }
 
+/// New files of one listener, judged.
+struct CertificateWatch::Fresh {
+    std::size_t at = 0;
+    tls::Material files;  ///< as they were read
+    Taken taken;
+    std::vector<std::string> doubts{};  ///< that must not keep them back
+};
+
 /// One look. Owned by the loop, then by the worker, then by the loop again.
 struct CertificateWatch::Look {
     std::uint64_t round = 0;
@@ -117,20 +173,12 @@ struct CertificateWatch::Look {
     std::vector<Served> served;
     std::vector<std::optional<tls::Material>> seen;
     std::vector<std::string> missing;
-    struct Fresh {
-        std::size_t at = 0;
-        tls::Settings settings;
-        std::shared_ptr<const tls::Context> context;  ///< null: `why`
-        std::string why;
-        rt::LogLevel level = rt::LogLevel::error;
-    };
     std::vector<Fresh> fresh;
 
     void read() {
         for (std::size_t i = 0; i < served.size(); ++i) {
-            tls::Material files;
+            tls::Material files = served[i].settings.material;
             missing[i] = read_again(served[i].settings, files);
-            if (!missing[i].empty()) continue;
             if (files == served[i].settings.material) {
                 seen[i].reset();
             } else if (std::exchange(seen[i], files) == files) {
@@ -139,19 +187,12 @@ struct CertificateWatch::Look {
         }
     }
     void make(std::size_t at, tls::Material files) {
-        Fresh made{at, served[at].settings, nullptr, ""};
-        made.settings.material = std::move(files);
-        made.settings.made = nullptr;
-        try {
-            made.settings.made = std::make_shared<const tls::Context>(made.settings);
-            made.why =
-                tls::why_kept(served[at].settings, made.settings, tls::Arrival::noticed, now);
-            made.level = rt::LogLevel::warn;
-            if (made.why.empty()) made.context = made.settings.made;
-        } catch (const tls::Unusable& why) {
-            made.why = why.what();
-        }
-        fresh.push_back(std::move(made));
+        const tls::Settings& used = served[at].settings;
+        tls::Settings next = used;
+        next.material = files;
+        Taken taken = take(used, next, tls::Arrival::noticed, now);
+        std::vector<std::string> doubts = tls::doubts(taken.settings, {}, now);
+        fresh.push_back({at, std::move(files), std::move(taken), std::move(doubts)});
     }
 };
 
@@ -167,17 +208,35 @@ void CertificateWatch::follow(const config::Config& config) {
     const std::vector<Served> before = std::exchange(served_, served_by(config));
     for (const Served& now : served_) {
         const auto was = std::ranges::find(before, now.listener, &Served::listener);
-        if (was != before.end() && was->settings.material != now.settings.material)
-            log_renewed(now.listener, was->settings.material, now.settings.material);
+        if (was == before.end() || was->settings.material == now.settings.material) continue;
+        ++renewals_[now.listener].replaced;
+        log_renewed(now.listener, was->settings.material, now.settings.material);
     }
     seen_.assign(served_.size(), std::nullopt);
     missing_.assign(served_.size(), "");
     told_missing_.assign(served_.size(), false);
-    std::erase_if(refused_, [&](const auto& one) {
+    const auto is_gone = [&](const auto& one) {
         return std::ranges::find(served_, one.first, &Served::listener) == served_.end();
-    });
+    };
+    std::erase_if(refused_, is_gone);
+    std::erase_if(renewals_, is_gone);
     ++round_;
     if (idle && !served_.empty()) later();
+}
+
+void CertificateWatch::refused(const Served& files) {
+    refused_[files.listener] = files.settings.material;
+    ++renewals_[files.listener].kept;
+}
+
+std::map<std::string, tls::Renewals> CertificateWatch::renewals() const {
+    std::map<std::string, tls::Renewals> all;
+    for (const Served& one : served_) {
+        const auto count = renewals_.find(one.listener);
+        all[one.listener.substr(one.listener.find(' ') + 1)] =
+            count == renewals_.end() ? tls::Renewals{} : count->second;
+    }
+    return all;
 }
 
 void CertificateWatch::stop() { alarm_->cancel(); }
@@ -203,21 +262,29 @@ void CertificateWatch::judge(Look& look) {
     if (look.round == round_) {
         seen_ = std::move(look.seen);
         for (std::size_t i = 0; i < served_.size(); ++i) tell_missing(i, look.missing[i]);
-        for (Look::Fresh& fresh : look.fresh) {
-            Served& served = served_[fresh.at];
-            if (fresh.context) {
-                const tls::Material before = served.settings.material;
-                served.settings = fresh.settings;
-                renew_(served, fresh.context);
-                log_renewed(served.listener, before, served.settings.material);
-            } else if (std::exchange(refused_[served.listener], fresh.settings.material) !=
-                       fresh.settings.material) {
-                rt::log(fresh.level, "certificate not renewed",
-                        {{"listener", served.listener}, {"reason", fresh.why}});
-            }
-        }
+        for (const Fresh& fresh : look.fresh) take_over(fresh);
     }
     later();
+}
+
+void CertificateWatch::take_over(const Fresh& fresh) {
+    Served& served = served_[fresh.at];
+    const tls::Settings& next = fresh.taken.settings;
+    if (next.made && next.material != served.settings.material) {
+        const tls::Material before = served.settings.material;
+        served.settings = next;
+        ++renewals_[served.listener].replaced;
+        renew_(served, next.made);
+        log_renewed(served.listener, before, next.material);
+        for (const std::string& doubt : fresh.doubts)
+            rt::log(rt::LogLevel::warn, "certificate",
+                    {{"listener", served.listener}, {"warning", doubt}});
+    }
+    if (fresh.taken.why.empty() || refused_[served.listener] == fresh.files) return;
+    refused_[served.listener] = fresh.files;
+    ++renewals_[served.listener].kept;
+    rt::log(fresh.taken.level, "certificate not renewed",
+            {{"listener", served.listener}, {"reason", fresh.taken.why}});
 }
 
 /// A file that two looks miss is not just being replaced.

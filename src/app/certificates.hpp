@@ -14,6 +14,7 @@
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/rt/process.hpp"
 #include "panelgate/tls/context.hpp"
+#include "panelgate/tls/counters.hpp"
 #include "panelgate/tls/settings.hpp"
 
 namespace panelgate::app {
@@ -53,15 +54,19 @@ class CertificateWatch {
     /// What is in use.
     const std::vector<Served>& served() const { return served_; }
     /// These files have been refused, and somebody was told why.
-    void refused(const Served& files) { refused_[files.listener] = files.settings.material; }
+    void refused(const Served& files);
+    /// Of what is served, by the address alone.
+    std::map<std::string, tls::Renewals> renewals() const;
     void stop();
 
   private:
     struct Look;
+    struct Fresh;
 
     void later();
     void look();
     void judge(Look& look);
+    void take_over(const Fresh& fresh);
     void tell_missing(std::size_t at, const std::string& file);
 
     rt::Clock& clock_;
@@ -72,7 +77,8 @@ class CertificateWatch {
     std::vector<std::string> missing_;  ///< the file that the last look could not read, or ""
     std::vector<bool> told_missing_;
     std::map<std::string, tls::Material> refused_;  ///< already logged; by listener
-    std::uint64_t round_ = 0;                       ///< of follow(): an older look does not count
+    std::map<std::string, tls::Renewals> renewals_;
+    std::uint64_t round_ = 0;  ///< of follow(): an older look does not count
     std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
     rt::Worker worker_;
 };

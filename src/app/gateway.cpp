@@ -349,6 +349,7 @@ bool Gateway::copy_figures(metrics::Snapshot& figures, PointCopy& points,
     figures.relays = relay_samples(relays_->status());
     servers_.copy_figures(figures);
     figures.mqtt = northbound_.counters();
+    if (certificates_) figures.renewals = certificates_->renewals();
     if (audit_.is_kept()) figures.audit = audit_.counters();
     if (reloads_->barred(false).empty()) figures.reloads = reloads_->counters();
     figures.version = PANELGATE_VERSION;

@@ -141,7 +141,8 @@ void log_write(const Settings& settings, const WriteEnd& write) {
     const std::string name =
         write.station == 0 ? std::string("broadcast") : name_of(settings.stations, write.station);
     const std::string full_name = text_of(write.who);
-    const std::string client = without_port(full_name);
+    const std::string certificate = write.who ? write.who->certificate : "";
+    const std::string client = without_port(full_name) + ' ' + certificate;
     const std::string at = place_of(write.items);
     const std::string pdu = hex_of(write.pdu);
     const std::string place = settings.name + '/' + name + ' ' + at;
@@ -149,6 +150,7 @@ void log_write(const Settings& settings, const WriteEnd& write) {
     const bool accepted = is_accepted(write);
     std::vector<rt::LogField> fields{
         {"line", settings.name}, {"station", name}, {"client", full_name}};
+    if (!certificate.empty()) fields.push_back({"certificate", certificate});
     if (!at.empty()) fields.push_back({"at", at});
     fields.push_back({"pdu", accepted ? pdu : shortened(pdu)});
     fields.push_back({"outcome", ended});

@@ -308,8 +308,13 @@ void load_rules(Loading& loading, MapReader& root) {
 
 void apply_rules(Config& config) {
     const auto shared = std::make_shared<const access::Settings>(config.access);
+    std::vector<std::string> words;
+    for (const Rule& rule : config.access.rules)
+        words.insert(words.end(), rule.roles.begin(), rule.roles.end());
     const auto give = [&](std::optional<tls::Settings>& tls) {
-        if (tls) tls->own_roles = config.access.roles;
+        if (!tls) return;
+        tls->own_roles = config.access.roles;
+        tls->rule_roles = words;
     };
     for (tcp_server::Settings& listener : config.modbus_tcp) give(listener.tls);
     if (config.http) give(config.http->tls);

@@ -79,9 +79,11 @@ void compare_tls(Lines& all, const std::string& endpoint,
         all.push_back(endpoint + ": roles of certificates no longer count");
     if (!running->crl.empty() && next->crl.empty())
         all.push_back(endpoint + ": revoked certificates are accepted");
+    else if (running->crl != next->crl)
+        all.push_back(endpoint + ": another list of revoked certificates counts");
     if (next->lowest < running->lowest)
         all.push_back(endpoint + ": tls min_version TLSv1.3 -> TLSv1.2");
-    if (next->material.ca != running->material.ca)
+    if (next->material.ca != running->material.ca || next->ca != running->ca)
         all.push_back(endpoint + ": certificates of another CA are accepted");
 }
 

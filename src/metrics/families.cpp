@@ -85,8 +85,16 @@ void add_tls(Families& out, const Snapshot& snapshot) {
     for (const tcp_server::Counters& listener : snapshot.listeners)
         add(listener.listener, listener.tls);
     if (snapshot.http) add(snapshot.http->listener, snapshot.http->tls);
+    Family renewals = make_counter("panelgate_certificate_renewals_total",
+                                   "New certificate files of a listener, by what became of them: "
+                                   "replaced those in use, or not taken, so that those were kept.");
+    for (const auto& [listener, count] : snapshot.renewals) {
+        renewals.counter({{"listener", listener}, {"outcome", "replaced"}}, count.replaced);
+        renewals.counter({{"listener", listener}, {"outcome", "kept"}}, count.kept);
+    }
     out.push_back(handshakes.take());
     out.push_back(expiry.take());
+    out.push_back(renewals.take());
 }
 
 void add_http(Families& out, const Snapshot& snapshot) {

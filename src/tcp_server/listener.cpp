@@ -20,6 +20,7 @@
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/rt/acceptor.hpp"
 #include "panelgate/tcp_server/dispatch.hpp"
+#include "panelgate/tls/roles.hpp"
 #include "places.hpp"
 #include "session.hpp"
 #include "shared.hpp"
@@ -151,21 +152,15 @@ void Listener::Core::renew(const tls::Settings& settings,
     if (others) review();
 }
 
-/// A connection keeps the role that it came in with: who has another one now comes in anew.
+/// Without roles from certificates everybody writes.
 void Listener::Core::apply_roles(const Settings& before) {
-    const auto from_certificate = [](const Settings& settings) {
-        return settings.tls && settings.tls->role_from_certificate;
-    };
-    const bool was = from_certificate(before);
-    const bool is = from_certificate(shared_->settings);
-    const bool others = was && is && before.tls->own_roles != shared_->settings.tls->own_roles;
-    if (was == is && !others) return;
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // dismiss() erases
-    for (const auto& session : sessions)
-        if (session->has_other_role(was, is))
-            session->dismiss("role_from has changed, and with it what its certificate allows");
-        else if (others && session->has_own_role())
-            session->dismiss("access.roles have changed, and with them what its role allows");
+    for (const auto& session : sessions) {
+        if (!session->stream().is_secure()) continue;
+        const std::string why = tls::why_other_role(
+            before.tls, shared_->settings.tls, session->stream().peer(), {Role::operator_}, {});
+        if (!why.empty()) session->dismiss(why);
+    }
 }
 
 void Listener::Core::review() {

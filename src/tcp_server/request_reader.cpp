@@ -130,9 +130,14 @@ bool is_http_request_line(ByteView first) {
            line.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ") == method;
 }
 
-/// A handshake record with a client's hello (RFC 8446 5.1, 4). As MBAP its protocol id is not 0.
+/// A handshake record that is a client's hello (RFC 8446 5.1, 4). As MBAP its protocol id is not 0;
+/// a read of unit 22 begins alike, but has no two lengths that fit each other.
 bool is_tls_hello(ByteView first) {
-    return first.size() > 5 && first[0] == 0x16 && first[1] == 3 && first[2] <= 4 && first[5] == 1;
+    if (first.size() < 9 || first[0] != 0x16 || first[1] != 3 || first[2] > 4 || first[5] != 1)
+        return false;
+    const std::size_t record = first[3] * 256U + first[4];
+    const std::size_t hello = (first[6] * 256U + first[7]) * 256U + first[8];
+    return record == hello + 4;
 }
 
 std::optional<std::string> foreign(modbus::Framing expected, ByteView first) {

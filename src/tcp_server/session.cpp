@@ -13,6 +13,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/pool.hpp"
+#include "panelgate/tls/roles.hpp"
 
 namespace panelgate::tcp_server {
 namespace {
@@ -54,15 +55,12 @@ void Session::on_secure(bool secure) {
     if (closed_) return;
     if (!secure) return close();
     const tls::Peer& peer = stream_.peer();
-    std::optional<std::string> role;
-    if (shared_->settings.tls && shared_->settings.tls->role_from_certificate)
-        role = peer.role.value_or("");
-    if (role && !peer.role_fault.empty())
-        shared_->log(rt::LogLevel::warn, "certificate without a role",
-                     {{"client", pipeline_->client()},
-                      {"subject", peer.subject},
-                      {"reason", peer.role_fault}});
-    pipeline_->certify(peer.subject, std::move(role));
+    const auto role = tls::certified_role(shared_->settings.tls, peer);
+    if (role && !role->doubt.empty())
+        shared_->log(
+            rt::LogLevel::warn, "certificate without a role",
+            {{"client", pipeline_->client()}, {"subject", peer.subject}, {"reason", role->doubt}});
+    pipeline_->certify(peer.subject, role ? std::optional(role->word) : std::nullopt);
     active_ = shared_->clock.now();
     go_on();
 }
@@ -92,20 +90,6 @@ void Session::finish() {
 
 void Session::dismiss(const std::string& why) {
     if (!closed_) fail(why, rt::LogLevel::warn);
-}
-
-bool Session::has_other_role(bool from_certificate_before, bool from_certificate_now) const {
-    if (!stream_.is_secure()) return false;
-    const auto role = [&](bool from_certificate) {
-        if (!from_certificate) return Role::operator_;
-        return tls::role_named(stream_.peer().role.value_or(""));
-    };
-    return role(from_certificate_before) != role(from_certificate_now);
-}
-
-bool Session::has_own_role() const {
-    const auto role = stream_.is_secure() ? stream_.peer().role : std::nullopt;
-    return role && tls::role_named(*role) == Role::none;
 }
 
 void Session::close() {
@@ -150,6 +134,10 @@ void Session::on_read(const error_code& error, std::size_t size) {
     reading_ = false;
     if (closed_) return;
     if (error == asio::error::eof) return on_end_of_input();
+    if (error == tls::kDamaged) {
+        ++shared_->counters.protocol_errors;
+        return fail("its bytes are no TLS, or were changed on the way");
+    }
     if (error) return close();
     active_ = shared_->clock.now();
     if (input_state_ == Input::served)

@@ -46,10 +46,6 @@ class Session : public std::enable_shared_from_this<Session> {
     void finish();
     /// Closes at once, because of what its certificate no longer allows; logged.
     void dismiss(const std::string& why);
-    /// True if `role_from` decides something else than before, by its certificate.
-    bool has_other_role(bool from_certificate_before, bool from_certificate_now) const;
-    /// True if its certificate names no default role: it may be one of the configuration.
-    bool has_own_role() const;
     const tls::Stream& stream() const { return stream_; }
     /// Closes at once and cancels its queued requests on the buses. Idempotent.
     void close();

@@ -3,11 +3,15 @@
 #include <openssl/err.h>
 #include <openssl/ssl.h>
 #include <openssl/x509_vfy.h>
-#include <set>
+#include <algorithm>
+#include <array>
+#include <limits>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "native.hpp"
+#include "proof.hpp"
 
 namespace panelgate::tls {
 namespace {
@@ -22,8 +26,8 @@ constexpr const char* kSuites13 =
     "TLS_AES_128_GCM_SHA256:TLS_AES_256_GCM_SHA384:TLS_CHACHA20_POLY1305_SHA256";
 constexpr const char* kGroups = "X25519:P-256:P-384";
 
-/// A list that is overdue still says who is revoked: its age locks nobody out. Leaves the name of
-/// whoever is refused for the log, where SSL_set_app_data() says.
+/// A list that is overdue still says who is revoked: its age locks nobody out. Leaves for the
+/// log whose certificate is refused, where SSL_set_app_data() says.
 int judge_chain(int good, X509_STORE_CTX* chain) {
     if (good != 0) return good;
     const int why = X509_STORE_CTX_get_error(chain);
@@ -34,10 +38,23 @@ int judge_chain(int good, X509_STORE_CTX* chain) {
     const auto* const ssl = static_cast<const SSL*>(
         X509_STORE_CTX_get_ex_data(chain, SSL_get_ex_data_X509_STORE_CTX_idx()));
     if (ssl == nullptr) return 0;  // not in a handshake
-    auto* const subject = static_cast<std::string*>(SSL_get_app_data(ssl));
-    const X509* const judged = X509_STORE_CTX_get_current_cert(chain);
-    if (subject != nullptr && judged != nullptr) *subject = subject_of(judged);
+    auto* const refused = static_cast<std::string*>(SSL_get_app_data(ssl));
+    if (refused != nullptr) *refused = blamed(chain);
     return 0;
+}
+
+/// CAs may have the same name: only those lists count that the CA in the chain has signed.
+STACK_OF(X509_CRL) * lists_of_ca(const X509_STORE_CTX* judging, const X509_NAME* name) {
+    STACK_OF(X509_CRL)* const found = X509_STORE_CTX_get1_crls(judging, name);
+    const STACK_OF(X509)* const chain = X509_STORE_CTX_get0_chain(judging);
+    const int depth = X509_STORE_CTX_get_error_depth(judging);
+    const X509* const ca = sk_X509_value(chain, std::min(depth + 1, sk_X509_num(chain) - 1));
+    for (int i = sk_X509_CRL_num(found) - 1; ca != nullptr && i >= 0; --i) {
+        if (X509_CRL_verify(sk_X509_CRL_value(found, i), X509_get0_pubkey(ca)) == 1) continue;
+        X509_CRL_free(sk_X509_CRL_delete(found, i));
+    }
+    ERR_clear_error();
+    return found;
 }
 
 /// A file that is being written holds the first objects only.
@@ -47,6 +64,26 @@ void check_whole(const char* key, const std::string& file, std::string_view cont
         throw Unusable(key, file +
                                 " is damaged or cut off: not all that it holds can be read; "
                                 "copy it again, and under its name in one step (mv)");
+}
+
+/// RFC 8446 4.2.3: what clients offer.
+bool is_spoken(const EVP_PKEY* key) {
+    switch (EVP_PKEY_get_base_id(key)) {
+        case EVP_PKEY_RSA:
+        case EVP_PKEY_RSA_PSS:
+        case EVP_PKEY_ED25519:
+        case EVP_PKEY_ED448:
+            return true;
+        case EVP_PKEY_EC:
+            break;
+        default:
+            return false;
+    }
+    std::array<char, 32> curve{};
+    std::size_t size = 0;
+    if (EVP_PKEY_get_group_name(key, curve.data(), curve.size(), &size) != 1) return false;
+    constexpr std::array<std::string_view, 3> kSpoken{"prime256v1", "secp384r1", "secp521r1"};
+    return std::ranges::count(kSpoken, std::string_view(curve.data(), size)) > 0;
 }
 
 std::string last_reason() {
@@ -116,7 +153,9 @@ void Context::use_certificate(const Settings& settings) {
                                           "more, and SHA-256");
     for (std::size_t i = 1; i < chain.size(); ++i)
         SSL_CTX_add1_chain_cert(context_.get(), chain[i].get());
-    expiry_ = seconds_of(X509_get0_notAfter(chain.front().get()));
+    expiry_ = std::numeric_limits<std::int64_t>::max();
+    for (const auto& one : chain)
+        expiry_ = std::min(expiry_, seconds_of(X509_get0_notAfter(one.get())));
 }
 
 void Context::use_key(const Settings& settings) {
@@ -132,6 +171,11 @@ void Context::use_key(const Settings& settings) {
                                   " does not belong to the certificate in " + settings.certificate +
                                   "; give the key that it was made with");
     }
+    if (!is_spoken(key.get()))
+        throw Unusable("key",
+                       "the key in " + settings.key +
+                           " is of a kind that TLS clients do not speak; make one with ECDSA "
+                           "P-256, or RSA of 2048 bits or more");
     if (SSL_CTX_use_PrivateKey(context_.get(), key.get()) != 1)
         throw Unusable("key", "the key in " + settings.key + " cannot be used" + last_reason() +
                                   "; make one with ECDSA P-256, or RSA of 2048 bits or more");
@@ -163,17 +207,12 @@ void Context::use_crl(const Settings& settings) {
                                   "(-----BEGIN X509 CRL-----)");
     check_whole("crl", settings.crl, settings.material.crl, "CRL", lists.size());
     X509_STORE* const store = SSL_CTX_get_cert_store(context_.get());
-    std::set<std::string> issuers;
-    for (const auto& list : lists) {
-        X509_STORE_add_crl(store, list.get());
-        char* const name = X509_NAME_oneline(X509_CRL_get_issuer(list.get()), nullptr, 0);
-        issuers.insert(name);
-        OPENSSL_free(name);
-    }
+    for (const auto& list : lists) X509_STORE_add_crl(store, list.get());
     unsigned long flags = X509_V_FLAG_CRL_CHECK;
-    if (issuers.size() >= certificates_of(settings.material.ca).size())
+    if (without_list(certificates_of(settings.material.ca), lists).empty())
         flags |= X509_V_FLAG_CRL_CHECK_ALL;
     X509_STORE_set_flags(store, flags);
+    X509_STORE_set_lookup_crls(store, lists_of_ca);
 }
 
 }  // namespace panelgate::tls

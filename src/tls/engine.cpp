@@ -140,7 +140,8 @@ constexpr const char* kNotTaken =
 constexpr const char* kNoneShown =
     "the client shows no certificate; give it one that the CA of `ca` signed";
 constexpr const char* kVersions =
-    "the client speaks no version that is allowed; TLS 1.2 with AEAD suites, and TLS 1.3, are";
+    "the client speaks no version that is allowed: TLS 1.3, and TLS 1.2 with AEAD suites unless "
+    "`min_version` rules it out";
 
 constexpr Explained kExplained[] = {
     {SSL_R_PEER_DID_NOT_RETURN_A_CERTIFICATE, Outcome::no_certificate, kNoneShown},
@@ -152,6 +153,12 @@ constexpr Explained kExplained[] = {
     {SSL_R_TLSV1_ALERT_UNKNOWN_CA, Outcome::refused, kNotTaken},
     {SSL_R_SSLV3_ALERT_BAD_CERTIFICATE, Outcome::refused, kNotTaken},
     {SSL_R_SSLV3_ALERT_CERTIFICATE_UNKNOWN, Outcome::refused, kNotTaken},
+    {SSL_R_SSLV3_ALERT_UNSUPPORTED_CERTIFICATE, Outcome::refused,
+     "the client says that the gateway's certificate is of a kind that it does not take; is it one "
+     "of a server?"},
+    {SSL_R_SSLV3_ALERT_CERTIFICATE_REVOKED, Outcome::refused,
+     "the client says that the gateway's certificate is revoked"},
+    {SSL_R_TLSV1_ALERT_ACCESS_DENIED, Outcome::refused, "the client ended it"},
     {SSL_R_SSLV3_ALERT_CERTIFICATE_EXPIRED, Outcome::refused,
      "the client says that the gateway's certificate has expired"},
     {SSL_R_SSLV3_ALERT_HANDSHAKE_FAILURE, Outcome::refused, "the client ended it"},

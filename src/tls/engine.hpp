@@ -69,7 +69,7 @@ class Engine {
     bool ended_ = false;  ///< the socket's input
     Outcome outcome_ = Outcome::broken;
     std::string why_;
-    std::string refused_;  ///< subject of the certificate that is not accepted
+    std::string refused_;  ///< the certificate that is not accepted, in words
 };
 
 }  // namespace panelgate::tls

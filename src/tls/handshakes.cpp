@@ -133,12 +133,12 @@ class Handshakes::Conversation : public std::enable_shared_from_this<Conversatio
 };
 
 void Handshakes::Conversation::listen() {
-    stream_.socket().async_wait(tcp::socket::wait_read,
-                                [self = shared_from_this()](const error_code& error) {
-                                    if (!self->done_) return;
-                                    if (!error) return self->on_readable();
-                                    self->finish(Outcome::displaced, "another connection came");
-                                });
+    stream_.socket().async_wait(
+        tcp::socket::wait_read, [self = shared_from_this()](const error_code& error) {
+            if (!self->done_) return;
+            if (!error) return self->on_readable();
+            self->finish(Outcome::displaced, "the gateway needed its place, or ends");
+        });
 }
 
 void Handshakes::Conversation::on_readable() {
@@ -310,8 +310,11 @@ void Handshakes::make_room(const std::string& address) {
     } else if (running_.size() >= settings_.max_handshakes) {
         std::map<std::string, std::size_t> counts;
         for (const auto& one : running_) ++counts[one->address];
-        from =
-            std::ranges::max_element(counts, {}, [](const auto& one) { return one.second; })->first;
+        const auto most = std::ranges::max_element(counts, {}, [](const auto& one) {
+                              return one.second;
+                          })->second;
+        const auto has_most = [&](const Conversation* one) { return counts[one->address] == most; };
+        from = (*std::ranges::find_if(running_, has_most))->address;
     } else {
         return;
     }

@@ -79,9 +79,12 @@ class Draft {
   public:
     Draft(const std::string& name, EVP_PKEY* key, const Validity& validity, std::int64_t latest) {
         check(certificate_ != nullptr, "no memory");
+        if (latest <= validity.now)
+            throw CannotIssue("the CA's certificate has expired; make a new one with new-ca");
         X509_set_version(get(), X509_VERSION_3);
         set_serial(X509_get_serialNumber(get()));
-        const std::int64_t end = std::min(validity.now + validity.days * kDay, latest);
+        const std::int64_t end =
+            std::min(validity.now - kHour + validity.days * kDay - 1, latest);  // both ends count
         ASN1_TIME_set(X509_getm_notBefore(get()), static_cast<time_t>(validity.now - kHour));
         ASN1_TIME_set(X509_getm_notAfter(get()), static_cast<time_t>(end));
         const auto* const text = reinterpret_cast<const unsigned char*>(name.c_str());
@@ -182,6 +185,8 @@ bool is_host(std::string_view name) {
 std::string name_in(std::string name) {
     if (const std::size_t scheme = name.find("://"); scheme != name.npos) name.erase(0, scheme + 3);
     if (name.starts_with('[')) return name.substr(1, name.find(']') - 1);
+    // The zone of an address means something on one machine only.
+    if (const std::string bare = name.substr(0, name.find('%')); is_address(bare)) return bare;
     name.resize(std::min(name.find_first_of(":/"), name.size()));
     return is_address(name) || is_host(name) ? name : "";
 }
@@ -235,6 +240,8 @@ Issued issue_server(const Issued& ca, const std::vector<std::string>& names,
 
 Issued issue_client(const Issued& ca, const std::string& name,
                     const std::optional<std::string>& role, const Validity& validity) {
+    if (role && !is_role_word(*role))
+        throw WrongName("a role is a word of 1 to 64 bytes of UTF-8, none of control");
     const Signer signer(ca);
     const Owned<EVP_PKEY> key = new_key();
     Draft draft(name, key.get(), validity,
@@ -294,21 +301,38 @@ void check_issued_by(const Signer& signer, X509* certificate) {
                         ", not by this CA; --dir names the folder of the CA that signed it");
 }
 
-}  // namespace
-
-std::string revoke(const Issued& ca, std::string_view list, std::string_view certificate,
-                   const Validity& validity) {
-    const Signer signer(ca);
-    const auto given = certificates_of(certificate);
+Owned<X509> revocable(const Signer& signer, std::string_view certificate) {
+    auto given = certificates_of(certificate);
     if (given.empty()) throw WrongName("the file to revoke holds no certificate");
     check_issued_by(signer, given.front().get());
+    return std::move(given.front());
+}
+
+/// RFC 5280 5.2.1, for programs that look lists up: CAs may have the same name.
+void name_signer(X509_CRL* list, const X509* ca) {
+    const ASN1_OCTET_STRING* const key = X509_get0_subject_key_id(const_cast<X509*>(ca));
+    if (key == nullptr || X509_CRL_get_ext_by_NID(list, NID_authority_key_identifier, -1) >= 0)
+        return;
+    AUTHORITY_KEYID* const name = AUTHORITY_KEYID_new();
+    name->keyid = ASN1_OCTET_STRING_dup(key);
+    X509_CRL_add1_ext_i2d(list, NID_authority_key_identifier, name, 0, 0);
+    AUTHORITY_KEYID_free(name);
+}
+
+}  // namespace
+
+std::string revoke(const Issued& ca, std::string_view list,
+                   const std::optional<std::string_view>& certificate, const Validity& validity) {
+    const Signer signer(ca);
     const Owned<X509_CRL> made = former_list(signer, list);
-    ASN1_TIME* const time = ASN1_TIME_set(nullptr, static_cast<time_t>(validity.now));
-    add_revoked(made.get(), given.front().get(), time);
+    // As of certificates: clocks differ.
+    ASN1_TIME* const time = ASN1_TIME_set(nullptr, static_cast<time_t>(validity.now - kHour));
+    if (certificate) add_revoked(made.get(), revocable(signer, *certificate).get(), time);
     X509_CRL_set1_lastUpdate(made.get(), time);
     ASN1_TIME_set(time, static_cast<time_t>(validity.now + validity.days * kDay));
     X509_CRL_set1_nextUpdate(made.get(), time);
     ASN1_TIME_free(time);
+    name_signer(made.get(), signer.certificate.get());
     X509_CRL_sort(made.get());
     check(X509_CRL_sign(made.get(), signer.key.get(), EVP_sha256()) > 0,
           "the CA's key cannot sign");

@@ -37,19 +37,41 @@ class Judge {
         X509* const own = chain.front().get();
         const std::string what = "the certificate in " + settings_.certificate;
         judge_dates(own, what, "clients refuse it");
+        for (const auto& one : chain)
+            if (one != chain.front())
+                judge_dates(one.get(),
+                            "the certificate " + subject_of(one.get()) +
+                                ", which stands behind the gateway's in " + settings_.certificate,
+                            "clients refuse the gateway's");
         if ((X509_get_extended_key_usage(own) & XKU_SSL_SERVER) == 0)
             say(what + " is not one of a server (extended key usage): clients refuse it");
         judge_names(own, what, names);
         judge_chain(chain, what);
     }
     void judge_clients() {
-        for (const auto& one : certificates_of(settings_.material.ca)) {
+        const auto authorities = certificates_of(settings_.material.ca);
+        for (const auto& one : authorities) {
             const std::string what = "the CA " + subject_of(one.get()) + " in " + settings_.ca;
             judge_dates(one.get(), what, "the certificates that it has signed are refused");
             if (X509_check_ca(one.get()) == 0)
                 say(what + " is no CA: certificates that it has signed are refused");
         }
-        for (const auto& one : lists_of(settings_.material.crl)) {
+        const auto lists = lists_of(settings_.material.crl);
+        if (!lists.empty())
+            for (const X509* const one : without_list(authorities, lists))
+                say("the CA " + subject_of(one) + " in " + settings_.ca + " has no list in " +
+                    settings_.crl +
+                    ": the certificates that it has signed are refused; `panelgate cert revoke` "
+                    "without a file makes a list, and crl takes those of several CAs, one behind "
+                    "the other");
+        for (const auto& one : lists) {
+            const std::int64_t begin = seconds_of(X509_CRL_get0_lastUpdate(one.get()));
+            if (begin > now_)
+                say("the list of revoked certificates in " + settings_.crl + " is valid from " +
+                    date_text(begin) +
+                    " only, which is still to come: every client is refused until then; compare "
+                    "the "
+                    "clock of the machine that made it");
             const ASN1_TIME* const next = X509_CRL_get0_nextUpdate(one.get());
             if (next == nullptr || seconds_of(next) > now_) continue;
             say("the list of revoked certificates in " + settings_.crl + " is overdue since " +

@@ -39,6 +39,24 @@ std::vector<Owned<X509_CRL>> lists_of(std::string_view pem) {
         pem, [](BIO* in) { return PEM_read_bio_X509_CRL(in, nullptr, no_password, nullptr); });
 }
 
+bool has_signed(const X509* authority, X509_CRL* list) {
+    const bool signed_it =
+        X509_NAME_cmp(X509_get_subject_name(authority), X509_CRL_get_issuer(list)) == 0 &&
+        X509_CRL_verify(list, X509_get0_pubkey(authority)) == 1;
+    ERR_clear_error();
+    return signed_it;
+}
+
+std::vector<X509*> without_list(const std::vector<Owned<X509>>& authorities,
+                                const std::vector<Owned<X509_CRL>>& lists) {
+    std::vector<X509*> found;
+    for (const auto& authority : authorities)
+        if (std::ranges::none_of(
+                lists, [&](const auto& list) { return has_signed(authority.get(), list.get()); }))
+            found.push_back(authority.get());
+    return found;
+}
+
 Owned<EVP_PKEY> key_of(std::string_view pem) {
     const Owned<BIO> in = reader_of(pem);
     Owned<EVP_PKEY> key(PEM_read_bio_PrivateKey(in.get(), nullptr, no_password, nullptr));

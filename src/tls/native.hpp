@@ -31,6 +31,11 @@ Owned<BIO> reader_of(std::string_view text);
 /// All certificates of a PEM text, in order; what is none is skipped.
 std::vector<Owned<X509>> certificates_of(std::string_view pem);
 std::vector<Owned<X509_CRL>> lists_of(std::string_view pem);
+/// Those CAs that have signed none of the lists.
+std::vector<X509*> without_list(const std::vector<Owned<X509>>& authorities,
+                                const std::vector<Owned<X509_CRL>>& lists);
+/// CAs may have the same name, but not the same key.
+bool has_signed(const X509* authority, X509_CRL* list);
 /// Null if there is none, or it is encrypted: nobody is asked for a password.
 Owned<EVP_PKEY> key_of(std::string_view pem);
 /// Seconds since 1970.

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "native.hpp"
+#include "panelgate/base/text.hpp"
 
 namespace panelgate::tls {
 namespace {
@@ -40,10 +41,8 @@ void read_role(const ASN1_OCTET_STRING* value, Peer& peer) {
     }
     const auto* const begin = reinterpret_cast<const char*>(ASN1_STRING_get0_data(text.get()));
     std::string role(begin, static_cast<std::size_t>(ASN1_STRING_length(text.get())));
-    const bool has_control =
-        std::ranges::any_of(role, [](unsigned char c) { return c < ' ' || c == 0x7f; });
-    if (role.empty() || role.size() > kLongestRole || has_control) {
-        peer.role_fault = "its role is not a word of 1 to 64 characters";
+    if (!is_role_word(role)) {
+        peer.role_fault = "its role is not a word of 1 to 64 bytes of UTF-8";
         return;
     }
     peer.role = std::move(role);
@@ -51,11 +50,18 @@ void read_role(const ASN1_OCTET_STRING* value, Peer& peer) {
 
 }  // namespace
 
+bool is_role_word(std::string_view word) {
+    const bool has_control =
+        std::ranges::any_of(word, [](unsigned char c) { return c < ' ' || c == 0x7f; });
+    return !word.empty() && word.size() <= kLongestRole && !has_control && is_utf8(word);
+}
+
 Role role_named(std::string_view word) { return standing_named(word, {}).role; }
 
 Peer peer_of(const x509_st* certificate) {
     Peer peer;
     if (certificate == nullptr) return peer;
+    peer.shown = true;
     peer.subject = subject_of(certificate);
     const int at = X509_get_ext_by_NID(certificate, nid_of_role(), -1);
     if (at < 0) return peer;

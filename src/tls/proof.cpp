@@ -37,7 +37,9 @@ std::string words_of_chain(long result) {
         case X509_V_ERR_SELF_SIGNED_CERT_IN_CHAIN:
             return "is not signed by the CA of `ca`";
         case X509_V_ERR_INVALID_PURPOSE:
-            return "is not one of a client (extended key usage)";
+            return "is not one of a client; its extended key usage must have clientAuth, and its "
+                   "key "
+                   "usage, if it has one, digitalSignature";
         case X509_V_ERR_UNABLE_TO_GET_CRL:
             return "is of a CA whose list of revoked certificates is not in `crl`";
         default:
@@ -47,9 +49,16 @@ std::string words_of_chain(long result) {
 
 }  // namespace
 
-Refusal refusal_of(long result, const std::string& subject) {
-    return {outcome_of_chain(result),
-            "the client's certificate " + subject + ' ' + words_of_chain(result)};
+std::string blamed(X509_STORE_CTX* judging) {
+    const X509* const own = X509_STORE_CTX_get0_cert(judging);
+    const X509* const judged = X509_STORE_CTX_get_current_cert(judging);
+    const std::string client = "the client's certificate " + subject_of(own);
+    if (judged == nullptr || X509_cmp(judged, own) == 0) return client;
+    return "the CA " + subject_of(judged) + " of " + client;
+}
+
+Refusal refusal_of(long result, const std::string& blamed) {
+    return {outcome_of_chain(result), blamed + ' ' + words_of_chain(result)};
 }
 
 Proof::Proof(SSL* connection)
@@ -82,10 +91,9 @@ std::optional<Refusal> Proof::judge_chain(const Context& context) const {
     X509_STORE_CTX_set_verify_cb(judging.get(), SSL_CTX_get_verify_callback(rules));
     const bool good = X509_verify_cert(judging.get()) == 1;
     const int why = X509_STORE_CTX_get_error(judging.get());
-    const X509* const judged = X509_STORE_CTX_get_current_cert(judging.get());
     ERR_clear_error();
     if (good) return std::nullopt;
-    return refusal_of(why, subject_of(judged == nullptr ? certificate_.get() : judged));
+    return refusal_of(why, blamed(judging.get()));
 }
 
 }  // namespace panelgate::tls

@@ -17,8 +17,10 @@ struct Refusal {
     Outcome outcome = Outcome::untrusted;
     std::string why;
 };
-/// Of a certificate's verification, X509_V_ERR_*; `subject`: of the certificate that is to blame.
-Refusal refusal_of(long result, const std::string& subject);
+/// The certificate that a verification has stopped at, in words.
+std::string blamed(X509_STORE_CTX* judging);
+/// Of a certificate's verification, X509_V_ERR_*.
+Refusal refusal_of(long result, const std::string& blamed);
 
 /// What a client has shown in its handshake, for another look at it when the rules have changed.
 /// May be used by any thread, as soon as the handshake is over.

@@ -97,25 +97,11 @@ bool have_key_in_common(const Certificates& some, const Certificates& others) {
     });
 }
 
-/// The list of this CA; null if there is none.
-X509_CRL* list_of(const Lists& lists, const X509_NAME* issuer) {
-    const auto found = std::ranges::find_if(lists, [&](const auto& one) {
-        return X509_NAME_cmp(X509_CRL_get_issuer(one.get()), issuer) == 0;
-    });
-    return found == lists.end() ? nullptr : found->get();
-}
-
-/// False if the CA is known and has not signed it.
-bool may_be_signed_by(const Certificates& authorities, X509_CRL* list) {
-    bool known = false;
-    for (const auto& one : authorities) {
-        if (X509_NAME_cmp(X509_get_subject_name(one.get()), X509_CRL_get_issuer(list)) != 0)
-            continue;
-        known = true;
-        if (X509_CRL_verify(list, X509_get0_pubkey(one.get())) == 1) return true;
-    }
-    ERR_clear_error();
-    return !known;
+/// The CA that has signed it; null if it is not among these.
+const X509* signer_of(const Certificates& authorities, X509_CRL* list) {
+    const auto found = std::ranges::find_if(
+        authorities, [&](const auto& one) { return has_signed(one.get(), list); });
+    return found == authorities.end() ? nullptr : found->get();
 }
 
 bool is_overdue(const X509_CRL* list, std::int64_t now) {
@@ -131,8 +117,8 @@ class Comparison {
     std::string judge() const {
         if (used_chain_.empty() || fresh_chain_.empty()) return "";
         for (const auto part :
-             {&Comparison::judge_dates, &Comparison::judge_names, &Comparison::judge_ca_of_pair,
-              &Comparison::judge_ca, &Comparison::judge_lists})
+             {&Comparison::judge_dates, &Comparison::judge_kind, &Comparison::judge_names,
+              &Comparison::judge_ca_of_pair, &Comparison::judge_ca, &Comparison::judge_lists})
             if (std::string why = (this->*part)(); !why.empty()) return why;
         return "";
     }
@@ -149,6 +135,22 @@ class Comparison {
         if (end <= now_) return pair() + " has expired on " + date_text(end);
         return pair() + " is valid from " + date_text(seconds_of(X509_get0_notBefore(own()))) +
                " only; compare the clock of the machine that made it";
+    }
+    /// Not all that is worse: what no client takes.
+    std::string judge_kind() const {
+        if (!is_pair_new() || !is_used_one_good()) return "";
+        const auto serves = [](const auto& one) {
+            return X509_check_purpose(one.get(), X509_PURPOSE_SSL_SERVER, 0) == 1;
+        };
+        if (serves(used_chain_.front()) && !serves(fresh_chain_.front()))
+            return pair() + " is not one of a server (key usage): every client would refuse it";
+        const auto valid = [&](const auto& one) { return is_valid(one.get(), now_); };
+        if (!std::ranges::all_of(used_chain_, valid)) return "";
+        const auto bad = std::ranges::find_if_not(fresh_chain_, valid);
+        if (bad == fresh_chain_.end()) return "";
+        return "the certificate " + subject_of(bad->get()) +
+               ", which stands behind the gateway's in " + fresh_.certificate +
+               ", is not valid now: every client would refuse the gateway's";
     }
     std::string judge_names() const {
         if (!noticed_ || !is_pair_new() || !is_used_one_good()) return "";
@@ -189,29 +191,37 @@ class Comparison {
         const Lists before = lists_of(used_.material.crl);
         const Lists now = lists_of(fresh_.material.crl);
         for (const auto& one : before) {
-            const X509_NAME* const issuer = X509_CRL_get_issuer(one.get());
-            if (!is_still_served(issuer)) continue;
-            if (std::string why = judge_list(*one, list_of(now, issuer)); !why.empty()) return why;
+            const X509* const signer = signer_of(used_ca_, one.get());
+            if (signer != nullptr && !is_still_served(signer)) continue;
+            const auto next = std::ranges::find_if(now, [&](const auto& other) {
+                return signer != nullptr ? has_signed(signer, other.get())
+                                         : X509_NAME_cmp(X509_CRL_get_issuer(other.get()),
+                                                         X509_CRL_get_issuer(one.get())) == 0;
+            });
+            if (std::string why = judge_list(*one, next == now.end() ? nullptr : next->get());
+                !why.empty())
+                return why;
         }
         return "";
     }
     /// Lists of a CA that is gone may go, too.
-    bool is_still_served(const X509_NAME* issuer) const {
-        const auto is_issuer = [&](const auto& one) {
-            return X509_NAME_cmp(X509_get_subject_name(one.get()), issuer) == 0;
-        };
-        return std::ranges::none_of(used_ca_, is_issuer) ||
-               std::ranges::any_of(fresh_ca_, is_issuer);
+    bool is_still_served(const X509* authority) const {
+        return std::ranges::any_of(fresh_ca_, [&](const auto& one) {
+            return EVP_PKEY_eq(X509_get0_pubkey(one.get()), X509_get0_pubkey(authority)) == 1;
+        });
     }
     std::string judge_list(const X509_CRL& before, X509_CRL* now) const {
         const std::string what = "the list of revoked certificates in " + fresh_.crl;
-        if (now == nullptr || !may_be_signed_by(fresh_ca_, now))
-            return what + " is not of the CA whose list is in use";
+        if (now == nullptr) return what + " is not of the CA whose list is in use";
+        const std::int64_t begin = seconds_of(X509_CRL_get0_lastUpdate(now));
+        if (begin > now_)
+            return what + " is valid from " + date_text(begin) +
+                   " only, which is still to come: every client would be refused; compare the "
+                   "clock of the machine that made it";
         if (is_overdue(now, now_) && !is_overdue(&before, now_))
             return what + " is overdue since " +
                    date_text(seconds_of(X509_CRL_get0_nextUpdate(now)));
-        if (noticed_ && seconds_of(X509_CRL_get0_lastUpdate(now)) <
-                            seconds_of(X509_CRL_get0_lastUpdate(&before)))
+        if (noticed_ && begin < seconds_of(X509_CRL_get0_lastUpdate(&before)))
             return what + " is older than the one in use" + kAsk;
         return "";
     }

@@ -20,6 +20,9 @@ using boost::system::error_code;
 
 namespace {
 
+/// The client's own: it ends the connection.
+bool is_alert(int reason) { return reason >= SSL_AD_REASON_OFFSET; }
+
 /// What others left would be taken for this connection's. Looking is cheaper than clearing.
 void forget_errors() {
     if (ERR_peek_error() != 0) ERR_clear_error();
@@ -57,10 +60,12 @@ void Stream::arrived(std::size_t size) { engine_->arrived(size); }
 Stream::Step Stream::step_of(int result) {
     if (result > 0) return {static_cast<std::size_t>(result), {}, Need::nothing};
     const int why = SSL_get_error(engine_->native(), result);
+    const bool is_damaged = why == SSL_ERROR_SSL && !is_alert(ERR_GET_REASON(ERR_peek_error()));
     forget_errors();
     if (why == SSL_ERROR_WANT_READ) return {0, {}, Need::readable};
     if (why == SSL_ERROR_WANT_WRITE) return {0, {}, Need::writable};
     if (why == SSL_ERROR_ZERO_RETURN) return {0, asio::error::eof, Need::nothing};
+    if (is_damaged) return {0, make_error_code(kDamaged), Need::nothing};
     return {0, asio::error::connection_reset, Need::nothing};
 }
 

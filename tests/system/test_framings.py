@@ -252,6 +252,12 @@ class Framings(unittest.TestCase):
                         f"this one has framing: {names[listener]}")
         self.assertEqual(self.sent_since(before), [])
 
+    def test_a_read_of_unit_22_is_no_tls_hello(self):
+        for first in (0, 100, 0x1FF, 0x4FF):
+            with Raw(self.port(RTU)) as client:
+                client.send(harness.rtu(22, harness.read_registers(first)))
+                self.assertEqual(client.exactly(5), harness.rtu(22, b"\x83\x0a"), first)
+
     def test_p2_a_datagram_that_comes_twice_is_one_frame_and_one_answer(self):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
             client.settimeout(harness.PATIENCE)

@@ -1,4 +1,5 @@
 """What the commands say of certificates: `cert`, and those that ask by HTTPS."""
+import datetime
 import pathlib
 import resource
 import shutil
@@ -32,7 +33,7 @@ class Cert(unittest.TestCase):
     def test_names_that_are_none_are_wrong_usage_that_says_what_is_right(self):
         for names, why in ((["gw:8443"], "'gw:8443' is no host name or IP address, without a port or "
                                          "more; write gw"),
-                           (["https://10.0.0.5/"], "write 10.0.0.5"), (["[fd00::1]:802"], "write fd00::1"),
+                           (["https://10.0.0.5/"], "write 10.0.0.5"), (["[fd00::1]:802"], "write fd00::1"), (["fe80::1%eth0"], "write fe80::1\n"),
                            (["300.1.1.1"], "such as gateway.plant.example"), (["a b"], "such as"),
                            (["*"], "such as"), (["a..b"], "such as"), ([""], "such as"),
                            (["gw", "a,DNS:b"], "'a,DNS:b' is no host name"), (["x" * 64 + ".a"], "such as")):
@@ -62,6 +63,55 @@ class Cert(unittest.TestCase):
         self.assertIn("viewer, operator, engineer or admin, not 'Operator'", done.stderr)
         self.assertEqual(self.cert("new-client", "scada", "--role-word", "shift").returncode, 0)
         self.assertIn("shift", self.text("scada.crt"))
+        for word in ("x" * 65, b"\xff", "a\nb"):
+            done = self.cert("new-client", "other", "--role-word", word)
+            self.assertEqual(done.returncode, 64, word)
+            self.assertIn("a role is a word of 1 to 64 bytes of UTF-8", done.stderr)
+        self.assertNotIn("other.crt", self.files())
+
+    def test_its_end_is_no_later_than_the_cas(self):
+        self.cert("new-ca", "--days", "30", "--force")
+        said = self.cert("new-client", "scada").stdout
+        until = datetime.datetime.now(datetime.timezone.utc) + datetime.timedelta(days=30)
+        self.assertIn(f"wrote {self.folder}/scada.crt and {self.folder}/scada.key, valid until ", said)
+        self.assertLess(abs((datetime.date.fromisoformat(said.split("until ")[1][:10]) - until.date()).days), 2)
+
+    def test_nothing_is_said_to_be_written_where_a_folder_is_in_the_way(self):
+        (self.folder / "scada.key").mkdir()
+        done = self.cert("new-client", "scada", "--force")
+        self.assertEqual((done.returncode, done.stdout), (69, ""))
+        self.assertIn("scada.key: Is a directory", done.stderr)
+
+    def test_revocations_at_the_same_time_are_all_in_the_list(self):
+        names = [f"p{number}" for number in range(8)]
+        for name in names:
+            self.cert("new-client", name)
+        started = [subprocess.Popen([harness.PANELGATE, "cert", "revoke", str(self.folder / f"{name}.crt"),
+                                     "--dir", str(self.folder)], stdout=subprocess.DEVNULL) for name in names]
+        self.assertEqual([one.wait(harness.PATIENCE) for one in started], [0] * 8)
+        text = subprocess.run(["openssl", "crl", "-in", str(self.folder / "crl.pem"), "-noout", "-text"],
+                              capture_output=True, text=True, check=True).stdout
+        self.assertEqual(text.count("Serial Number"), 8)
+
+    def test_files_of_a_wildcard_are_no_options(self):
+        self.assertIn("_.plant.example.crt", self.cert("new-server", "*.plant.example").stdout)
+        self.assertIn("__1.crt", self.cert("new-server", "::1").stdout)
+
+    def test_a_list_that_cannot_be_read_is_not_made_anew(self):
+        for name in ("one", "two"):
+            self.cert("new-client", name)
+        self.assertEqual(self.cert("revoke", str(self.folder / "one.crt")).returncode, 0)
+        former = (self.folder / "crl.pem").read_bytes()
+        (self.folder / "crl.pem").write_bytes(b"")
+        done = self.cert("revoke", str(self.folder / "two.crt"))
+        self.assertEqual(done.returncode, 69)
+        self.assertIn("is empty, though it should name who is revoked already", done.stderr)
+        (self.folder / "crl.pem").write_bytes(former)
+        self.assertEqual(self.cert("revoke").returncode, 0, "without a file: the same list, a later end")
+        text = subprocess.run(["openssl", "crl", "-in", str(self.folder / "crl.pem"), "-noout", "-text"],
+                              capture_output=True, text=True, check=True).stdout
+        self.assertEqual(text.count("Serial Number"), 1)
+        self.assertIn("X509v3 Authority Key Identifier", text)
 
     def test_revoke_refuses_another_cas_certificate_and_list(self):
         with plant() as other:

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import ssl
+import subprocess
 import unittest
 
 import harness
@@ -57,6 +58,12 @@ class Noticed(unittest.TestCase):
         self.assertEqual(shown(self.program), self.good)
         self.assertEqual(get(self.program.http_port(), "/readyz", self.made.context("scada"))[0], 200)
         self.assertEqual(self.program.log.text().count("certificate not renewed"), 1)
+        self.assertEqual(self.renewals("kept"), 1)
+        self.assertEqual(self.renewals("replaced"), 0)
+
+    def renewals(self, outcome):
+        text = get(self.program.http_port(), "/metrics", self.made.context("scada"))[1]
+        return metric(self.program, text, "panelgate_certificate_renewals_total", outcome=outcome)
 
     def put_pair(self, source, name="localhost"):
         for end in ("key", "crt"):
@@ -77,6 +84,14 @@ class Noticed(unittest.TestCase):
         self.assertEqual(reload(self.made, self.program).returncode, 0)
         self.assertNotEqual(shown(self.program), self.good)
         self.program.log.wait_for("certificate renewed .*subject=.CN=other.plant. issuer=.CN=Plant CA")
+
+    def test_a_key_on_a_curve_that_clients_do_not_speak(self):
+        for command in (["ecparam", "-genkey", "-name", "secp256k1", "-out", self.made.path("odd.key")],
+                        ["req", "-new", "-x509", "-key", self.made.path("odd.key"), "-subj", "/CN=localhost",
+                         "-out", self.made.path("odd.crt")]):
+            subprocess.run(["openssl", *command], check=True, capture_output=True)
+        self.put_pair(self.made, "odd")
+        self.kept("localhost.key is of a kind that TLS clients do not speak")
 
     def test_a_pair_of_another_ca(self):
         self.put_pair(self.other)
@@ -124,6 +139,101 @@ class Noticed(unittest.TestCase):
             self.made.cert("new-server", "localhost", "127.0.0.1", "--force")
             self.program.log.wait_for("certificate renewed .*files=\"certificate, key\" subject=.CN=localhost. "
                                       "issuer=.CN=Plant CA. serial=.* valid_from=.* expires=", count)
+        self.assertEqual((self.renewals("replaced"), self.renewals("kept")), (7, 0))
+
+
+class EachForItself(unittest.TestCase):
+    """A file that is kept back, or gone, holds back no other."""
+
+    def setUp(self):
+        self.stack = contextlib.ExitStack()
+        self.addCleanup(self.stack.close)
+        self.made = self.stack.enter_context(plant())
+        self.made.cert("new-client", "lost", "--role", "operator")
+        self.made.cert("new-client", "gone")
+        self.made.cert("revoke", self.made.path("gone.crt"))
+        self.program = self.stack.enter_context(
+            served(self.made, self.made.tls("required", crl=self.made.path("crl.pem"))))
+
+    def loses_its_place(self):
+        with SecureClient(self.program.modbus_port(), self.made.context("lost")) as client:
+            self.assertEqual(client.ask(31, READ)[0], 3)
+            self.made.cert("revoke", self.made.path("lost.crt"))
+            self.program.log.wait_for("certificate renewed .*files=crl")
+            self.program.log.wait_for("connection closed .*CN=lost is revoked")
+            self.assertTrue(client.is_closed_by_peer())
+
+    def test_a_revocation_beside_a_pair_that_is_kept_back(self):
+        self.made.cert("new-server", "localhost", "--force")
+        self.program.log.wait_for("certificate not renewed .*is not for 127.0.0.1")
+        self.loses_its_place()
+        self.made.cert("new-server", "localhost", "127.0.0.1", "--force")
+        self.program.log.wait_for("certificate renewed .*files=.certificate, key.")
+
+    def test_a_revocation_beside_a_key_that_is_gone(self):
+        os.rename(self.made.path("localhost.key"), self.made.path("away"))
+        self.program.log.wait_for("certificate file missing")
+        self.loses_its_place()
+
+
+class TwoCas(unittest.TestCase):
+    """Both named "Plant CA", as `panelgate cert new-ca` names them: a change of the CA, in order."""
+
+    def reads(self, program, context):
+        try:
+            with SecureClient(program.modbus_port(), context) as client:
+                return client.ask(31, READ)[0] == 3
+        except (ssl.SSLError, ConnectionError):
+            return False
+
+    def test_each_list_is_of_the_ca_that_has_signed_it(self):
+        with plant() as old, plant() as new:
+            for one in (old, new):
+                one.cert("new-client", "lost")
+                one.cert("revoke", one.path("lost.crt"))
+            both = (old.folder / "ca.crt").read_text() + (new.folder / "ca.crt").read_text()
+            old_list, new_list = ((one.folder / "crl.pem").read_text() for one in (old, new))
+            (old.folder / "cas.pem").write_text(both)
+            contexts = []
+            for name in ("scada", "lost"):
+                for one in (old, new):
+                    context = ssl.create_default_context(cafile=old.path("ca.crt"))
+                    context.load_cert_chain(one.path(f"{name}.crt"), one.path(f"{name}.key"))
+                    contexts.append(context)
+            for lists, right in ((old_list + new_list, [True, True, False, False]),
+                                 (new_list + old_list, [True, True, False, False]),
+                                 (old_list, [True, False, False, False])):
+                (old.folder / "lists.pem").write_text(lists)
+                tls = old.tls("required", crl=old.path("lists.pem")).replace("ca.crt", "cas.pem")
+                with served(old, tls) as program:
+                    self.assertEqual([self.reads(program, one) for one in contexts], right)
+            done = harness.run("check", "-c", old.path("panelgate.yaml"))
+            self.assertIn("has no list in", done.stdout + done.stderr)
+
+    def test_a_second_list_is_taken_over_and_closes_nobody(self):
+        with plant() as old, plant() as new:
+            for one in (old, new):
+                one.cert("new-client", "lost")
+                one.cert("revoke", one.path("lost.crt"))
+            old_list, new_list = ((one.folder / "crl.pem").read_text() for one in (old, new))
+            authorities = (old.folder / "ca.crt").read_text() + (new.folder / "ca.crt").read_text()
+            with served(old, old.tls("required", crl=old.path("crl.pem"))) as program, \
+                    SecureClient(program.modbus_port(), old.context("scada")) as client:
+                count = 0
+                for file, text in (("ca.crt", authorities), ("crl.pem", old_list + new_list),
+                                   ("crl.pem", new_list + old_list)):
+                    (old.folder / "next").write_text(text)
+                    replace(old.path(file), old.path("next"))
+                    count += 1
+                    program.log.wait_for("certificate renewed ", count)
+                    self.assertEqual(client.ask(31, READ)[0], 3)
+                self.assertNotIn("connection closed", program.log.text())
+
+    def test_a_pair_that_ends_soon_is_taken_and_announced(self):
+        with plant() as made, served(made, made.tls()) as program:
+            made.cert("new-server", "localhost", "127.0.0.1", "--days", "2", "--force")
+            program.log.wait_for("certificate renewed ")
+            program.log.wait_for("warn certificate listener=.* warning=.*localhost.crt expires on .* in [12] days")
 
 
 class AskedFor(unittest.TestCase):

@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,6 +17,7 @@
 #include "panelgate/rt/counters.hpp"
 #include "panelgate/serial_server/counters.hpp"
 #include "panelgate/tcp_server/counters.hpp"
+#include "panelgate/tls/counters.hpp"
 #include "panelgate/web/http/counters.hpp"
 
 namespace panelgate::metrics {
@@ -28,9 +30,10 @@ struct Snapshot {
     std::deque<points::PointSample> points;  ///< deque: many points, never moved
     std::vector<points::RelaySample> relays;
     std::optional<web::Counters> http;
-    std::optional<mqtt::Counters> mqtt;             ///< nullopt: no broker
-    std::optional<audit::Counters> audit{};         ///< nullopt: no audit
-    std::optional<config::ReloadCounters> reloads;  ///< nullopt: built-in configuration
+    std::optional<mqtt::Counters> mqtt;               ///< nullopt: no broker
+    std::optional<audit::Counters> audit{};           ///< nullopt: no audit
+    std::optional<config::ReloadCounters> reloads;    ///< nullopt: built-in configuration
+    std::map<std::string, tls::Renewals> renewals{};  ///< by listener, as its other metrics name it
     std::string version;
     std::string commit;    ///< empty: unknown
     std::string compiler;  ///< the same

@@ -28,7 +28,8 @@ class Context {
     explicit Context(const Settings& settings);
 
     ssl_ctx_st* native() const { return context_.get(); }
-    /// The end of the certificate's validity, in seconds since 1970.
+    /// The end of the certificate's validity, or of one between it and its CA, whichever is first;
+    /// in seconds since 1970.
     std::int64_t expiry() const { return expiry_; }
     ClientCertificate client() const { return client_; }
 

@@ -34,4 +34,10 @@ struct Counters {
     std::int64_t certificate_expiry = 0;
 };
 
+/// What became of new certificate files of one listener.
+struct Renewals {
+    std::uint64_t replaced = 0;  ///< in use
+    std::uint64_t kept = 0;      ///< not taken: the former ones stay in use
+};
+
 }  // namespace panelgate::tls

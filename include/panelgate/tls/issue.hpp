@@ -45,7 +45,7 @@ Issued issue_client(const Issued& ca, const std::string& name,
                     const std::optional<std::string>& role, const Validity& validity);
 /// The CA's list of revoked certificates with this one added, which it has signed; `list` is the
 /// former one, or "".
-std::string revoke(const Issued& ca, std::string_view list, std::string_view certificate,
-                   const Validity& validity);
+std::string revoke(const Issued& ca, std::string_view list,
+                   const std::optional<std::string_view>& certificate, const Validity& validity);
 
 }  // namespace panelgate::tls

@@ -19,11 +19,14 @@ struct Peer {
     std::string subject;              ///< "CN=panel PC 3,O=Plant"; "" without a certificate
     std::optional<std::string> role;  ///< none: no such extension, or none that counts
     std::string role_fault;           ///< why an extension does not count; "" if it does
+    bool shown = false;               ///< there is a certificate; its subject may be empty
 };
 
 /// Reads a certificate; null: nobody. Long names are cut off, control characters replaced.
 Peer peer_of(const x509_st* certificate);
 
+/// True if a certificate may carry it as its role.
+bool is_role_word(std::string_view word);
 /// The role of this name, as in the configuration; none for another word, which only the rules of
 /// the plant can know.
 Role role_named(std::string_view word);

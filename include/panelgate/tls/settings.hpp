@@ -44,7 +44,8 @@ struct Settings {
     std::size_t handshakes_per_second = 200;
     std::size_t handshakes_per_second_per_address = 100;
     Material material{};
-    std::vector<OwnRole> own_roles{};  ///< that a client's certificate may name
+    std::vector<OwnRole> own_roles{};       ///< that a client's certificate may name
+    std::vector<std::string> rule_roles{};  ///< words besides that rules of `access` go by
     /// Made of all this by whoever read the files, which takes milliseconds; null: not yet.
     std::shared_ptr<const Context> made{};
 
@@ -54,7 +55,7 @@ struct Settings {
                             of.role_from_certificate, of.lowest, of.handshake_timeout,
                             of.max_handshakes, of.max_handshakes_per_address,
                             of.handshakes_per_second, of.handshakes_per_second_per_address,
-                            of.material, of.own_roles);
+                            of.material, of.own_roles, of.rule_roles);
         };
         return all(one) == all(other);
     }

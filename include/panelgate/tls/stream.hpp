@@ -23,6 +23,9 @@ namespace panelgate::tls {
 class Engine;
 class Proof;
 
+/// What has come is no TLS, or was changed on the way.
+inline constexpr auto kDamaged = boost::system::errc::protocol_error;
+
 /// A connection, plain or with TLS, chosen at run time: plain until secure(). Meets Asio's
 /// AsyncReadStream and AsyncWriteStream. One read and one write at a time; whoever owns it keeps it
 /// alive until both have ended. Never blocks. One thread.

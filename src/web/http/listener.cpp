@@ -9,6 +9,8 @@
 
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tls/handshakes.hpp"
+#include "panelgate/tls/roles.hpp"
+#include "router.hpp"
 #include "session.hpp"
 #include "shared.hpp"
 
@@ -88,23 +90,20 @@ void dismiss(const std::string& listener, HttpSession& session, const std::strin
 
 }  // namespace
 
-/// A connection keeps the role that it came in with: who has another one now comes in anew.
 void HttpListener::apply_roles(const Settings& before) {
-    const auto from_certificate = [](const Settings& settings) {
-        return settings.tls && settings.tls->role_from_certificate;
-    };
     const Settings& now = shared_->site->settings;
-    const bool was = from_certificate(before);
-    const bool is = from_certificate(now);
-    const bool others = was && is && before.tls->own_roles != now.tls->own_roles;
-    if (was == is && !others) return;
+    const Standing anonymous = now.anonymous_standing();
+    const Standing least = only_reading(anonymous);
     const auto sessions = sessions_;
-    for (const auto& [id, session] : sessions)
-        if (session->stream().peer().role)
-            dismiss(now.name(), *session,
-                    others ? "access.roles have changed, and with them what its role allows"
-                           : "role_from has changed, and with it what its certificate allows",
-                    now.request_timeout);
+    for (const auto& [id, session] : sessions) {
+        const tls::Peer& peer = session->stream().peer();
+        if (!peer.shown) continue;  // as anonymous as before
+        const std::string why = tls::why_other_role(before.tls, now.tls, peer, anonymous, least);
+        if (why.empty())
+            session->take_certificate();
+        else
+            dismiss(now.name(), *session, why, now.request_timeout);
+    }
 }
 
 /// Running requests are answered, such as the one that has asked for the new rules.

@@ -34,6 +34,8 @@ void Caller::certify(std::string subject, std::string word, std::optional<Standi
 void log_client(const Caller& caller, std::string_view event,
                 std::initializer_list<std::pair<std::string_view, std::string>> fields) {
     std::vector<rt::LogField> all{{"client", caller.name()}};
+    const std::string& certificate = caller.who()->certificate;
+    if (!certificate.empty()) all.emplace_back("certificate", certificate);
     for (const auto& [key, value] : fields) all.emplace_back(key, excerpt(value));
     rt::log(rt::LogLevel::info, event, all);
 }

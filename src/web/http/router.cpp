@@ -170,6 +170,18 @@ Problem insufficient(const Standing& standing, Role needed, Right right) {
                             standing.own->name + "' does not have");
 }
 
+/// Of a client's certificate.
+Problem insufficient(const Standing& certified, const std::string& word, Role needed) {
+    return problem(403, "this needs the role " + std::string(label(needed)) +
+                            ", and the client's certificate has " + word +
+                            (certified.role == Role::none ? ", which no role here is called" : ""));
+}
+
+/// By its certificate, where the listener goes by that.
+std::optional<Standing> certified_standing(const HttpRequest& request) {
+    return request.caller ? request.caller->certificate_role() : std::nullopt;
+}
+
 }  // namespace
 
 std::optional<Problem> check_access(const HttpRequest& request, Role needed,
@@ -180,12 +192,10 @@ std::optional<Problem> check_access(const HttpRequest& request, Role needed,
         const Standing standing = standing_of(request, settings);
         if (suffices(standing, needed, right)) return std::nullopt;
         // Who has shown a role is known: another role would help.
-        const bool certified = request.caller && request.caller->certificate_role();
-        if (certified && standing.own) return insufficient(standing, needed, right);
-        if (certified && standing.role != Role::none)
-            return problem(403, "this needs the role " + std::string(label(needed)) +
-                                    ", and the client's certificate has " +
-                                    std::string(label(standing.role)));
+        const auto certified = certified_standing(request);
+        if (certified && certified->own) return insufficient(standing, needed, right);
+        if (certified && !request.caller->who()->certificate_role.empty())
+            return insufficient(*certified, request.caller->who()->certificate_role, needed);
         return unauthorized("this needs a token");
     }
     // Do not echo the value: without a scheme it may be the token.
@@ -213,13 +223,19 @@ std::optional<Problem> check_encoding(const HttpRequest& request) {
     return made;
 }
 
+Standing only_reading(const Standing& anonymous) {
+    if (!anonymous.may(Right::read)) return {};
+    const auto may_more = [&](Right right) { return right != Right::read && anonymous.may(right); };
+    if (std::ranges::none_of(kAllRights, may_more)) return anonymous;
+    return {Role::viewer, std::nullopt};
+}
+
 Standing standing_of(const HttpRequest& request, const Settings& settings) {
     if (header(request, "authorization").empty()) {
-        const bool certified = request.caller && request.caller->certificate_role();
-        const Standing anonymous = settings.anonymous_standing();
-        if (!certified || request.caller->certificate_role()->role < anonymous.role)
-            return anonymous;
-        return *request.caller->certificate_role();
+        const auto certified = certified_standing(request);
+        if (!certified) return settings.anonymous_standing();
+        if (certified->own || certified->role != Role::none) return *certified;
+        return only_reading(settings.anonymous_standing());
     }
     const Token* token = valid_token_of(request, settings);
     return token == nullptr ? Standing{} : token->standing();

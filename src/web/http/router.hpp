@@ -23,9 +23,12 @@ bool carries_token(const HttpRequest& request);
 /// Returns 415 for a compressed or otherwise encoded body, which is not supported.
 std::optional<Problem> check_encoding(const HttpRequest& request);
 
-/// Returns the role of its token; without one that of its certificate or the anonymous one,
-/// whichever is more; none for an unknown token.
+/// Returns the role of its token; without one that of its certificate, where the listener goes by
+/// that; else the anonymous one. None for an unknown token.
 Standing standing_of(const HttpRequest& request, const Settings& settings);
+
+/// What a certificate without a role that counts may: no more than to read.
+Standing only_reading(const Standing& anonymous);
 
 /// Returns the name of its token, "" without a known one.
 std::string token_name(const HttpRequest& request, const Settings& settings);

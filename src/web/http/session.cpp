@@ -23,6 +23,7 @@
 #include "admission.hpp"
 #include "panelgate/base/network.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/tls/roles.hpp"
 #include "panelgate/web/http/problem.hpp"
 #include "router.hpp"
 
@@ -177,11 +178,17 @@ asio::awaitable<bool> HttpSession::secure() {
 
 void HttpSession::take_certificate() {
     const tls::Peer& peer = stream_.peer();
-    const auto& tls = shared_->site->settings.tls;
-    const bool counts = tls && tls->role_from_certificate && peer.role;
-    std::optional<Standing> standing;
-    if (counts) standing = standing_named(*peer.role, tls->own_roles);
-    caller_->certify(peer.subject, counts ? *peer.role : "", std::move(standing));
+    if (!peer.shown) return;
+    const Settings& settings = shared_->site->settings;
+    const auto role = tls::certified_role(settings.tls, peer);
+    if (role && !role->doubt.empty())
+        rt::log(rt::LogLevel::warn, "certificate without a role",
+                {{"listener", settings.name()},
+                 {"client", caller_->name()},
+                 {"subject", peer.subject},
+                 {"reason", role->doubt}});
+    caller_->certify(peer.subject, role ? role->word : "",
+                     role ? std::optional(role->standing) : std::nullopt);
 }
 
 asio::awaitable<bool> HttpSession::serve_one() {

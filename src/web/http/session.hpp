@@ -73,6 +73,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     void stop(Duration reading);
     const Caller& caller() const { return *caller_; }
     const tls::Stream& stream() const { return stream_; }
+    /// Takes over what its certificate says, by the listener's present settings.
+    void take_certificate();
     /// Ends an event stream after the pending events.
     void end_events();
     /// Returns the peer's address.
@@ -87,7 +89,6 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     boost::asio::awaitable<bool> secure();
     boost::asio::awaitable<ErrorCode> receive();
     bool speaks_tls() const;
-    void take_certificate();
     std::string head_of_events() const;
     boost::asio::awaitable<ErrorCode> receive_body();
     boost::asio::awaitable<bool> serve_one();

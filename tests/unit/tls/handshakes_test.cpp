@@ -139,6 +139,24 @@ TEST_F(HandshakesTest, EndsAHandshakeThatDoesNotGoOn) {
     EXPECT_EQ(count(*handshakes, Outcome::timeout), 1u);
 }
 
+TEST_F(HandshakesTest, OfAddressesWithEquallyManyTheOldestGivesWay) {
+    Settings settings = plant.settings();
+    settings.max_handshakes = 3;
+    serve(settings);
+    std::vector<std::shared_ptr<Stream>> streams;
+    std::vector<std::unique_ptr<Sockets>> sockets;
+    std::vector<std::string> gone;
+    for (const char* address : {"c", "a", "b", "d"}) {
+        sockets.push_back(std::make_unique<Sockets>(io));
+        streams.push_back(std::make_shared<Stream>(std::move(sockets.back()->server)));
+        handshakes->begin(streams.back(), *streams.back(), "127.0.0.1:1", address,
+                          [&gone, address](bool) { gone.emplace_back(address); });
+    }
+    EXPECT_EQ(gone, std::vector<std::string>{"c"});
+    for (const auto& stream : streams) stream->close();
+    while (gone.size() < 4) io.run_one();
+}
+
 TEST_F(HandshakesTest, TheOldestOfAnAddressGivesWayBeyondItsLimit) {
     Settings settings = plant.settings();
     settings.max_handshakes_per_address = 2;
