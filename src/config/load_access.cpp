@@ -41,27 +41,21 @@ std::string without_brackets(const std::string& text) {
 }  // namespace
 
 void load_hosts(Loading& loading, yaml::MapReader& in, web::Settings& settings) {
-    const yaml::Node* list = in.sequence("hosts");
     in.looks_like("hosts", "^\\[?[A-Za-z0-9._:-]+\\]?$", true);
-    in.schema("hosts").fewest = 1;
-    if (list == nullptr) return;
-    for (const yaml::Node& item : list->items) {
-        const std::string host = without_brackets(item.scalar);
+    for (const yaml::Node* item : in.items("hosts", "[gw.plant.example]", "the machine's names")) {
+        const std::string host = without_brackets(item->scalar);
         if (is_host(host)) {
             settings.hosts.push_back(host);
         } else {
             loading.problems.add(
-                item.mark,
+                item->mark,
                 "hosts lists names such as gateway.plant.example, without http:// "
                 "and without a port, not '" +
-                    item.scalar + '\'' +
-                    (line::is_broken_address(item.scalar) ? "; its numbers are no IP address"
-                                                          : missing_commas(item.scalar)));
+                    item->scalar + '\'' +
+                    (line::is_broken_address(item->scalar) ? "; its numbers are no IP address"
+                                                           : missing_commas(item->scalar)));
         }
     }
-    if (list->items.empty())
-        in.problem("hosts",
-                   "hosts must name at least one host; leave it out for the machine's names");
 }
 
 namespace {
@@ -214,6 +208,7 @@ web::Token load_token(Loading& loading, const Node& node) {
 void load_tokens(Loading& loading, MapReader& in, std::vector<web::Token>& tokens) {
     const Node* list =
         in.sequence("tokens", "[{name: ops, role: operator, file: /run/secrets/ops}]");
+    in.refuse_empty("tokens", "give at least one token, or leave it out");
     if (list == nullptr) return;
     for (const Node& node : list->items) {
         web::Token token = load_token(loading, node);
