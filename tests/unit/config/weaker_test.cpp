@@ -162,8 +162,9 @@ TEST(Weaker, AllowThatLetsMoreIn) {
 }
 
 TEST(Weaker, PagesOfMoreSitesThatMayRead) {
-    EXPECT_EQ(told(http, ", cors: ['http://a.example']", ", cors: ['http://a.example:81']"),
-              "http: cors has http://a.example:81");
+    EXPECT_EQ(told(http, ", cors: ['http://a.example']",
+                   ", cors: ['http://a.example', 'http://b.example:81']"),
+              "http: cors has http://b.example:81");
 }
 
 TEST(Weaker, HostsThatAreMore) {
