@@ -17,6 +17,7 @@
 #include "panelgate/tls/handshakes.hpp"
 #include "panelgate/tls/stream.hpp"
 #include "panelgate/web/http/message.hpp"
+#include "router.hpp"
 #include "shared.hpp"
 
 namespace panelgate::web {
@@ -89,14 +90,19 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     boost::asio::awaitable<bool> secure();
     boost::asio::awaitable<ErrorCode> receive();
     bool speaks_tls() const;
-    std::string head_of_events() const;
+    std::string head_of_events(const HttpResponse& response) const;
     boost::asio::awaitable<ErrorCode> receive_body();
     boost::asio::awaitable<bool> serve_one();
     boost::asio::awaitable<HttpResponse> answer(BeastRequest message);
     boost::asio::awaitable<HttpResponse> handle(HttpRequest request, std::optional<Problem> barred);
     boost::asio::awaitable<bool> refuse(ErrorCode why);
     boost::asio::awaitable<bool> send(HttpResponse response, bool head, bool keep_alive);
-    boost::asio::awaitable<void> send_events(std::shared_ptr<EventHub::Listener> listener);
+    /// Of an event stream; zero: its client's token has expired.
+    Duration to_heartbeat() const {
+        constexpr Duration kHeartbeat = 15s;
+        return time_of_token(caller_->token(), *shared_->site, kHeartbeat);
+    }
+    boost::asio::awaitable<void> send_events(HttpResponse response);
     boost::asio::awaitable<void> wait_for_rate_limit(const HttpResponse* response);
     boost::asio::awaitable<void> drain();
     void set_busy(bool busy);
