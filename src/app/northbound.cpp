@@ -142,8 +142,10 @@ bool BrokerSession::fits(const Snapshot& snapshot) const {
 void BrokerSession::show(std::shared_ptr<const Snapshot> snapshot) {
     snapshot_ = std::move(snapshot);
     numbers_.clear();
-    places_.assign(snapshot_->plant.lines().size(), {});
     const BrokerSight sight(*snapshot_->config);
+    const auto lines = std::ranges::count_if(
+        snapshot_->config->lines, [&](const config::Line& line) { return sight.line(line); });
+    places_.assign(static_cast<std::size_t>(lines), {});
     for (const Station* station : by_name(snapshot_->plant.stations())) {
         if (!sight.station(*station->configured)) continue;
         Numbers& numbers = numbers_[station];

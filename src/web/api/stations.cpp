@@ -149,7 +149,8 @@ json::object describe(const bus::LineSample& sample, const WallClock& wall, bool
     object["load_percent"] = rounded(sample.load_percent);
     object["requests"] = sample.requests;
     object["errors"] = nullptr;
-    object["latency_ms"] = object["wire_ms"] = nullptr;
+    object["latency_ms"] = nullptr;
+    object["wire_ms"] = nullptr;
     if (whole) {
         object["errors"] = sample.errors;
         object["latency_ms"] = rounded(sample.latency_ms);
