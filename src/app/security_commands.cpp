@@ -24,9 +24,14 @@ void add_audit(CLI::App& cli, ExitCode& code) {
                                 "name the first record that was changed, removed, added "
                                 "or put elsewhere");
     add_files(verify);
-    verify->add_option("--log", typed->logs,
-                       "the gateway's log, whose `audit anchor` lines name records: finds a chain "
-                       "that was made anew, and what was cut off at the end; - for standard input");
+    verify
+        ->add_option(
+            "--log", typed->logs,
+            "the gateway's log, whose `audit anchor` lines name records: finds a chain "
+            "that was made anew, and what was cut off at the end; - for standard input; once for "
+            "each log")
+        ->expected(1)
+        ->take_all();
     verify->footer(
         "Exit codes: 0 the chain is whole; 1 it is not; 64 usage; 66 a file cannot be "
         "read.");

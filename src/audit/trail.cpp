@@ -21,7 +21,7 @@ namespace panelgate::audit {
 
 namespace {
 
-constexpr Duration kAgain = 1s;  // between two tries while the disk takes nothing
+constexpr Duration kAgain = 1s;  // between two tries while the disk takes nothing, or two looks
 
 /// Signals are for the loop's thread.
 std::thread start_thread(std::function<void()> run) {
@@ -148,7 +148,9 @@ bool Trail::State::wait(std::unique_lock<std::mutex>& lock) {
         wake.wait_for(lock, kAgain, [&] { return stop; });
         return stop;
     }
-    wake.wait(lock, [&] { return stop || next || !pending.empty(); });
+    // A file that was removed is seen even when there is nothing to record.
+    if (!wake.wait_for(lock, kAgain, [&] { return stop || next || !pending.empty(); }))
+        return false;
     wake.wait_for(lock, settings.flush,
                   [&] { return stop || next || pending.size() > settings.buffer / 2; });
     return stop;
@@ -187,7 +189,7 @@ void Trail::State::anchor() {
     if (!due) return;
     anchored = last.number;
     anchored_at = time;
-    hooks.tell({Notice::Kind::anchor, {}, last});
+    hooks.tell({Notice::Kind::anchor, writer.chain_id(), last});
 }
 
 void Trail::State::work() {
@@ -237,7 +239,7 @@ void Trail::State::run() {
         round(lock);
     }
     // What came while the last try was going on, and what belongs to another file.
-    for (int i = 0; i < 2 && !failing; ++i) round(lock);
+    for (int i = 0; i < 2; ++i) round(lock);
 }
 
 Trail::Trail(const Settings& settings, Hooks hooks)
@@ -247,7 +249,7 @@ Trail::Trail(const Settings& settings, Hooks hooks)
 
 Trail::~Trail() { close(); }
 
-Position Trail::close() {
+Trail::End Trail::close() {
     if (state_->thread.joinable()) {
         {
             const std::scoped_lock lock(state_->mutex);
@@ -256,7 +258,13 @@ Position Trail::close() {
         state_->wake.notify_one();
         state_->thread.join();
     }
-    return state_->writer.last();
+    // What the thread had taken, what it had not, and what was counted only.
+    const auto lines = [](const std::string& text) {
+        return static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n'));
+    };
+    const Writer& writer = state_->writer;
+    return {writer.last(), writer.chain_id(),
+            writer.unwritten() + lines(state_->taken) + lines(state_->pending) + state_->lost};
 }
 
 void Trail::add(std::string_view body) {
