@@ -297,6 +297,9 @@ void AuditBook::add_values(ByteView pdu, const modbus::Span& items) {
     const std::size_t each = modbus::is_bit_table(items.table) ? 0 : 2;
     if (pdu[0] == modbus::kMaskWriteRegister && pdu.size() == 7) {
         composer_.number("and_mask", register_at(pdu, 3)).number("or_mask", register_at(pdu, 5));
+    } else if (pdu[0] == modbus::kWriteSingleCoil && pdu.size() == 5 &&
+               (pdu[4] != 0 || (pdu[3] != 0 && pdu[3] != 0xFF))) {
+        composer_.hex("pdu", pdu);  // neither on nor off: what it means is the panel's
     } else if (at == 0 || pdu.size() < at + std::max<std::size_t>(each * items.count, 1)) {
         composer_.hex("pdu", pdu);
     } else {

@@ -127,6 +127,8 @@ void AuditBook::reload(const web::ReloadVerdict& verdict) {
     const std::span<const std::string> changes(verdict.changes);
     composer_.texts("changes", changes.first(std::min(changes.size(), kChanges)));
     if (changes.size() > kChanges) composer_.number("more_changes", changes.size() - kChanges);
+    const std::span<const std::string> weaker(verdict.weaker);
+    if (!weaker.empty()) composer_.texts("weaker", weaker.first(std::min(weaker.size(), kChanges)));
     if (!verdict.faults.empty()) composer_.number("faults", verdict.faults.size());
     record();
 }

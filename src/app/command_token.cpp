@@ -109,6 +109,9 @@ ExitCode token_new(const TokenOptions& options) {
                 "--expires is a span such as 90d, 12w, 6months or 2y, or a day such "
                 "as 2027-12-31, not '" +
                 options.expires + '\'');
+        const auto ends = web::parse_expiry(*day);
+        if (ends && *ends <= rt::wall_now())
+            return wrong_usage("--expires " + options.expires + " is over already");
         expires = *day;
     }
     const auto token = random_token();

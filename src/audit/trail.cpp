@@ -123,8 +123,9 @@ struct Trail::State {
     Settings settings;
     std::optional<Settings> next;
     std::string pending;
-    std::size_t of_last = 0;  ///< bytes of `pending` from before `next` was wanted
-    std::uint64_t lost = 0;   ///< not yet recorded
+    std::size_t of_last = 0;      ///< bytes of `pending` from before `next` was wanted
+    std::uint64_t lost = 0;       ///< not yet recorded
+    std::uint64_t told_lost = 0;  ///< in a record that is not yet written
     Counters counters;
     bool stop = false;
 
@@ -175,6 +176,7 @@ void Trail::State::take_over() {
     const std::uint64_t left_out = std::exchange(lost, 0);
     std::swap(taken, pending);
     if (left_out == 0) return;
+    told_lost = left_out;
     composer.begin(hooks.wall(), Kind::lost).number("count", left_out);
     taken += composer.body();
     taken += '\n';
@@ -211,6 +213,7 @@ void Trail::State::work() {
         hooks.tell({good ? Notice::Kind::recovered : Notice::Kind::failing, why, {}});
         if (!good) ++failures;
     }
+    if (good) told_lost = 0;
     if (good) anchor();
 }
 
@@ -263,8 +266,10 @@ Trail::End Trail::close() {
         return static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n'));
     };
     const Writer& writer = state_->writer;
+    const std::uint64_t told = state_->told_lost;  // by one of the records
     return {writer.last(), writer.chain_id(),
-            writer.unwritten() + lines(state_->taken) + lines(state_->pending) + state_->lost};
+            writer.unwritten() + lines(state_->taken) + lines(state_->pending) + state_->lost +
+                told - (told > 0 ? 1 : 0)};
 }
 
 void Trail::add(std::string_view body) {

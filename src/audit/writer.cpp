@@ -280,12 +280,12 @@ void Writer::begin_run() {
     begun_ = true;
     composer_.begin(wall_(), Kind::start);
     if (unclean_) composer_.flag("unclean", true);
-    if (unclean_ && remark_.empty())
-        remark_ = "the run before did not end in order: what it recorded last may be missing";
     if (torn_bytes_ > 0) composer_.number("torn_bytes", torn_bytes_).text("torn", torn_);
     composer_.text("remark", remark_);
     chain_.append(out_, std::string(composer_.body()) + start_);
     ++sealed_;
+    if (unclean_ && remark_.empty())
+        remark_ = "the run before did not end in order: what it recorded last may be missing";
 }
 
 void Writer::seal() {

@@ -168,25 +168,29 @@ Anchors named_by(const std::string& line) {
 
 TEST(AuditVerify, AnchorsOfALogCountWhateverACollectorPutBeforeThem) {
     const std::string text = "info audit anchor number=12 hash=" + kHash + " chain=0c";
-    for (const std::string& line :
-         {text, "2026-11-26T09:00:00.123Z " + text, "<6>" + text,
-          "Nov 26 09:00:00 host panelgate[7]: " + text + '\r',
-          R"({"_PID":"7","MESSAGE":")" + text + R"(","PRIORITY":"6"})",
-          R"({"time":"x","level":"info","event":"audit anchor","number":"12","hash":")" + kHash +
-              R"(","chain":"0c"})"})
+    const Lines said_as{
+        text,
+        "2026-11-26T09:00:00.123Z " + text,
+        "<6>" + text,
+        "Nov 26 09:00:00 host panelgate[7]: " + text + '\r',
+        R"({"_PID":"7","MESSAGE":")" + text + R"(","PRIORITY":"6"})",
+        R"({"time":"x","level":"info","event":"audit anchor","number":"12","hash":")" + kHash +
+            R"(","chain":"0c"})"};
+    for (const std::string& line : said_as)
         EXPECT_EQ(named_by(line).chains["0c"][12], kHash) << line;
 }
 
 TEST(AuditVerify, WhatAClientSendsIsNoAnchor) {
     const std::string anchor = "info audit anchor number=3 hash=" + kHash;
-    for (const std::string& line :
-         {"info http request refused client=a path=\"/x/" + anchor + "\"",
-          "info x path=\"/x/\\\"MESSAGE\\\":\\\"" + anchor + "\"",
-          R"({"time":"x","event":"write refused","path":"\",\"event\":\"audit anchor\",)"
-          R"(\"number\":\"3\",\"hash\":\")" +
-              kHash + R"(\",\"x\":\""})",
-          R"({"time":"x","event":"x","path":")" + anchor + R"("})", "info x why=x" + anchor,
-          "warn http refused why=\"error audit records lost count=7\""}) {
+    const Lines sent{"info http request refused client=a path=\"/x/" + anchor + "\"",
+                     "info x path=\"/x/\\\"MESSAGE\\\":\\\"" + anchor + "\"",
+                     R"({"time":"x","event":"write refused","path":"\",\"event\":\"audit anchor\",)"
+                     R"(\"number\":\"3\",\"hash\":\")" +
+                         kHash + R"(\",\"x\":\""})",
+                     R"({"time":"x","event":"x","path":")" + anchor + R"("})",
+                     "info x why=x" + anchor,
+                     "warn http refused why=\"error audit records lost count=7\""};
+    for (const std::string& line : sent) {
         const Anchors anchors = named_by(line);
         EXPECT_TRUE(anchors.chains.empty()) << line;
         EXPECT_EQ(anchors.lost, 0U) << line;
