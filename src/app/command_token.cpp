@@ -101,6 +101,9 @@ ExitCode token_new(const TokenOptions& options) {
     if (!is_name(options.name))
         return wrong_usage("a name has letters, digits, '-', '_' and '.', not '" + options.name +
                            '\'');
+    if (!is_name(options.role))
+        return wrong_usage("a role is viewer, operator, engineer, admin or one of your own, not '" +
+                           options.role + '\'');
     std::string expires;
     if (!options.expires.empty()) {
         const auto day = last_day(options.expires);

@@ -62,8 +62,9 @@ void add_token(CLI::App& cli, ExitCode& code) {
         "new", "make a token: print it once, and what goes into the configuration");
     fresh->add_option("--name", typed->name, "its name in logs and in the audit, such as scada")
         ->required();
-    fresh->add_option("--role", typed->role, "what it may do")
-        ->check(CLI::IsMember({"viewer", "operator", "engineer", "admin"}))
+    fresh
+        ->add_option("--role", typed->role,
+                     "what it may do: viewer, operator, engineer, admin, or a role of your own")
         ->capture_default_str();
     fresh->add_option("--expires", typed->expires,
                       "how long it is known, such as 90d or 2y, or its last day, 2027-12-31");

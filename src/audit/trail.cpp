@@ -265,7 +265,7 @@ Trail::End Trail::close() {
     const auto lines = [](const std::string& text) {
         return static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n'));
     };
-    const Writer& writer = state_->writer;
+    Writer& writer = state_->writer;
     const std::uint64_t told = state_->told_lost;  // by one of the records
     return {writer.last(), writer.chain_id(),
             writer.unwritten() + lines(state_->taken) + lines(state_->pending) + state_->lost +

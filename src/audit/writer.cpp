@@ -128,11 +128,14 @@ bool Writer::fail(const std::string& what) {
     return false;
 }
 
-std::uint64_t Writer::unwritten() const {
-    const std::size_t from = std::min(at_, batch_.size());
-    const auto waiting =
-        std::count(batch_.begin() + static_cast<std::ptrdiff_t>(from), batch_.end(), '\n');
-    return sealed_ + static_cast<std::uint64_t>(waiting);
+/// Whole lines that a full disk took before it was full are there, if they can be synchronized.
+std::uint64_t Writer::unwritten() {
+    const auto lines = [](const std::string& text, std::size_t from) {
+        const auto begin = text.begin() + static_cast<std::ptrdiff_t>(std::min(from, text.size()));
+        return static_cast<std::uint64_t>(std::count(begin, text.end(), '\n'));
+    };
+    const bool is_there = file_ >= 0 && sealed_ > 0 && ::fdatasync(file_) == 0;
+    return (is_there ? lines(out_, sent_) : sealed_) + lines(batch_, at_);
 }
 
 /// Closes a file that has no longer its name: it was moved away by a rotation that is not ours, or

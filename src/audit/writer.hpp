@@ -42,8 +42,8 @@ class Writer {
     std::uint64_t rotations() const { return rotations_; }
     /// The chain's id, which the log names with its records; empty: its first file has none.
     const std::string& chain_id() const { return id_; }
-    /// Records that were taken and are not known to be on the disk.
-    std::uint64_t unwritten() const;
+    /// Records that were taken and are not on the disk, as far as it can tell.
+    std::uint64_t unwritten();
     /// What should be said of the file that was found, or has gone; told once.
     std::string remark() { return std::exchange(remark_, {}); }
 

@@ -435,6 +435,20 @@ class Explain(unittest.TestCase):
             self.assertIn("the token 'old' ended on 2020-01-01", said)
             self.assertIn(f"audit: there is no folder {folder}/no", said)
 
+    def test_tokens_name_own_roles_and_are_neither_over_nor_a_hash_in_capitals(self):
+        for more, code in ((["--role", "setter"], 0), (["--role", "no role"], 64), (["--expires", "2020-01-01"], 64)):
+            done = harness.run("token", "new", "--name", "h", *more)
+            self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            token = pathlib.Path(folder) / "old"
+            token.write_text("SHA256:" + "AB" * 32)
+            token.chmod(0o600)
+            file.write_text(DOORS.format(token=token))
+            done = harness.run("check", "-c", file)
+            self.assertEqual(done.returncode, 78, done.stderr)
+            self.assertIn("64 hex digits in lower case", done.stderr)
+
 
 DOORS = """lines:
   - {{name: floor1, device: sim, stations: [{{id: 1, name: aaa, profile: generic}}, {{id: 2, name: ro, profile: generic, access: read_only}}]}}

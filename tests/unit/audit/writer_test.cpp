@@ -279,6 +279,7 @@ TEST_F(AuditWriter, AFullDiskLosesNothingThatWasTaken) {
         EXPECT_FALSE(writer->idle());
         EXPECT_FALSE(writer->work());
         EXPECT_EQ(writer->last().number, 2U);
+        EXPECT_EQ(writer->unwritten(), 49U);
     }
     EXPECT_TRUE(writer->work());
     const Report report = verify({file});
