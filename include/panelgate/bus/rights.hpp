@@ -94,7 +94,8 @@ struct Refusal {
 /// Refuses what rules deny, or what the client's role may not.
 Refusal denial(const access::Verdict& verdict, std::string station);
 
-/// What somebody who has come in already may do now: doors change while requests wait.
+/// What somebody who has come in may do now, where that is less than all that was asked of his door
+/// when he came: doors change while requests wait.
 struct Admission {
     WhoRef who{};             ///< with the role that he would have now
     panelgate::Rights may{};  ///< of what reaches a line
