@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "ruling.hpp"
+
 namespace panelgate::access {
 
 namespace {
@@ -19,14 +21,6 @@ bool holds(const List& list, const Value& value) {
 }
 
 bool is_trusted(const WhoRef& who) { return who && who->face == Face::gateway; }
-
-bool is_named(const Rule& rule, std::uint8_t function) { return holds(rule.functions, function); }
-
-/// True if the rule speaks of this act by this function.
-bool is_about(const Rule& rule, Act act, std::uint8_t function) {
-    if (!rule.acts.has(act)) return false;
-    return rule.functions.empty() || is_named(rule, function);
-}
 
 /// A request for no items still names a place.
 std::optional<Span> with_items(std::optional<Span> span) {
@@ -50,10 +44,10 @@ constexpr Right right_of(Act act) {
 
 /// Default roles are what doors want; what an own one lacks is refused wherever it comes in.
 bool lacks(const WhoRef& who, Act act) {
-    return who && who->own_role && !who->own_role->rights.has(right_of(act));
+    return who && who->standing.own && !who->standing.own->rights.has(right_of(act));
 }
 
-Verdict by_role(const WhoRef& who, Act act) { return {false, nullptr, act, who->own_role->name}; }
+Verdict by_role(const WhoRef& who, Act act) { return {false, nullptr, act, who->standing.own->name}; }
 
 /// What this request does.
 Acts acts_of(const LineRules::Question& question) {
@@ -92,7 +86,7 @@ LineRules::LineRules(std::shared_ptr<const Settings> settings, std::string line,
 
 Verdict LineRules::judge(const WhoRef& who, const Question& question) const {
     if (is_trusted(who)) return {};
-    if (who && who->own_role) {
+    if (who && who->standing.own) {
         const Acts acts = acts_of(question);
         for (const Act act : {Act::read, Act::write, Act::broadcast, Act::raw})
             if (acts.has(act) && lacks(who, act)) return by_role(who, act);
@@ -151,57 +145,12 @@ Verdict LineRules::judge(const WhoRef& who, std::uint8_t station, Act act, std::
 }
 
 Verdict LineRules::decide(const Meeting& meeting, Act act, std::uint8_t function,
-                          const std::optional<Span>& items) const {
-    if (items) return decide_items(meeting, act, function, *items);
-    for (const Applied& applied : meeting.rules) {
-        const Rule& rule = *applied.rule;
-        // A rule about items says nothing of a function without items, unless it names it.
-        if (rule.has_range() && !is_named(rule, function)) continue;
-        if (is_about(rule, act, function)) return {rule.allow, &rule, act};
-    }
-    return by_default(act);
+                          const std::optional<Span>& items) {
+    const Ruling& ruling = *meeting.ruling;
+    const Ruling::Decision decision =
+        items ? ruling.decide(act, function, *items) : ruling.decide(act, function);
+    return {decision.allowed, decision.rule, act};
 }
-
-/// Each item is decided by the first rule that matches it; one that is denied denies them all.
-Verdict LineRules::decide_items(const Meeting& meeting, Act act, std::uint8_t function,
-                                const Span& items) const {
-    left_.assign(1, {items.first, items.end()});
-    for (const Applied& applied : meeting.rules) {
-        const Rule& rule = *applied.rule;
-        if (!is_about(rule, act, function)) continue;
-        if (applied.items == nullptr) return {rule.allow, &rule, act};
-        for (const Span& span : *applied.items) {
-            if (span.table == items.table && take_out(span) && !rule.allow)
-                return {false, &rule, act};
-        }
-        if (left_.empty()) return {true, &rule, act};
-    }
-    return by_default(act);
-}
-
-bool LineRules::take_out(const Span& items) const {
-    bool any = false;
-    for (std::size_t i = 0; i < left_.size();) {
-        const Interval part = left_[i];
-        const std::uint32_t first = std::max(part.first, items.first);
-        const std::uint32_t end = std::min(part.end, items.end());
-        if (first >= end) {
-            ++i;
-            continue;
-        }
-        any = true;
-        const Interval before{part.first, first};
-        const Interval behind{end, part.end};
-        left_[i] = left_.back();
-        left_.pop_back();
-        // What remains of it cannot overlap these items again.
-        if (before.first < before.end) left_.push_back(before);
-        if (behind.first < behind.end) left_.push_back(behind);
-    }
-    return any;
-}
-
-Verdict LineRules::by_default(Act act) const { return {settings_->allow_by_default, nullptr, act}; }
 
 bool LineRules::may_some(const WhoRef& who, std::uint8_t station, Act act) const {
     if (lacks(who, act)) return false;
@@ -209,24 +158,11 @@ bool LineRules::may_some(const WhoRef& who, std::uint8_t station, Act act) const
     Meeting& meeting = meet(who, station);
     if (act == Act::read && meeting.reads_some) return *meeting.reads_some;
     const bool some = std::ranges::any_of(modbus::kTables, [&](modbus::Table table) {
-        return can_be(act, table) && some_allowed(meeting, act, table);
+        return can_be(act, table) &&
+               meeting.ruling->allows_some(act, function_for(act, table), table);
     });
     if (act == Act::read) meeting.reads_some = some;
     return some;
-}
-
-bool LineRules::some_allowed(const Meeting& meeting, Act act, modbus::Table table) const {
-    left_.assign(1, {0, modbus::kTableItems});
-    for (const Applied& applied : meeting.rules) {
-        const Rule& rule = *applied.rule;
-        if (!is_about(rule, act, function_for(act, table))) continue;
-        if (applied.items == nullptr) return rule.allow;
-        for (const Span& span : *applied.items) {
-            if (span.table == table && take_out(span) && rule.allow) return true;
-        }
-        if (left_.empty()) return false;
-    }
-    return settings_->allow_by_default;
 }
 
 bool LineRules::may_read_some(const WhoRef& who) const {
@@ -250,7 +186,7 @@ bool LineRules::may_all(const WhoRef& who, std::uint8_t station, Act act) const 
     return std::ranges::all_of(modbus::kTables, [&](modbus::Table table) {
         const Span all{table, 0, modbus::kTableItems};
         return !can_be(act, table) ||
-               decide_items(meeting, act, function_for(act, table), all).allowed;
+               meeting.ruling->decide(act, function_for(act, table), all).allowed;
     });
 }
 
@@ -271,18 +207,27 @@ LineRules::Meeting& LineRules::meet(const WhoRef& who, std::uint8_t station) con
     if (const auto found = known.find(who.get()); found != known.end()) return *found->second;
     if (met_ >= kMeetings) {
         for (Meetings& all : meetings_) all.clear();
+        rulings_.clear();
         met_ = 0;
     }
     ++met_;
-    auto made = std::make_unique<Meeting>(Meeting{who, rules_for(who, station)});
+    auto made = std::make_unique<Meeting>(Meeting{who, ruling_for(who, station)});
     return *known.emplace(who.get(), std::move(made)).first->second;
 }
 
-std::vector<LineRules::Applied> LineRules::rules_for(const WhoRef& who,
-                                                     std::uint8_t station) const {
+/// Clients whom the same rules match share what these decide.
+std::shared_ptr<const Ruling> LineRules::ruling_for(const WhoRef& who, std::uint8_t station) const {
+    std::vector<RuleAtStation> rules = rules_for(who, station);
+    std::shared_ptr<const Ruling>& known = rulings_[rules];
+    if (!known)
+        known = std::make_shared<const Ruling>(std::move(rules), settings_->allow_by_default);
+    return known;
+}
+
+std::vector<RuleAtStation> LineRules::rules_for(const WhoRef& who, std::uint8_t station) const {
     static const Who kNobody{};
     const Place place{line_, station};
-    std::vector<Applied> applied;
+    std::vector<RuleAtStation> applied;
     for (std::size_t i = 0; i < settings_->rules.size(); ++i) {
         const Rule& rule = settings_->rules[i];
         if (!is_about(rule, who ? *who : kNobody)) continue;

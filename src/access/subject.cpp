@@ -56,7 +56,7 @@ bool comes_from(const Rule& rule, const Who& who) {
 
 bool has_role(const Rule& rule, const Who& who) {
     return rule.roles.empty() || std::ranges::any_of(rule.roles, [&](const std::string& role) {
-               return role == who.role_name() || role == who.certificate_role;
+               return role == who.standing.name() || role == who.certificate_role;
            });
 }
 

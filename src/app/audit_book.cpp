@@ -21,13 +21,26 @@ namespace {
 using audit::Composer;
 using audit::Kind;
 
-void add_who(Composer& record, const WhoRef& who) {
-    if (!who) return;
-    record.text("client", who->name).text("face", label(who->face));
-    record.text("listener", who->listener).text("token", who->token);
-    if (who->role != Role::none) record.text("role", who->role_name());
-    record.text("certificate", who->certificate).text("certificate_role", who->certificate_role);
-    record.text("user", who->user);
+/// Who it is, as members of a record.
+std::string who_members(const Who& who) {
+    Composer record;
+    record.begin({}, Kind::write);
+    const std::size_t begin = record.body().size();
+    record.text("client", who.name).text("face", label(who.face));
+    record.text("listener", who.listener).text("token", who.token);
+    if (who.standing.role != Role::none) record.text("role", who.standing.name());
+    record.text("certificate", who.certificate).text("certificate_role", who.certificate_role);
+    record.text("user", who.user);
+    return std::string(record.body().substr(begin));
+}
+
+/// Where it is, as members of a record.
+std::string place_members(const Station& station) {
+    Composer record;
+    record.begin({}, Kind::write);
+    const std::size_t begin = record.body().size();
+    record.text("line", station.line).text("station", station.name).number("id", station.id);
+    return std::string(record.body().substr(begin));
 }
 
 /// How a write ended, for somebody who asks whether the panel has changed.
@@ -192,6 +205,7 @@ void AuditBook::show(std::shared_ptr<const Snapshot> snapshot) {
     for (const Station& station : snapshot->plant.stations()) {
         Known& known = next[station.line][station.id];
         known.station = &station;
+        known.members = place_members(station);
         if (const Known* before = find(station.line, station.id)) known.written = before->written;
     }
     known_ = std::move(next);
@@ -220,6 +234,17 @@ std::string AuditBook::place_of(Known* known, const modbus::Span& items) {
     return known != nullptr ? notation_of(*known, items) : plain_place(items);
 }
 
+/// What tells who it is is made once for each client.
+void AuditBook::add_who(const WhoRef& who) {
+    if (!who) return;
+    if (const auto known = clients_.find(who); known != clients_.end()) {
+        composer_.members(known->second);
+        return;
+    }
+    if (clients_.size() >= kClients) clients_.clear();
+    composer_.members(clients_.emplace(who, who_members(*who)).first->second);
+}
+
 void AuditBook::write(const std::string& line, const bus::WriteEnd& end) {
     if (!trail_) return;
     Known* known = find(line, end.station);
@@ -236,10 +261,11 @@ void AuditBook::write(const std::string& line, const bus::WriteEnd& end) {
 
 void AuditBook::add_write(const std::string& line, const bus::WriteEnd& end, Known* known) {
     Composer& record = begin(Kind::write);
-    add_who(record, end.who);
-    record.text("line", line);
-    if (known != nullptr) record.text("station", known->station->name);
-    record.number("id", end.station);
+    add_who(end.who);
+    if (known != nullptr)
+        record.members(known->members);
+    else
+        record.text("line", line).number("id", end.station);
     if (end.items) record.text("at", place_of(known, *end.items));
     if (!end.pdu.empty()) record.number("function", end.pdu[0]);
     if (end.items) {
@@ -320,11 +346,12 @@ bool AuditBook::is_vain_repeat(const std::string& line, const bus::WriteEnd& end
 bool AuditBook::is_repeat(const WhoRef& who, std::string_view what, unsigned in_full,
                           const std::function<std::string()>& more) {
     make_client_key(key_, who);
-    const std::string client = key_;
+    const std::size_t client = key_.size();
     key_ += what;
     const auto members = [&] { return client_members(who); };
     const bool is_new = repeats_.is_new(clock_.now(), rt::wall_now(), key_, in_full,
-                                        [&] { return members() + more(); }, {client, members});
+                                        [&] { return members() + more(); },
+                                        {std::string_view(key_).substr(0, client), members});
     if (!waits_) wait_for_repeats();
     return !is_new;
 }
@@ -361,13 +388,15 @@ void AuditBook::deed(const web::Deed& deed) {
     if (deed.status == 401) {
         if (is_repeat(deed.who, "login", 1, [&] { return member("outcome", "log-in failed"); }))
             return;
-        add_who(begin(Kind::login), deed.who);
+        begin(Kind::login);
+        add_who(deed.who);
         composer_.text("outcome", "failed").text("path", deed.path);
         composer_.text("why", detail_of(deed.answer));
     } else if (deed.status >= 400) {
         return refusal(deed);
     } else if (discovers || simulates) {
-        add_who(begin(discovers ? Kind::discovery : Kind::simulator), deed.who);
+        begin(discovers ? Kind::discovery : Kind::simulator);
+        add_who(deed.who);
         composer_.text("method", deed.method).text("path", deed.path).text("body", deed.body);
     } else {
         return;  // the bus tells of writes, the reloader of reloads
@@ -390,7 +419,8 @@ void AuditBook::refusal(const web::Deed& deed) {
                    member("outcome", "refused");
         }))
         return;
-    add_who(begin(Kind::refusal), deed.who);
+    begin(Kind::refusal);
+    add_who(deed.who);
     composer_.text("method", deed.method).text("path", deed.path).text("body", deed.body);
     composer_.number("status", deed.status).text("why", detail_of(deed.answer));
     record();
@@ -410,7 +440,7 @@ void AuditBook::reload(const web::ReloadVerdict& verdict) {
 void AuditBook::tokens(const std::vector<web::Token>& before, const std::vector<web::Token>& now) {
     if (!trail_) return;
     const auto tell_of = [this](const web::Token& token, std::string_view event) {
-        begin(Kind::token).text("token", token.name).text("role", token.standing().name());
+        begin(Kind::token).text("token", token.name).text("role", token.standing.name());
         composer_.text("event", event);
         if (token.expires) composer_.text("expires", web::expiry_text(*token.expires));
         record();
@@ -421,9 +451,9 @@ void AuditBook::tokens(const std::vector<web::Token>& before, const std::vector<
             tell_of(token, "added");
         } else if (*old != token) {
             const bool other = old->hash != token.hash;
-            tell_of(token, old->standing() != token.standing() ? "role changed"
-                           : other                             ? "replaced"
-                                                               : "changed");
+            tell_of(token, old->standing != token.standing ? "role changed"
+                           : other                         ? "replaced"
+                                                           : "changed");
         }
     }
     for (const web::Token& token : before)

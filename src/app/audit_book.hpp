@@ -37,6 +37,7 @@ struct Snapshot;
 class AuditBook {
   public:
     static constexpr std::size_t kNotations = 4096;  ///< of a station, kept
+    static constexpr std::size_t kClients = 1024;    ///< whose members are kept
     static constexpr std::size_t kChanges = 200;     ///< of a reload, told
     static constexpr unsigned kNotSent = 3;  ///< writes to one place that were not sent, in full
 
@@ -78,6 +79,7 @@ class AuditBook {
     struct Known;
 
     Composer& begin(audit::Kind kind) { return composer_.begin(rt::wall_now(), kind); }
+    void add_who(const WhoRef& who);
     void add_write(const std::string& line, const bus::WriteEnd& end, Known* known);
     void add_values(ByteView pdu, const modbus::Span& items);
     void add_before(const Known& known, const modbus::Span& items);
@@ -107,6 +109,7 @@ class AuditBook {
     /// A station as records name it.
     struct Known {
         const Station* station = nullptr;
+        std::string members{};  ///< of a record, that tell where it is
         std::unordered_map<std::uint32_t, std::string> notations{};  ///< by table and address
         std::optional<TimePoint> written{};  ///< the last write that may have had an effect
     };
@@ -116,6 +119,7 @@ class AuditBook {
 
     std::shared_ptr<const Snapshot> snapshot_;
     std::map<std::string, std::map<std::uint8_t, Known>, std::less<>> known_;
+    std::unordered_map<WhoRef, std::string> clients_;  ///< what records tell of them
     std::vector<std::uint16_t> values_;
     std::string key_;
     std::string what_;

@@ -26,15 +26,17 @@ using modbus::Span;
 
 constexpr const char* kForm =
     "; write [from=ADDRESS] [role=ROLE] [token=NAME] [face=FACE] [listener=NAME] [count=N] "
-    "read|write|broadcast|raw STATION/PLACE, such as from=10.0.0.7 role=operator write press/UW102";
+    "read|write|broadcast|raw [read|write] STATION/PLACE, such as from=10.0.0.7 role=operator "
+    "write press/UW102";
 
 /// What was asked, as far as it has been understood.
 struct AskedRight {
-    Who who{.role = Role::none};
+    Who who{};
     bool has_role = false;
     bool has_face = false;
     std::int64_t count = 1;
     std::optional<Act> act;
+    std::optional<bool> raw_reads;  ///< what a raw request is, too; nullopt: it was not said
     const config::Line* line = nullptr;
     const config::Station* station = nullptr;
     Span items;
@@ -52,8 +54,7 @@ void set_role(AskedRight& asked, const config::Config& config, const std::string
     Standing standing = standing_named(word, config.access.roles);
     asked.has_role = true;
     if (standing.role == Role::none && !standing.own) asked.who.certificate_role = word;
-    asked.who.role = standing.role;
-    asked.who.own_role = std::move(standing.own);
+    asked.who.standing = std::move(standing);
 }
 
 void set(AskedRight& asked, const config::Config& config, const std::string& key,
@@ -128,10 +129,7 @@ void complete(const config::Config& config, AskedRight& asked) {
         const auto& tokens = config.http->tokens;
         const auto token = std::ranges::find(tokens, asked.who.token, &web::Token::name);
         if (token == tokens.end()) asked.wrong = "there is no token '" + asked.who.token + '\'';
-        if (token != tokens.end() && !asked.has_role) {
-            asked.who.role = token->role;
-            asked.who.own_role = token->own_role;
-        }
+        if (token != tokens.end() && !asked.has_role) asked.who.standing = token->standing;
         asked.has_role = true;
         if (!asked.has_face) asked.who.face = Face::http;
     }
@@ -139,8 +137,7 @@ void complete(const config::Config& config, AskedRight& asked) {
         asked.who.face = Face::http;
     if (asked.has_role) return;
     const bool anonymous = asked.who.face == Face::http && config.http;
-    asked.who.role = anonymous ? config.http->anonymous : Role::operator_;
-    if (anonymous) asked.who.own_role = config.http->anonymous_own;
+    asked.who.standing = anonymous ? config.http->anonymous : Standing(Role::operator_);
 }
 
 AskedRight parse(const config::Config& config, const std::string& text) {
@@ -156,8 +153,10 @@ AskedRight parse(const config::Config& config, const std::string& text) {
         bool is_act = false;
         for (const Act act : {Act::read, Act::write, Act::broadcast, Act::raw}) {
             if (word != label(act)) continue;
-            asked.act = act;
             is_act = true;
+            const bool is_second = asked.act == Act::raw && (act == Act::read || act == Act::write);
+            if (is_second) asked.raw_reads = act == Act::read;
+            if (!is_second) asked.act = act;
         }
         if (!is_act) place = word;
     }
@@ -170,7 +169,7 @@ AskedRight parse(const config::Config& config, const std::string& text) {
 /// The request that REST or a Modbus client would send.
 std::optional<modbus::Request> request_of(const AskedRight& asked) {
     const Span& items = asked.items;
-    const bool reads = asked.act == Act::read || asked.act == Act::raw;
+    const bool reads = asked.act == Act::read || asked.raw_reads.value_or(false);
     Bytes pdu;
     if (reads) {
         pdu = modbus::encode_read(items);
@@ -194,20 +193,20 @@ std::optional<modbus::Request> request_of(const AskedRight& asked) {
 
 /// What decides before any rule; "" if nothing does.
 std::string decided_before(const AskedRight& asked) {
-    const bool writes = asked.act == Act::write || asked.act == Act::broadcast;
+    const bool writes = asked.act != Act::read && !asked.raw_reads.value_or(false);
     if (asked.station->listens) return "line '" + asked.line->name + "' is only listened to";
     if (writes && asked.station->read_only)
         return "station '" + asked.station->name + "' is read_only";
     if (asked.act != Act::read && !asked.who.certificate_role.empty())
         return "the role '" + asked.who.certificate_role +
                "' of a certificate is no role that the gateway has, so it may only read";
-    if (asked.who.face != Face::http || asked.who.own_role) return "";
+    if (asked.who.face != Face::http || asked.who.standing.own) return "";
     const Role needed = asked.act == Act::read    ? Role::viewer
                         : asked.act == Act::write ? Role::operator_
                                                   : Role::engineer;
-    if (asked.who.role >= needed) return "";
+    if (asked.who.standing.role >= needed) return "";
     return "over http this needs the role " + std::string(label(needed)) + ", not " +
-           std::string(label(asked.who.role));
+           std::string(label(asked.who.standing.role));
 }
 
 std::string place_in(const std::string& file, const access::Rule& rule) {
@@ -216,10 +215,10 @@ std::string place_in(const std::string& file, const access::Rule& rule) {
 
 }  // namespace
 
+namespace {
+
 Explanation explain(const config::Config& config, const std::string& file,
-                    const std::string& question) {
-    const AskedRight asked = parse(config, question);
-    if (!asked.wrong.empty()) return {false, "", asked.wrong + kForm};
+                    const AskedRight& asked) {
     const auto request = request_of(asked);
     if (!request) return {false, "", "no request does that to so many items of this table"};
     if (const std::string why = decided_before(asked); !why.empty())
@@ -245,6 +244,27 @@ Explanation explain(const config::Config& config, const std::string& file,
         text += "rule '" + verdict.rule->name + "' (" + place_in(file, *verdict.rule) + ')';
     }
     return {verdict.allowed, std::move(text), ""};
+}
+
+}  // namespace
+
+Explanation explain(const config::Config& config, const std::string& file,
+                    const std::string& question) {
+    AskedRight asked = parse(config, question);
+    if (!asked.wrong.empty()) return {false, "", asked.wrong + kForm};
+    if (asked.act != Act::raw || asked.raw_reads) return explain(config, file, asked);
+    // It was not said which: what holds for both, or what does not for one of them.
+    asked.raw_reads = true;
+    Explanation read = explain(config, file, asked);
+    asked.raw_reads = false;
+    Explanation write = explain(config, file, asked);
+    if (!write.wrong.empty()) return read;  // nothing can write there
+    if (read.allowed == write.allowed) return read;
+    const bool only_reads = read.allowed;
+    return {false,
+            (only_reads ? write : read).text +
+                (only_reads ? "; a raw read is allowed" : "; a raw write is allowed"),
+            ""};
 }
 
 }  // namespace panelgate::app

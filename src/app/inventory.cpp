@@ -154,7 +154,7 @@ Heading heading_of(const serial_server::Settings& master) {
 
 Heading heading_of(const web::Settings& http) {
     std::string text = "http " + http.name() + ": without a token " +
-                       text_of(http.anonymous_standing()) + ", for " + text_of(http.allow);
+                       text_of(http.anonymous) + ", for " + text_of(http.allow);
     if (!http.hosts.empty()) text += ", as";
     for (const std::string& host : http.hosts) text += ' ' + host;
     return {std::move(text), " listen anonymous allow hosts "};

@@ -52,7 +52,7 @@ WhoRef client_of(const mqtt::Settings& settings) {
     return make_who({.face = Face::mqtt,
                      .name = kMqttName,
                      .listener = settings.broker(),
-                     .role = Role::operator_,
+                     .standing = Role::operator_,
                      .user = settings.username});
 }
 

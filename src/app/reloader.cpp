@@ -131,10 +131,7 @@ struct Reloader::Job {
 
 bool allows_more(const web::Token& token, const web::Token& than) {
     const bool longer = than.expires && (!token.expires || *token.expires > *than.expires);
-    const bool more = std::ranges::any_of(kAllRights, [&](Right right) {
-        return token.standing().may(right) && !than.standing().may(right);
-    });
-    return longer || more;
+    return longer || token.standing.exceeds(than.standing);
 }
 
 /// A rollback brings back no token that was removed, and none that allows more than now.
@@ -146,10 +143,8 @@ config::Config with_tokens_of(const config::Config& config, const config::Config
             const auto was = std::ranges::find(config.http->tokens, token.hash, &web::Token::hash);
             if (was != config.http->tokens.end() && !allows_more(*was, token)) token = *was;
         }
-        if (running.http->anonymous < made.http->anonymous) {
+        if (made.http->anonymous.exceeds(running.http->anonymous))
             made.http->anonymous = running.http->anonymous;
-            made.http->anonymous_own = running.http->anonymous_own;
-        }
     }
     return made;
 }

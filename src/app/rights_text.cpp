@@ -23,21 +23,17 @@ struct Door {
 };
 
 Door door(std::string name, Who who) {
-    const bool writes = Standing{who.role, who.own_role}.may(Right::write);
+    const bool writes = who.standing.may(Right::write);
     const bool is_open = who.token.empty();
     return {std::move(name), make_who(std::move(who)), !writes, is_open};
 }
 
 void add_http(const web::Settings& http, std::vector<Door>& doors) {
-    Who who{.face = Face::http,
-            .listener = http.name(),
-            .role = http.anonymous,
-            .own_role = http.anonymous_own};
-    if (http.anonymous != Role::none) doors.push_back(door("http " + http.name(), who));
+    Who who{.face = Face::http, .listener = http.name(), .standing = http.anonymous};
+    if (http.anonymous.role != Role::none) doors.push_back(door("http " + http.name(), who));
     for (const web::Token& token : http.tokens) {
         who.token = token.name;
-        who.role = token.role;
-        who.own_role = token.own_role;
+        who.standing = token.standing;
         doors.push_back(door("http token " + token.name, who));
     }
 }
@@ -57,7 +53,7 @@ std::vector<Door> doors_of(const config::Config& config) {
     std::vector<Door> doors;
     const std::vector<Network> networks = networks_of(config.access);
     for (const tcp_server::Settings& listener : config.modbus_tcp) {
-        Who who{.face = Face::modbus_tcp, .listener = listener.name(), .role = Role::operator_};
+        Who who{.face = Face::modbus_tcp, .listener = listener.name(), .standing = Role::operator_};
         const std::string name = "modbus_tcp " + listener.name();
         doors.push_back(door(name, who));
         doors.back().read_only = listener.read_only;
@@ -70,16 +66,16 @@ std::vector<Door> doors_of(const config::Config& config) {
         }
     }
     for (const serial_server::Settings& master : config.serial_masters) {
-        doors.push_back(
-            door("serial master " + master.name,
-                 {.face = Face::serial_master, .listener = master.name, .role = Role::operator_}));
+        doors.push_back(door(
+            "serial master " + master.name,
+            {.face = Face::serial_master, .listener = master.name, .standing = Role::operator_}));
         doors.back().read_only = master.access.read_only;
     }
     if (config.http) add_http(*config.http, doors);
     if (config.mqtt) {
-        doors.push_back(
-            door("mqtt " + config.mqtt->broker(),
-                 {.face = Face::mqtt, .listener = config.mqtt->broker(), .role = Role::operator_}));
+        doors.push_back(door(
+            "mqtt " + config.mqtt->broker(),
+            {.face = Face::mqtt, .listener = config.mqtt->broker(), .standing = Role::operator_}));
         doors.back().read_only = !config.mqtt->write;
     }
     return doors;

@@ -169,6 +169,7 @@ void Arbiter::on_line_left() {
     resetting_ = false;
     stations_.on_line_down();
     unsolicited_.forget();
+    stations_.book().forget_foreign();
     admission_.memory().clear();
 }
 
@@ -176,7 +177,6 @@ void Arbiter::on_line_up(TimePoint now) {
     up_ = true;
     suspended_ = false;
     resetting_ = false;
-    schedule_.on_transport_opened(now);
     if (settings_.may_stall) stations_.on_opened(now);
     if (ascii_) ascii_->cut();
     quiet_.on_open(now);
@@ -194,18 +194,19 @@ void Arbiter::on_line_down(TimePoint now) {
     resetting_ = false;
     stations_.on_line_down();
     unsolicited_.forget();
+    stations_.book().forget_foreign();
     admission_.memory().clear();
     if (active_) {
         note(now, active_->take_unsolicited());
         const Attempt attempt = take_active(now);
         const Group& group = attempt.group();
         if (attempt.is_broadcast()) {
-            stations_.on_broadcast(attempt.timing().sent, group.request.pdu());
+            stations_.book().on_broadcast(attempt.timing().sent, group.request.pdu());
             rest_ = std::max(rest_, attempt.timing().sent + settings_.broadcast_turnaround);
         } else {
             stations_.of(group.station)
-                .requests()
-                .on_unanswered(now, group.request.pdu(), attempt.timing().sent);
+                .replies()
+                .on_unanswered(stations_.book(), now, group.request.pdu(), attempt.timing().sent);
         }
         outbox_.report(attempt, TransactionEnd::line_down);
         for (const Job& job : group.jobs) outbox_.finish(job, Fault::line_lost);
@@ -349,7 +350,7 @@ void Arbiter::start(TimePoint now, Group group) {
     if (group.station != kBroadcast) {
         Station& station = stations_.of(group.station);
         if (group.attempts == 1) group.repeatable = station.settings().retry_writes;
-        station.on_asked(now, group, schedule_.in_transit(station));
+        station.on_asked(stations_.book(), now, group, schedule_.in_transit(stations_, station));
         if (group.attempts == 1)
             group.first_silence = !station.missed_last() && !station.health().offline() &&
                                   !stations_.flaky_beside_others(now, station);

@@ -141,7 +141,7 @@ Verdict Attempt::feed(ByteView bytes, const Ends& ends) {
 Verdict Attempt::accept(std::optional<Bytes> reply) {
     collect();
     if (!reply) return Verdict::open;
-    if (own_.may_be_echo(echo_, adu_of(*reply))) return Verdict::open;
+    if (own_.may_be_echo(echo_, *reply)) return Verdict::open;
     // Two equal replies cannot be distinguished.
     if (const auto candidate = std::exchange(candidate_, std::nullopt);
         candidate && candidate != reply) {
@@ -186,8 +186,6 @@ void Attempt::collect() {
     std::vector<Unused> parts = framer_.take_unused();
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const bool foreign = begins_with_request(parts[i].bytes, echo_.frame(), orders_);
-        if (foreign && parts[i].bytes[0] == group_.station)
-            foreign_requests_.on_heard({}, parts[i].bytes);
         if (std::ranges::equal(parts[i].bytes, echo_.frame())) on_echo_behind();
         const bool in_front = i + behind < parts.size();
         const bool damaged = parts[i].kind == Unused::Kind::damaged;

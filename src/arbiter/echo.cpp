@@ -21,9 +21,9 @@ bool holds_fragment(ByteView heard, ByteView frame) {
     return false;
 }
 
-bool OwnFrame::may_be_echo(const EchoFilter& filter, ByteView adu) {
+bool OwnFrame::may_be_echo(const EchoFilter& filter, ByteView pdu) {
     const bool accounted = !possible || filter.complete() || fragment || seen;
-    if (accounted || !std::ranges::equal(adu, filter.frame())) return false;
+    if (accounted || !filter.is_own(pdu)) return false;
     return seen = true;
 }
 

@@ -55,17 +55,20 @@ std::optional<JobQueue::Place> JobQueue::first_of(std::size_t rank, const Test& 
 JobQueue::Choice JobQueue::choose(const Test& may_run) const {
     Choice choice;
     for (std::size_t rank = kRanks; rank-- > 0;) {
-        choice.first[rank] = first_of(rank, may_run);
-        if (choice.first[rank]) choice.rank = rank;
+        choice.first_[rank] = first_of(rank, may_run);
+        if (choice.first_[rank]) choice.rank_ = rank;
     }
-    if (choice.rank == kRanks || last_was_passed_over_) return choice;
-    const std::size_t top = choice.rank;
-    if (top < kRead && choice.first[kRead] && passed_[kRead] >= kReadTurn - 1) {
-        choice.rank = kRead;
-    } else if (top < kPoll && choice.first[kPoll] && is_polls_turn(choice, top)) {
-        choice.rank = kPoll;
+    if (choice.rank_ == kRanks) return choice;
+    const std::size_t top = choice.rank_;
+    if (last_was_passed_over_) {
+        // The higher class goes.
+    } else if (top < kRead && choice.first_[kRead] && passed_[kRead] >= kReadTurn - 1) {
+        choice.rank_ = kRead;
+    } else if (top < kPoll && choice.first_[kPoll] && is_polls_turn(choice, top)) {
+        choice.rank_ = kPoll;
     }
-    choice.passed_over = choice.rank != top;
+    choice.passed_over_ = choice.rank_ != top;
+    choice.job_ = &lane_at(*choice.first_[choice.rank_]).jobs.front().job;
     return choice;
 }
 
@@ -73,7 +76,7 @@ JobQueue::Choice JobQueue::choose(const Test& may_run) const {
 /// itself, or would be in the following turn, which is a write's again), the poll goes up to three
 /// turns earlier; one of these four turns is always free for it.
 bool JobQueue::is_polls_turn(const Choice& choice, std::size_t top) const {
-    const bool read = choice.first[kRead].has_value();
+    const bool read = choice.first_[kRead].has_value();
     const int reads_wait = passed_[kRead];
     if (read && reads_wait >= kReadTurn - 2) return false;
     const bool in_the_way = top == kWrite && reads_wait + (read ? 1 : 0) >= kReadTurn - 2;
@@ -81,27 +84,28 @@ bool JobQueue::is_polls_turn(const Choice& choice, std::size_t top) const {
 }
 
 void JobQueue::count_turn(const Choice& choice) {
-    last_was_passed_over_ = choice.passed_over;
+    last_was_passed_over_ = choice.passed_over_;
     for (const std::size_t rank : {kRead, kPoll}) {
-        if (rank == choice.rank || rounds_[rank].empty()) {
+        if (rank == choice.rank_ || rounds_[rank].empty()) {
             passed_[rank] = 0;
-        } else if (choice.first[rank]) {
+        } else if (choice.first_[rank]) {
             ++passed_[rank];
         }
     }
 }
 
-const Job* JobQueue::peek(const Test& may_run) const {
-    const Choice choice = choose(may_run);
-    return choice.rank == kRanks ? nullptr : &lane_at(*choice.first[choice.rank]).jobs.front().job;
-}
+const Job* JobQueue::peek(const Test& may_run) const { return choose(may_run).job(); }
 
 std::optional<Job> JobQueue::pop(const Test& may_run) {
     const Choice choice = choose(may_run);
-    if (choice.rank == kRanks) return std::nullopt;
+    if (choice.job() == nullptr) return std::nullopt;
+    return take(choice);
+}
+
+Job JobQueue::take(const Choice& choice) {
     count_turn(choice);
-    const Place place = *choice.first[choice.rank];
-    move_to_back(place, choice.rank);
+    const Place place = *choice.first_[choice.rank_];
+    move_to_back(place, choice.rank_);
     return take(place, 0);
 }
 

@@ -16,25 +16,26 @@ namespace panelgate::arbiter {
 
 namespace {
 
-FrameKind kind_of(Outbox::Part what) {
-    switch (what) {
-        case Outbox::Part::damaged:
-            return FrameKind::damaged;
-        case Outbox::Part::echo:
-            return FrameKind::echo;
-        case Outbox::Part::request:
-            return FrameKind::foreign_request;
-        case Outbox::Part::late:
-            return FrameKind::late;
-        case Outbox::Part::duplicate:
-            return FrameKind::copy;
-        case Outbox::Part::broadcast_reply:
-        case Outbox::Part::unasked:
-        case Outbox::Part::unknown:
-            return FrameKind::foreign;
-    }
-    std::abort();
-}
+/// How a frame is shown and counted that answers no open request.
+struct Shown {
+    Done done;
+    FrameKind kind;
+    std::uint64_t Symptoms::* symptom;
+    bool counts_for_asked = false;  ///< not for the station that it names: it may not be its
+    bool foreign = false;
+};
+constexpr Shown kShown[] = {
+    {Done::echo, FrameKind::echo, &Symptoms::echoes},
+    {Done::request, FrameKind::foreign_request, &Symptoms::requests, true, true},
+    {Done::damaged, FrameKind::damaged, &Symptoms::strays, true},
+    {Done::duplicate, FrameKind::copy, &Symptoms::doubled},
+    {Done::second, FrameKind::copy, &Symptoms::doubled},
+    {Done::late, FrameKind::late, &Symptoms::late},
+    {Done::disorder, FrameKind::late, &Symptoms::late},
+    {Done::broadcast, FrameKind::foreign, &Symptoms::broadcast_replies, false, true},
+    {Done::unasked, FrameKind::foreign, &Symptoms::unasked, false, true},
+    {Done::nobodys, FrameKind::foreign, &Symptoms::unasked, true, true},
+};
 
 FrameKind kind_of(const Group& group) {
     if (group.learns_for != 0 || !group.confirms.empty()) return FrameKind::learn_echo;
@@ -142,16 +143,20 @@ void Outbox::on_echo_mismatch(TimePoint now, std::uint8_t station) {
     event(StationEvent::Kind::collision, station);
 }
 
-void Outbox::on_unsolicited(TimePoint now, const modbus::Unused& part, Part what,
+void Outbox::on_unsolicited(TimePoint now, const modbus::Unused& part, Done done,
                             std::uint8_t asked, Duration lateness) {
-    const bool known = what == Part::late || what == Part::duplicate || what == Part::unasked;
-    const bool is_foreign = what == Part::unasked || what == Part::unknown ||
-                            what == Part::request || what == Part::broadcast_reply;
-    of(known ? part.station : asked).discarded_bytes += part.bytes.size();
-    if (what == Part::late) ++of(part.station).late_frames;
-    if (is_foreign) ++of(asked).foreign_frames;
-    count_unsolicited(part, what, asked, lateness);
-    actions_.push_back(Note{now, kind_of(what), part.bytes, {}});
+    const Shown& shown = *std::ranges::find(kShown, done, &Shown::done);
+    const bool late = is_late(done);
+    of(is_reply(done) ? part.station : asked).discarded_bytes += part.bytes.size();
+    if (late) ++of(part.station).late_frames;
+    if (shown.foreign) ++of(asked).foreign_frames;
+    Symptoms& symptoms = symptoms_of(shown.counts_for_asked ? asked : part.station);
+    if (late) symptoms.mute_in_a_row = 0;
+    symptoms.worst_lateness = std::max(symptoms.worst_lateness, lateness);
+    const bool in_time = late && lateness <= Duration::zero();  // after a shortened wait
+    const bool elsewhere = done == Done::damaged && inside_attempt_;
+    if (!in_time && !elsewhere) ++(symptoms.*shown.symptom);
+    actions_.push_back(Note{now, shown.kind, part.bytes, {}});
 }
 
 // Symptoms, for diagnosis only: nothing depends on them.
@@ -269,39 +274,6 @@ void Outbox::count_damaged(const Attempt& attempt) {
     symptoms.damaged_odd += static_cast<std::uint64_t>(
         std::ranges::count_if(bytes, [](std::uint8_t b) { return std::popcount(b) % 2 == 1; }));
     symptoms.damaged_zeros += static_cast<std::uint64_t>(std::ranges::count(bytes, 0));
-}
-
-void Outbox::count_unsolicited(const modbus::Unused& part, Part what, std::uint8_t asked,
-                               Duration lateness) {
-    const bool known = what != Part::damaged && what != Part::unknown && what != Part::request;
-    Symptoms& symptoms = symptoms_of(known ? part.station : asked);
-    switch (what) {
-        case Part::damaged:
-            if (!inside_attempt_) ++symptoms.strays;
-            return;
-        case Part::echo:
-            ++symptoms.echoes;
-            return;
-        case Part::request:
-            ++symptoms.requests;
-            return;
-        case Part::late:
-            symptoms.mute_in_a_row = 0;
-            if (lateness <= Duration::zero()) return;  // after a shortened wait
-            ++symptoms.late;
-            symptoms.worst_lateness = std::max(symptoms.worst_lateness, lateness);
-            return;
-        case Part::duplicate:
-            ++symptoms.doubled;
-            return;
-        case Part::broadcast_reply:
-            ++symptoms.broadcast_replies;
-            return;
-        case Part::unasked:
-        case Part::unknown:
-            ++symptoms.unasked;
-            return;
-    }
 }
 
 }  // namespace panelgate::arbiter

@@ -17,19 +17,21 @@ std::uint32_t known_length(const Station& station, const modbus::Span& span) {
     const StationSettings& settings = station.settings();
     const std::uint32_t limit =
         modbus::is_bit_table(span.table) ? settings.max_bits : settings.max_registers;
-    return settings.vouched ? limit : std::min(limit, station.requests().longest_read(span.table));
+    return settings.vouched ? limit
+                            : std::min(limit, station.replies().reads().longest(span.table));
 }
 
 }  // namespace
 
-Group Sharing::gather(Job leader, const Station& station, JobQueue& queue) const {
+Group Sharing::gather(Job leader, const Station& station, const OutstandingRequests& book,
+                      JobQueue& queue) const {
     Group group{.station = leader.station, .request = leader.request};
     if (share_ && !leader.alone) group.span = leader.request.span();
     group.jobs.push_back(std::move(leader));
     while (group.span) {
         const std::uint32_t before = group.span->count;
         for (Job& job : queue.take_all(group.station, [&](const Job& other) {
-                 if (!joins(group, other, station)) return false;
+                 if (!joins(group, other, station, book)) return false;
                  group.span = join(*group.span, *other.request.span());
                  return true;
              })) {
@@ -42,13 +44,14 @@ Group Sharing::gather(Job leader, const Station& station, JobQueue& queue) const
     return group;
 }
 
-bool Sharing::joins(const Group& group, const Job& job, const Station& station) const {
+bool Sharing::joins(const Group& group, const Job& job, const Station& station,
+                    const OutstandingRequests& book) const {
     if (job.alone || job.station != group.station) return false;
     const auto& span = job.request.span();
     if (!span || !group.span->touches(*span)) return false;
     if (group.span->contains(*span)) return true;
     const modbus::Span both = join(*group.span, *span);
-    if (station.requests().any() && station.requests().is_ambiguous(modbus::Request::read(both)))
+    if (book.any(job.station) && book.is_ambiguous(job.station, modbus::Request::read(both)))
         return false;
     // A span that contains all the others was asked for by a client itself.
     if (both != *span && both.count > known_length(station, both)) return false;
@@ -177,7 +180,7 @@ Group internal_read(std::uint8_t station, modbus::Request request) {
 /// P8: it is unknown whether this line has an echo, and this job could be confirmed by its own
 /// echo. A read of the same station decides.
 Group learning_for(const Job& job, const Station& station) {
-    modbus::Request probe = station.requests().probe();
+    modbus::Request probe = station.replies().reads().probe();
     if (!teaches_echo(probe))
         probe = modbus::Request::read({modbus::Table::holding_registers, 0, 1});
     Group group = internal_read(job.station, std::move(probe));
@@ -209,9 +212,11 @@ TimePoint Schedule::ready_at(const Stations& stations, const Job& job) const {
     if (station == nullptr) return stations.broadcasts_over(job.station, job.request);
     // A write that its echo could confirm is preceded by a read, which may be any.
     const bool is_learned = echo_known_ || job.request.is_read();
-    const OutstandingRequests& book = station->requests();
-    TimePoint clear = is_learned ? book.clear_at(job.request) : book.rested();
-    if (can_prove(*station)) clear = std::min(clear, book.clear_at(book.proof()));
+    const OutstandingRequests& book = stations.book();
+    const ReplyHabits& replies = station->replies();
+    TimePoint clear = is_learned ? replies.clear_at(book, job.request) : replies.rested();
+    if (can_prove(book, *station))
+        clear = std::min(clear, replies.clear_at(book, replies.proof(book)));
     return std::max({clear, stations.broadcasts_over(job.station, job.request),
                      stations.throttled_until(job.station)});
 }
@@ -219,14 +224,14 @@ TimePoint Schedule::ready_at(const Stations& stations, const Job& job) const {
 /// At once if the outstanding reply is to this very request, else after it (P1).
 TimePoint Schedule::repeat_from(const Group& group, const Stations& stations) const {
     const Station& station = *stations.find(group.station);
-    return std::max(station.requests().clear_at(group.request, true),
+    return std::max(station.replies().clear_at(stations.book(), group.request, true),
                     stations.broadcasts_over(group.station, group.request));
 }
 
 /// On a connection that may delay outstanding requests, more is sent only while the station is seen
 /// to answer.
-bool Schedule::can_prove(const Station& station) const {
-    return station.may_prove() && (!may_stall_ || station.is_answering());
+bool Schedule::can_prove(const OutstandingRequests& book, const Station& station) const {
+    return station.may_prove(book) && (!may_stall_ || station.is_answering());
 }
 
 Schedule::Next Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
@@ -302,7 +307,7 @@ std::optional<Group> Schedule::next_probe(TimePoint now, Stations& stations, Qui
     if (now < quiet.quarantined_until()) return std::nullopt;
     const auto station = stations.next_to_probe(now);
     if (!station || !gap_is_over(now, *station, stations, quiet)) return std::nullopt;
-    Group group = internal_read(*station, stations.find(*station)->requests().probe());
+    Group group = internal_read(*station, stations.find(*station)->replies().reads().probe());
     group.probe = true;
     return group;
 }
@@ -324,15 +329,16 @@ std::optional<Schedule::Next> Schedule::proof_before(TimePoint now, const Job& j
                                                      const Stations& stations) const {
     const Station* station = stations.find(job.station);
     if (station == nullptr) return std::nullopt;
-    const OutstandingRequests& book = station->requests();
-    if (!book.is_ambiguous(job.request)) return std::nullopt;
-    const bool is_in_transit = in_transit(*station);
-    if (!is_in_transit && now >= book.clear_at(job.request)) return std::nullopt;
-    if (is_in_transit && !can_prove(*station) && book.any_since(transport_.opened()))
+    const OutstandingRequests& book = stations.book();
+    const ReplyHabits& replies = station->replies();
+    if (!book.is_ambiguous(job.station, job.request)) return std::nullopt;
+    const bool is_in_transit = in_transit(stations, *station);
+    if (!is_in_transit && now >= replies.clear_at(book, job.request)) return std::nullopt;
+    if (is_in_transit && !can_prove(book, *station) && book.any_since(job.station, book.opened()))
         return Next{std::nullopt, true};
-    Group proof = internal_read(job.station, book.proof());
+    Group proof = internal_read(job.station, replies.proof(book));
     proof.probe = true;
-    proof.distinct_length = proof.request != book.probe();
+    proof.distinct_length = proof.request != replies.reads().probe();
     return Next{std::move(proof), false};
 }
 
@@ -362,19 +368,19 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
                (!wanted.in_budget || stations.may_spend(now, job));
     };
     const JobQueue& queue = backlog_.queue();
-    const Job* next = queue.peek(test);
+    JobQueue::Choice next = queue.choose(test);
     // A failing station waits for its share only while others want the line.
-    wanted.in_budget = next != nullptr;
-    if (next == nullptr) next = queue.peek(test);
+    wanted.in_budget = next.job() != nullptr;
+    if (next.job() == nullptr) next = queue.choose(test);
+    if (next.job() == nullptr) return {};
     // P9: in the turn of a station's write its read goes first, and the write is next.
-    if (next != nullptr && !next->request.is_read() && stations.has_read_turn(next->station)) {
-        wanted.reads_of = next->station;
-        if (const Job* read = queue.peek(test)) next = read;
-        if (!next->request.is_read()) wanted.reads_of.reset();
+    if (!next.job()->request.is_read() && stations.has_read_turn(next.job()->station)) {
+        wanted.reads_of = next.job()->station;
+        if (const auto read = queue.choose(test); read.job() != nullptr) next = read;
     }
-    if (next == nullptr || !gap_is_over(now, next->station, stations, quiet)) return {};
-    if (auto read = read_before(now, *next, stations, echo)) return std::move(*read);
-    Job job = *backlog_.queue().pop(test);
+    if (!gap_is_over(now, next.job()->station, stations, quiet)) return {};
+    if (auto read = read_before(now, *next.job(), stations, echo)) return std::move(*read);
+    Job job = backlog_.queue().take(next);
     take_turn(job);
     if (job.station == kBroadcast) {
         Group group{.request = job.request};
@@ -382,7 +388,7 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
         return {std::move(group), false};
     }
     const Station& station = stations.of(job.station);
-    return {sharing_.gather(std::move(job), station, backlog_.queue()), false};
+    return {sharing_.gather(std::move(job), station, stations.book(), backlog_.queue()), false};
 }
 
 std::optional<TimePoint> Schedule::next_start(const Stations& stations, const Quiet& quiet) const {
@@ -407,12 +413,12 @@ std::optional<TimePoint> Schedule::next_start(const Stations& stations, const Qu
 std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& failed,
                                                     TimePoint sent, const Station& station) const {
     const StationSettings& own = station.settings();
-    const TimePoint rested = station.requests().rested();
+    const TimePoint rested = station.replies().rested();
     if (quarantine_ == Quarantine::line && !failed.probe) {
         return own.adaptive_timeout ? std::min(rested, now + station.response_timeout()) : rested;
     }
     // A rest longer than another timeout is not worth it: a collision costs that much.
-    const Duration worst = station.requests().worst_lateness();
+    const Duration worst = station.replies().worst_lateness();
     const bool is_late =
         failed.first_silence && worst > Duration::zero() && worst <= own.response_timeout;
     if (quarantine_ != Quarantine::automatic || !is_late) return std::nullopt;

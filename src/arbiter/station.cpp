@@ -13,7 +13,7 @@ Station::Station(const StationSettings& settings, const OfflineSettings& offline
                  Duration frame)
     : settings_(settings),
       listed_(listed),
-      requests_(settings),
+      replies_(settings),
       health_(offline),
       adaptive_(settings.timeout_floor, settings.response_timeout),
       trail_(frame) {}
@@ -21,22 +21,24 @@ Station::Station(const StationSettings& settings, const OfflineSettings& offline
 void Station::apply(const StationSettings& settings, const OfflineSettings& offline, bool listed) {
     settings_ = settings;
     listed_ = listed;
-    requests_.apply(settings);
+    replies_.apply(settings);
     health_.apply(offline);
     adaptive_.apply(settings.timeout_floor, settings.response_timeout);
 }
 
-void Station::on_asked(TimePoint now, const Group& group, bool in_transit) {
-    requests_.on_asked(now, group, in_transit);
+void Station::on_asked(OutstandingRequests& book, TimePoint now, const Group& group,
+                       bool in_transit) {
+    replies_.on_asked(book, now, group, in_transit);
     asked_ = now;
     writes_in_a_row_ = group.request.is_read() ? 0 : std::min(writes_in_a_row_ + 1, kWritesInARow);
     if (group.request.is_read()) read_turn_ = wants_check_ = woken_by_write_ = false;
 }
 
-Station::Heard Station::on_unsolicited_frame(TimePoint now, ByteView pdu, bool asked) {
-    Heard heard{requests_.on_unsolicited(now, pdu, asked)};
-    if (heard.claim == Claim::duplicate) trail_.on_unsolicited(now);
-    if (heard.claim != Claim::late) return heard;
+Station::Heard Station::on_unsolicited_frame(OutstandingRequests& book, TimePoint now, Done done,
+                                             ByteView pdu, bool asked) {
+    Heard heard{replies_.on_unsolicited(book, now, done, pdu, asked)};
+    if (done == Done::duplicate) trail_.on_unsolicited(now);
+    if (!is_late(done)) return heard;
     if (heard.needed) slowest_.add(*heard.needed);
     heard.back = health_.on_late_reply(now);
     missed_ = false;
@@ -44,8 +46,8 @@ Station::Heard Station::on_unsolicited_frame(TimePoint now, ByteView pdu, bool a
     return heard;
 }
 
-Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Duration waited,
-                                   Duration think) {
+Station::Replied Station::on_reply(OutstandingRequests& book, TimePoint now, const Attempt& attempt,
+                                   Duration waited, Duration think) {
     const Group& group = attempt.group();
     Replied result;
     result.before = condition();
@@ -67,9 +69,8 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
         result.drift = turnaround_.quantile(0.95);
     result.trailed = trail_.seen();
     trail_.on_reply(now);
-    requests_.on_answered(now, attempt, waited);
-    if (trail_.settle_time() > Duration::zero() && !std::exchange(trail_reported_, true))
-        result.trail = trail_.settle_time();
+    replies_.on_answered(book, now, attempt, waited);
+    result.trail = trail_.take_report();
     const bool exception = modbus::exception_of(attempt.reply()).has_value();
     hole_.on_reply(now, attempt.longest_pause());
     if (const auto& look = attempt.pace().end_look())
@@ -97,7 +98,7 @@ void Station::on_failed(TimePoint now, Verdict verdict, Duration cost,
 bool Station::take_half_open(TimePoint now, bool is_read) {
     if (!is_read && woken_by_write_) return false;
     if (!health_.take_half_open(now)) return false;
-    woken_by_write_ = !is_read && requests_.has_answered_reads();
+    woken_by_write_ = !is_read && replies_.reads().any();
     return true;
 }
 

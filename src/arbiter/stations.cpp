@@ -22,7 +22,7 @@ void Stations::apply(const Settings& settings) {
     configured_.clear();
     for (const StationSettings& station : settings.stations) configured_[station.id] = station;
     for (auto& [id, station] : stations_)
-        station.apply(this->settings(id), offline_, configured_.contains(id));
+        station.apply(own_settings(id), offline_, configured_.contains(id));
 }
 
 const StationSettings& Stations::settings(std::uint8_t id) const {
@@ -30,11 +30,17 @@ const StationSettings& Stations::settings(std::uint8_t id) const {
     return found == configured_.end() ? unlisted_ : found->second;
 }
 
+StationSettings Stations::own_settings(std::uint8_t id) const {
+    StationSettings own = settings(id);
+    own.id = id;
+    return own;
+}
+
 Station& Stations::of(std::uint8_t id) {
     const auto found = stations_.find(id);
     if (found != stations_.end()) return found->second;
     const bool listed = configured_.contains(id);
-    return stations_.try_emplace(id, settings(id), offline_, listed, frame_).first->second;
+    return stations_.try_emplace(id, own_settings(id), offline_, listed, frame_).first->second;
 }
 
 const Station* Stations::find(std::uint8_t id) const {
@@ -101,23 +107,23 @@ bool Stations::refuses(TimePoint now, const Job& job) {
     const ProbeBudget& budget = station.speculative() ? asked_unheard_ : probes();
     if (may_wake && budget.allows(now) && station.take_half_open(now, job.request.is_read()))
         return false;
-    station.requests().on_wanted(job.request);
+    station.replies().on_wanted(job.request);
     return true;
 }
 
 TimePoint Stations::clear_at(TimePoint now, bool may_stall) const {
     TimePoint clear{};
     for (const auto& [id, station] : stations_) {
-        if (!station.requests().any()) continue;
-        clear = std::max(clear, station.requests().rested());
-        if (may_stall) clear = std::max(clear, now + station.requests().latest_reply());
+        if (!book_.any(id)) continue;
+        clear = std::max(clear, station.replies().rested());
+        if (may_stall) clear = std::max(clear, now + station.replies().latest_reply());
     }
     return clear;
 }
 
 Duration Stations::latest_reply(std::uint8_t id) const {
     const Station* found = find(id);
-    return found == nullptr ? 2 * settings(id).response_timeout : found->requests().latest_reply();
+    return found == nullptr ? 2 * settings(id).response_timeout : found->replies().latest_reply();
 }
 
 StationHealth Stations::health(std::uint8_t id) const {
@@ -156,9 +162,9 @@ void Stations::on_failed(TimePoint now, const Group& group, Verdict verdict, Dur
 
 /// Probes of offline stations must be within their budget.
 std::optional<TimePoint> Stations::probe_at(const Station& station) const {
-    if (station.wants_check()) return station.probe_due();
+    if (station.wants_check()) return station.probe_due(book_);
     if (!station.health().offline() || station.speculative()) return std::nullopt;
-    return std::max(station.probe_due(), probes().next());
+    return std::max(station.probe_due(book_), probes().next());
 }
 
 std::optional<std::uint8_t> Stations::next_to_probe(TimePoint now) const {
@@ -166,8 +172,8 @@ std::optional<std::uint8_t> Stations::next_to_probe(TimePoint now) const {
     TimePoint earliest = TimePoint::max();
     for (const auto& [id, station] : stations_) {
         const auto at = probe_at(station);
-        if (!at || *at > now || station.probe_due() >= earliest) continue;
-        earliest = station.probe_due();
+        if (!at || *at > now || station.probe_due(book_) >= earliest) continue;
+        earliest = station.probe_due(book_);
         best = id;
     }
     return best;
@@ -190,7 +196,11 @@ bool Stations::any_online() const {
 }
 
 void Stations::forget_unheard(TimePoint now) {
-    std::erase_if(stations_, [&](const auto& entry) { return entry.second.forgettable(now); });
+    std::erase_if(stations_, [&](const auto& entry) {
+        const bool forgotten = entry.second.forgettable(book_, now);
+        if (forgotten) book_.forget(entry.first);
+        return forgotten;
+    });
 }
 
 }  // namespace panelgate::arbiter

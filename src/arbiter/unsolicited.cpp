@@ -15,7 +15,7 @@ namespace panelgate::arbiter {
 
 using modbus::Unused;
 using Kind = StationEvent::Kind;
-using Part = Outbox::Part;
+using fact::when;
 
 namespace {
 
@@ -27,25 +27,7 @@ bool is_request(ByteView adu) {
     return !fits_reply && modbus::request_adu_length(adu) == adu.size();
 }
 
-Part part_of(Claim kind) {
-    switch (kind) {
-        case Claim::late:
-            return Part::late;
-        case Claim::duplicate:
-        case Claim::second:
-            return Part::duplicate;
-        case Claim::unasked:
-            return Part::unasked;
-    }
-    std::abort();
-}
-
-/// How long after a recent broadcast this reply to it came, from a panel that should be silent;
-/// empty: it is none.
-std::optional<Duration> delay_behind_broadcast(TimePoint now, ByteView adu,
-                                               const Stations& stations) {
-    return stations.broadcasts().delay_of(now, modbus::pdu_of(adu));
-}
+bool is_exception(ByteView adu) { return modbus::exception_of(modbus::pdu_of(adu)).has_value(); }
 
 }  // namespace
 
@@ -64,59 +46,57 @@ std::vector<Unused> UnsolicitedFrames::take_delimited(std::uint8_t asked, bool g
     return {modbus::classify_frame(bytes, asked, good && modbus::crc_ok(bytes, orders_))};
 }
 
-Part UnsolicitedFrames::judge(TimePoint now, const Unused& part, const Stations& stations) const {
-    if (std::ranges::equal(part.bytes, last_frame_)) return Part::echo;
-    if (begins_with_request(part.bytes, last_frame_, orders_) &&
-        (part.kind == Unused::Kind::damaged || is_request(part.bytes)))
-        return Part::request;
-    if (part.kind == Unused::Kind::damaged) return Part::damaged;
-    // It must not be taken for anything else it might be.
-    if (answers_other_master(now, part.bytes)) return Part::unknown;
-    const Station* station = stations.find(part.station);
-    const bool explained =
-        station != nullptr &&
-        station->requests().claim_of(now, modbus::pdu_of(part.bytes)) != Claim::unasked;
-    if (!explained && delay_behind_broadcast(now, part.bytes, stations))
-        return Part::broadcast_reply;
-    return station == nullptr ? Part::unknown : Part::unasked;
+Facts UnsolicitedFrames::facts_of(TimePoint now, ByteView adu, bool damaged,
+                                  const Stations& stations) const {
+    const bool begins = begins_with_request(adu, last_frame_, orders_);
+    const Facts facts = when(std::ranges::equal(adu, last_frame_), fact::own_frame) |
+                        when(begins && (damaged || is_request(adu)), fact::request) |
+                        when(damaged, fact::damaged);
+    if (damaged) return facts;
+    const OutstandingRequests& book = stations.book();
+    const ByteView pdu = modbus::pdu_of(adu);
+    const Facts more = facts | when(book.behind_broadcast(now, pdu).has_value(), fact::broadcast);
+    if (const Station* station = stations.find(adu[0]))
+        return more | station->replies().facts(book, now, pdu);
+    return more | when(book.claims(now, adu[0], pdu, {}).other_master, fact::other_master);
 }
 
-void UnsolicitedFrames::note(TimePoint now, const std::vector<Unused>& parts, bool idle,
+void UnsolicitedFrames::note(TimePoint now, const std::vector<modbus::Unused>& parts, bool idle,
                              Stations& stations, Quiet& quiet, Outbox& outbox) {
     const TimePoint heard_at = std::min(now, quiet.since());
     for (const Unused& part : parts) {
-        const Part what = judge(heard_at, part, stations);
-        if (what != Part::unasked) {
-            outbox.on_unsolicited(now, part, what, quiet.station());
-            if (what == Part::damaged) stations.on_damaged(heard_at, part.bytes);
-            if (what == Part::broadcast_reply) learn_of_broadcasts(heard_at, part, stations);
-            if (what == Part::damaged && idle) stations.on_trail(heard_at, replied_);
-            if (what == Part::request) foreign_requests_.on_heard(heard_at, part.bytes);
-            if (what == Part::request) let_reply_pass(now, part.bytes, stations, quiet);
+        const bool damaged = part.kind == Unused::Kind::damaged;
+        const Done done = judge(facts_of(heard_at, part.bytes, damaged, stations));
+        if (is_reply(done)) {
+            const bool asked = !idle && part.station == quiet.station();
+            note_reply(now, part, done, asked, stations, quiet, outbox);
             continue;
         }
-        const bool asked = !idle && part.station == quiet.station();
-        const Station::Heard heard =
-            stations.of(part.station)
-                .on_unsolicited_frame(heard_at, modbus::pdu_of(part.bytes), asked);
-        outbox.on_unsolicited(now, part, part_of(heard.claim), quiet.station(), heard.lateness);
-        if (heard.claim == Claim::late) outbox.event(Kind::late, part.station, heard.lateness);
-        if (heard.back) {
-            stations.on_recovery();
-            outbox.event(Kind::online, part.station);
-        }
-        if (heard.settled) quiet.lift(now, part.station);
+        outbox.on_unsolicited(now, part, done, quiet.station());
+        if (done == Done::damaged) stations.on_damaged(heard_at, part.bytes);
+        if (done == Done::damaged && idle) stations.on_trail(heard_at, replied_);
+        if (done == Done::request) stations.book().on_foreign(heard_at, part.bytes, false);
+        if (done == Done::request) let_reply_pass(now, part.bytes, stations, quiet);
+        if (done != Done::broadcast) continue;
+        const auto delay = stations.book().behind_broadcast(heard_at, modbus::pdu_of(part.bytes));
+        stations.on_broadcast_answered(part.station, *delay, is_exception(part.bytes));
     }
 }
 
-void UnsolicitedFrames::learn_of_broadcasts(TimePoint now, const Unused& part, Stations& stations) {
-    const bool refused = modbus::exception_of(modbus::pdu_of(part.bytes)).has_value();
-    if (const auto delay = delay_behind_broadcast(now, part.bytes, stations))
-        stations.on_broadcast_answered(part.station, *delay, refused);
-}
-
-bool UnsolicitedFrames::answers_other_master(TimePoint now, ByteView adu) const {
-    return foreign_requests_.fit(adu, now - timing::kLatestRepetition);
+/// A reply of a station that is not, or no longer, waited for.
+void UnsolicitedFrames::note_reply(TimePoint now, const Unused& part, Done done, bool asked,
+                                   Stations& stations, Quiet& quiet, Outbox& outbox) {
+    const TimePoint heard_at = std::min(now, quiet.since());
+    const Station::Heard heard = stations.of(part.station)
+                                     .on_unsolicited_frame(stations.book(), heard_at, done,
+                                                           modbus::pdu_of(part.bytes), asked);
+    outbox.on_unsolicited(now, part, done, quiet.station(), heard.lateness);
+    if (is_late(done)) outbox.event(Kind::late, part.station, heard.lateness);
+    if (heard.back) {
+        stations.on_recovery();
+        outbox.event(Kind::online, part.station);
+    }
+    if (heard.settled) quiet.lift(now, part.station);
 }
 
 /// Another master asks: sending now would damage the reply to it. Wait as long as our slowest panel
@@ -136,19 +116,13 @@ void UnsolicitedFrames::let_reply_pass(TimePoint now, ByteView request, const St
 
 bool UnsolicitedFrames::is_wrong_reply(TimePoint now, ByteView adu, const Stations& stations,
                                        Duration heard_after) const {
-    if (std::ranges::equal(adu, last_frame_) || is_request(adu) ||
-        delay_behind_broadcast(now, adu, stations) || answers_other_master(now, adu))
-        return false;
-    const Station* station = stations.find(adu[0]);
-    if (station == nullptr) return false;
-    const Claim kind = station->requests().claim_of(now, modbus::pdu_of(adu));
-    if (kind == Claim::unasked) return true;
+    const Done done = judge(facts_of(now, adu, false, stations));
+    if (done == Done::unasked) return true;
+    if ((!is_late(done) && done != Done::duplicate) || !is_exception(adu)) return false;
     // An exception for another function may be meant for this request, even if it is outstanding:
     // asking again decides sooner than waiting. One that repeats an earlier one may be, too, where
     // the answer was due; a duplicate comes at any time.
-    const bool in_time = !station->is_quicker_than_ever(heard_after);
-    const bool may_be_meant = kind == Claim::late || (kind == Claim::duplicate && in_time);
-    return may_be_meant && modbus::exception_of(modbus::pdu_of(adu));
+    return is_late(done) || !stations.find(adu[0])->is_quicker_than_ever(heard_after);
 }
 
 }  // namespace panelgate::arbiter

@@ -130,6 +130,8 @@ std::string expired(TimePoint now, const Job& job, bool transmitted, const Clien
 
 namespace panelgate::arbiter {
 
+using fact::when;
+
 std::string text_of(const Reason& reason) {
     switch (reason.kind) {
         case Reason::Kind::none:
@@ -178,6 +180,12 @@ bool in_time(TimePoint now, const Group& group) {
 
 void Arbiter::conclude(TimePoint now, Verdict verdict) {
     const std::vector<modbus::Unused> unsolicited = active_->take_unsolicited();
+    const std::uint8_t station = active_->group().station;
+    for (const modbus::Unused& part : unsolicited) {
+        if (begins_with_request(part.bytes, active_->echo().frame(), orders_) &&
+            part.bytes[0] == station)
+            stations_.book().on_foreign(now, part.bytes, true);
+    }
     outbox_.inside_attempt(true);
     if (verdict == Verdict::replied) settle(now);
     note(now, unsolicited);
@@ -193,7 +201,7 @@ void Arbiter::conclude(TimePoint now, Verdict verdict) {
 void Arbiter::end_broadcast(TimePoint now) {
     const Attempt attempt = take_active(now);
     quiet_.rest_until(attempt.timing().sent + settings_.broadcast_turnaround + latency_);
-    stations_.on_broadcast(attempt.timing().sent, attempt.group().request.pdu());
+    stations_.book().on_broadcast(attempt.timing().sent, attempt.group().request.pdu());
     outbox_.report(attempt, TransactionEnd::ok);
     for (const Job& job : attempt.group().jobs) {
         if (job.deadline <= now) {  // the deadline passed unnoticed while it was leaving
@@ -204,82 +212,48 @@ void Arbiter::end_broadcast(TimePoint now) {
     }
 }
 
-/// What is done with a frame that has the form of the answer (README, the table of frames).
-enum class Arbiter::Take : std::uint8_t {
-    accept,
-    contested,     ///< another master's, perhaps: the attempt is damaged
-    reject,        ///< another request's: the attempt goes on
-    keep,          ///< a candidate: the answer if nothing else comes
-    ask_again,     ///< a candidate: the request is sent once more
-    suspect_echo,  ///< the same, and a read goes out that has no equal echo
-};
-
-/// The first row that fits decides.
-Arbiter::Take Arbiter::judge_reply(TimePoint now, const Station& station, bool early) const {
+/// What is true of the frame that has the form of the answer.
+Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early) const {
     const Attempt& attempt = *active_;
     const Group& group = attempt.group();
     const Bytes& reply = attempt.reply();
-    const OutstandingRequests& book = station.requests();
-    const bool slow = attempt.first_sign(now) > station.usual(stations_.slowest());
+    const OutstandingRequests& book = stations_.book();
+    const ReplyHabits& habits = station.replies();
+    const Claims claims = habits.claims(book, now, reply, &attempt);
+    const Duration first_sign = attempt.first_sign(now);
     const bool refusal = modbus::exception_of(reply).has_value();
     const bool first = !attempt.had_candidate();
     const bool is_early = early && !settings_.paced && pace_.believed();
-    const bool duplicate = station.may_be_duplicate(now, attempt, is_early);
-    const struct {
-        bool fits;
-        Take take;
-    } rows[] = {
-        // P1: another master's request to this station has the same answer.
-        {attempt.is_contested(), Take::contested},
-        // P1: an earlier request may have been refused; the next refusal may be that again.
-        {refusal && !group.probe &&
-             (attempt.refusal_was_rejected() || book.refuses_other(reply, group.request.pdu())),
-         Take::reject},
-        // P1: the request cannot have arrived yet.
-        {book.is_duplicate(now, attempt, is_early && attempt.replied_too_early()), Take::reject},
-        // P1: later than the station has ever answered, it may be to an earlier request after all.
-        {slow && book.may_answer_closed(now, reply, group.request), Take::reject},
-        // P8: a write's confirmation that is sooner than any answer.
-        {attempt.may_be_its_echo() && first &&
-             (is_early || station.is_far_too_quick(attempt.first_sign(now), stations_.quickest())),
-         Take::suspect_echo},
-        // P1: a panel may refuse with another function's number.
-        {refusal && group.may_doubt_refusal() && first &&
-             book.may_refuse_other(now, reply, group.request.function()),
-         Take::ask_again},
-        // P1: values repeat an earlier reply: only asking again tells.
-        {duplicate && group.may_doubt(reply), Take::ask_again},
-        // P1: confirmations and refusals are not asked again. P8: an echo behind it discards it.
-        {duplicate || (attempt.precedes_echo() && first), Take::keep},
-    };
-    const auto row = std::ranges::find_if(rows, [](const auto& one) { return one.fits; });
-    return row == std::end(rows) ? Take::accept : row->take;
+    // An earlier request may have been refused; the next refusal may be that again.
+    const bool refuses_other =
+        refusal && !group.probe && (attempt.refusal_was_rejected() || claims.other_outstanding);
+    const bool impossible =
+        ReplyHabits::is_impossible(attempt, claims, is_early && attempt.replied_too_early());
+    const bool overdue = claims.passed && first_sign > station.usual(stations_.slowest());
+    const bool like_echo = attempt.may_be_its_echo() && first &&
+                           (is_early || station.is_far_too_quick(first_sign, stations_.quickest()));
+    const bool misnumbered = refusal && group.may_doubt_refusal() && first &&
+                             habits.may_refuse_other(book, now, claims, group.request.function());
+    const bool repeats = station.may_be_duplicate(now, attempt, claims, is_early);
+    return fact::answers | when(claims.contested, fact::other_master) |
+           when(refuses_other, fact::refuses_other) | when(impossible, fact::impossible) |
+           when(overdue, fact::overdue) | when(like_echo, fact::like_echo) |
+           when(misnumbered, fact::misnumbered) | when(repeats, fact::repeats) |
+           when(group.may_doubt(reply), fact::may_ask) |
+           when(first && attempt.precedes_echo(), fact::before_echo);
 }
 
 /// Returns true if it is the answer.
 bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     Attempt& attempt = *active_;
-    switch (judge_reply(now, station, early)) {
-        case Take::accept:
-            return true;
-        case Take::contested:
-            attempt.reject_contested();
-            return false;
-        case Take::reject:
-            attempt.reject_reply();
-            return false;
-        case Take::keep:
-            attempt.keep_candidate(station.needed(), Attempt::Candidate::believed);
-            return false;
-        case Take::ask_again:
-            attempt.keep_candidate(station.needed(), Attempt::Candidate::doubted);
-            return false;
-        case Take::suspect_echo:
-            attempt.keep_candidate(station.needed(), Attempt::Candidate::doubted);
-            attempt.suspect_echo();
-            return false;
-    }
-    std::abort();
+    const Done done = judge(facts_of_reply(now, station, early));
+    if (done == Done::contested) attempt.reject_contested();
+    if (done == Done::reject) attempt.reject_reply();
+    if (done == Done::keep) attempt.keep_candidate(station.needed(), Attempt::Candidate::believed);
+    if (done == Done::ask_again || done == Done::suspect_echo)
+        attempt.keep_candidate(station.needed(), Attempt::Candidate::doubted);
+    if (done == Done::suspect_echo) attempt.suspect_echo();
+    return done == Done::accept;
 }
 
 /// The reply has come.
@@ -297,13 +271,14 @@ void Arbiter::settle(TimePoint now) {
     const Duration think =
         std::max(attempt.waited(now) - silent_interval(settings_.serial), Duration::zero());
     const Duration needed = attempt.first_sign(now);
-    const TimePoint proved = station.requests().surely_answered(attempt.timing().started, reply);
-    const Station::Replied replied = station.on_reply(now, attempt, needed, think);
+    OutstandingRequests& book = stations_.book();
+    const TimePoint proved =
+        station.replies().surely_answered(book, attempt.timing().started, reply);
+    const Station::Replied replied = station.on_reply(book, now, attempt, needed, think);
     stations_.on_reply(now, group.shows_pace() ? std::optional(needed) : std::nullopt);
     explain_condition(now, group.station, replied.before);
     if (replied.back) stations_.on_recovery();
     if (settings_.may_stall) stations_.on_proved(now, proved);
-    schedule_.on_transport_proved(proved);
     if (!settings_.paced && pace_.unbound() && now < attempt.timing().sent)
         quiet_.on_answered_early(now);
     unsolicited_.on_replied(group.station);
@@ -343,7 +318,7 @@ void Arbiter::ask_again(TimePoint now) {
     outbox_.report(attempt, end_of(Verdict::doubtful));
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
-    station.requests().on_doubted(now, group, attempt.timing().sent);
+    station.replies().on_doubted(stations_.book(), now, group, attempt.timing().sent);
     group.silent_after = group.cut_after = {};
     finish_barred(group);
     if (in_time(now, group) && !group.abandoned()) {
@@ -367,7 +342,7 @@ void Arbiter::finish_barred(Group& group) {
 Group Arbiter::confirming(Group& write, const Station& station) {
     Group read{.jobs = std::move(write.jobs),
                .station = write.station,
-               .request = station.requests().probe()};
+               .request = station.replies().reads().probe()};
     if (!teaches_echo(read.request))
         read.request = modbus::Request::read({modbus::Table::holding_registers, 0, 1});
     read.attempts = write.attempts;
@@ -380,10 +355,11 @@ Group Arbiter::confirming(Group& write, const Station& station) {
 void Arbiter::learn_from_failure(TimePoint now, const Attempt& attempt, Verdict verdict) {
     const modbus::Request& request = attempt.group().request;
     Station& station = stations_.of(attempt.group().station);
+    OutstandingRequests& book = stations_.book();
     if (attempt.came_damaged()) {
-        station.requests().on_damaged_reply(now, request, attempt.timing().sent);
+        station.replies().on_damaged_reply(book, now, request, attempt.timing().sent);
     } else {
-        station.requests().on_unanswered(now, request.pdu(), attempt.timing().sent);
+        station.replies().on_unanswered(book, now, request.pdu(), attempt.timing().sent);
     }
     if (settings_.learns_holes && verdict == Verdict::damaged && attempt.was_cut_off())
         station.on_broken_reply(now, std::max(attempt.longest_pause(), attempt.timing().hole));
@@ -449,7 +425,7 @@ void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
         for (const Job& job : backlog.remove_if(asked)) outbox_.finish(job, fault);
     }
     Station& station = stations_.of(group.station);
-    if (group.probe) station.requests().on_probe_unanswered(group.distinct_length);
+    if (group.probe) station.replies().on_probe_unanswered(group.distinct_length);
     if (group.distinct_length) return;
     if (!station.on_given_up(now, fault, group.request.is_read())) return;
     if (!station.speculative()) outbox_.event(Kind::offline, group.station);

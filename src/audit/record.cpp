@@ -177,6 +177,11 @@ Composer& Composer::texts(std::string_view name, std::span<const std::string> va
     return *this;
 }
 
+Composer& Composer::members(std::string_view composed) {
+    body_ += composed;
+    return *this;
+}
+
 /// The text of a second is made once: most records of a busy line share it.
 void Composer::append_time(WallTime time) {
     const auto second = std::chrono::floor<std::chrono::seconds>(time);

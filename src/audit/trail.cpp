@@ -113,8 +113,7 @@ struct Trail::State {
     void round(std::unique_lock<std::mutex>& lock);
     bool wait(std::unique_lock<std::mutex>& lock);
     void take_over();
-    void work(bool synchronizes);
-    bool is_sync_due() const;
+    void work();
     void anchor();
     void publish();
 
@@ -140,7 +139,6 @@ struct Trail::State {
     std::uint64_t failures = 0;
     std::uint64_t anchored = 0;
     WallTime anchored_at{};
-    WallTime synchronized_at{};
     std::thread thread;
 };
 
@@ -150,11 +148,7 @@ bool Trail::State::wait(std::unique_lock<std::mutex>& lock) {
         wake.wait_for(lock, kAgain, [&] { return stop; });
         return stop;
     }
-    const auto is_wanted = [&] { return stop || next || !pending.empty(); };
-    if (!writer.is_unsynced())
-        wake.wait(lock, is_wanted);
-    else if (!wake.wait_for(lock, settings.sync, is_wanted))
-        return stop;
+    wake.wait(lock, [&] { return stop || next || !pending.empty(); });
     wake.wait_for(lock, settings.flush,
                   [&] { return stop || next || pending.size() > settings.buffer / 2; });
     return stop;
@@ -163,7 +157,7 @@ bool Trail::State::wait(std::unique_lock<std::mutex>& lock) {
 /// Call with the lock. What was added before another file was wanted belongs to the one before, if
 /// that takes it.
 void Trail::State::take_over() {
-    const bool is_drained = of_last == 0 && writer.idle() && !writer.is_unsynced();
+    const bool is_drained = of_last == 0 && writer.idle();
     if (next && (is_drained || failing || next->file == settings.file)) {
         settings = *std::exchange(next, std::nullopt);
         writer.apply(settings);
@@ -196,20 +190,14 @@ void Trail::State::anchor() {
     hooks.tell({Notice::Kind::anchor, {}, last});
 }
 
-bool Trail::State::is_sync_due() const {
-    const WallTime time = hooks.wall();
-    return time - synchronized_at >= settings.sync || time < synchronized_at;
-}
-
-void Trail::State::work(bool synchronizes) {
+void Trail::State::work() {
     bool good = false;
     std::string why;
     try {
         if (!taken.empty() && settings.syslog) syslog_lost += syslog.send(taken);
         if (!taken.empty()) writer.take(taken);
         taken.clear();
-        good = writer.work(synchronizes);
-        if (synchronizes) synchronized_at = hooks.wall();
+        good = writer.work();
         if (!good) why = writer.why();
     } catch (const std::exception& error) {
         why = error.what();
@@ -221,7 +209,7 @@ void Trail::State::work(bool synchronizes) {
         hooks.tell({good ? Notice::Kind::recovered : Notice::Kind::failing, why, {}});
         if (!good) ++failures;
     }
-    if (good && !writer.is_unsynced()) anchor();
+    if (good) anchor();
 }
 
 void Trail::State::publish() {
@@ -235,9 +223,8 @@ void Trail::State::publish() {
 /// Takes what waits, and writes it without the lock.
 void Trail::State::round(std::unique_lock<std::mutex>& lock) {
     take_over();
-    const bool synchronizes = stop || next || failing || taken.empty() || is_sync_due();
     lock.unlock();
-    work(synchronizes);
+    work();
     lock.lock();
     publish();
 }

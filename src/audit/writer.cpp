@@ -264,14 +264,14 @@ bool Writer::sync() {
     return true;
 }
 
-bool Writer::work(bool synchronizes) {
+bool Writer::work() {
     if (!ensure_open()) return false;
     do {
         if (!flush()) return false;
         if (size_ >= settings_.rotate && at_ < batch_.size() && !rotate()) return false;
         seal();
     } while (sent_ < out_.size() || at_ < batch_.size());
-    return !synchronizes || sync();
+    return sync();
 }
 
 bool Writer::rotate() {

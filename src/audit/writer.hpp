@@ -33,11 +33,8 @@ class Writer {
     /// Takes bodies, one a line; only when idle().
     void take(std::string& bodies);
     bool idle() const { return at_ == batch_.size() && out_.size() == sent_; }
-    /// Writes what was taken, and synchronizes it if asked to or if another file begins. False: the
-    /// disk does not take it now; see why().
-    bool work(bool synchronizes);
-    /// True while something is written that may not be on the disk.
-    bool is_unsynced() const { return unsynced_; }
+    /// Writes and synchronizes what was taken. False: the disk does not take it now; see why().
+    bool work();
     const std::string& why() const { return why_; }
     /// The last record that is on the disk.
     const Position& last() const { return safe_; }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 namespace panelgate {
 
@@ -77,6 +78,13 @@ Role least_with(const Rights& rights) {
     for (const Right right : kAllRights)
         if (rights.has(right)) least = std::max(least, least_with(right));
     return least;
+}
+
+Standing::Standing(Role of, std::optional<OwnRole> own_role) : role(of), own(std::move(own_role)) {}
+
+bool Standing::exceeds(const Standing& other) const {
+    return std::ranges::any_of(kAllRights,
+                               [&](Right right) { return may(right) && !other.may(right); });
 }
 
 bool Standing::may(Right right) const {

@@ -47,7 +47,7 @@ WhoRef make_who(Who who) {
 }
 
 WhoRef own_task(std::string name) {
-    return make_who({.face = Face::gateway, .name = std::move(name), .role = Role::admin});
+    return make_who({.face = Face::gateway, .name = std::move(name), .standing = Role::admin});
 }
 
 std::string text_of(const WhoRef& who) { return who ? who->name : "a client without a name"; }

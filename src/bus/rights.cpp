@@ -62,10 +62,16 @@ modbus::ExceptionCode code_of(Rule rule) {
 }
 
 Refusal refusal_by(Rule rule, std::string station, std::string why = {}) {
-    return {rule, std::move(station), code_of(rule), std::move(why)};
+    return {rule, std::move(station), code_of(rule), std::move(why), {}};
 }
 
 }  // namespace
+
+Refusal denial(const access::Verdict& verdict, std::string station) {
+    Refusal made = refusal_by(Rule::denied, std::move(station), std::string(verdict.rule_name()));
+    if (!verdict.role.empty()) made.lacking = access::label(verdict.act);
+    return made;
+}
 
 Refusal unrecorded(std::string station) { return refusal_by(Rule::unrecorded, std::move(station)); }
 
@@ -91,9 +97,8 @@ std::optional<Refusal> Rights::judge(const WhoRef& who,
     if (!rules_) return std::nullopt;
     const access::Verdict verdict = rules_->judge(who, question);
     if (verdict.allowed) return std::nullopt;
-    return refusal_by(Rule::denied,
-                      question.station == 0 ? std::string() : name_of(stations_, question.station),
-                      std::string(verdict.rule_name()));
+    return denial(verdict,
+                  question.station == 0 ? std::string() : name_of(stations_, question.station));
 }
 
 std::optional<Refusal> Rights::judge_write(std::uint8_t station) const {

@@ -293,13 +293,13 @@ void warn_of_anonymous(Loading& loading, const Node& node, const web::Settings& 
         ", or list the networks that may, such as allow: [192.168.10.0/24], or listen on "
         "127.0.0.1:" +
         std::to_string(http.port);
-    if (http.anonymous == Role::viewer)
+    if (http.anonymous.role == Role::viewer)
         loading.warn(mark, whoever_reaches(http) +
                                " may see the configuration, all values and every frame, and read "
                                "on the bus, without a token; set anonymous: none and give readers "
                                "a token" +
                                instead);
-    if (http.anonymous >= Role::operator_)
+    if (http.anonymous.role >= Role::operator_)
         loading.warn(mark, whoever_reaches(http) +
                                " may write to the panels without a token; set anonymous: viewer "
                                "and give writers a token" +
@@ -320,7 +320,7 @@ void warn_of_http(Loading& loading, const Node& node, const web::Settings& http)
     warn_of_health(loading, node, http);
     warn_of_plain_tokens(loading, node, http);
     warn_of_anonymous(loading, node, http);
-    if (http.anonymous == Role::none && http.tokens.empty())
+    if (http.anonymous.role == Role::none && http.tokens.empty())
         loading.warn(mark_of(node, "anonymous"),
                      "clients can use only /healthz and /readyz: anonymous is none and there is no "
                      "token; add tokens, or set anonymous: viewer");

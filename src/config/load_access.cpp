@@ -146,11 +146,8 @@ web::Token load_token(Loading& loading, const Node& node) {
     });
     web::Token token;
     token.name = in.required_text("name").value_or("");
-    if (in.required_text("role")) {
-        Standing standing = load_role(loading, in, "role").value_or(Standing{Role::viewer, {}});
-        token.role = standing.role;
-        token.own_role = std::move(standing.own);
-    }
+    if (in.required_text("role"))
+        token.standing = load_role(loading, in, "role").value_or(Role::viewer);
     const std::string secret = load_secret(loading, in, elsewhere, token);
     if (web::is_token_hash(secret)) {
         token.hash = secret;

@@ -397,10 +397,8 @@ void load_http(Loading& loading, MapReader& root) {
     MapReader in(*node, loading.problems, "http");
     web::Settings settings;
     load_listen(in, settings);
-    if (auto standing = load_role(loading, in, "anonymous", true)) {
-        settings.anonymous = standing->role;
-        settings.anonymous_own = std::move(standing->own);
-    }
+    if (auto standing = load_role(loading, in, "anonymous", true))
+        settings.anonymous = std::move(*standing);
     http_keys().read(in, settings);
     load_hosts(loading, in, settings);
     load_allow(loading, in, settings.allow);

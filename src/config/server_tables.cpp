@@ -162,7 +162,7 @@ const Keys<web::Settings>& http_keys() {
                    "engineer (also raw, broadcast, discover, simulator), admin (also reload), or "
                    "one of access.roles.",
                    [](const Settings& settings) {
-                       return std::string(settings.anonymous_standing().name());
+                       return std::string(settings.anonymous.name());
                    })
             .initially("viewer")
             .other("hosts",
@@ -234,7 +234,7 @@ const Keys<web::Token>& token_keys() {
             .other("role",
                    "viewer reads, operator writes, engineer also raw, broadcast, discover and "
                    "simulator, admin also reload; or one of access.roles.",
-                   [](const web::Token& token) { return std::string(token.standing().name()); })
+                   [](const web::Token& token) { return std::string(token.standing.name()); })
             .other("file",
                    "File that holds the token, or its hash as `panelgate token new` prints it, and "
                    "nothing else.",

@@ -236,10 +236,10 @@ bool lasts_longer(const web::Token& token, const web::Token& than) {
     return than.expires && (!token.expires || *token.expires > *than.expires);
 }
 
-/// True if it may do something that the other may not.
-bool may_more(const Standing& one, const Standing& other) {
-    return std::ranges::any_of(kAllRights,
-                               [&](Right right) { return one.may(right) && !other.may(right); });
+/// "role viewer -> operator", or what the role of this name has become.
+std::string change_of(const Standing& was, const Standing& now) {
+    if (was.name() == now.name()) return std::string(now.name()) + " has more rights";
+    return std::string(was.name()) + " -> " + std::string(now.name());
 }
 
 void compare_tokens(Lines& all, const web::Settings& running, const web::Settings& next) {
@@ -247,10 +247,9 @@ void compare_tokens(Lines& all, const web::Settings& running, const web::Setting
         const auto was = std::ranges::find(running.tokens, token.hash, &web::Token::hash);
         if (was == running.tokens.end()) {
             all.push_back("http: token " + token.name + " is valid");
-        } else if (may_more(token.standing(), was->standing())) {
+        } else if (token.standing.exceeds(was->standing)) {
             all.push_back("http: token " + token.name + ": role " +
-                          std::string(was->standing().name()) + " -> " +
-                          std::string(token.standing().name()));
+                          change_of(was->standing, token.standing));
         } else if (lasts_longer(token, *was)) {
             all.push_back("http: token " + token.name + ": expires later");
         }
@@ -277,11 +276,9 @@ void compare_http(Lines& all, const Config& running, const Config& next) {
     compare_tls(all, endpoint, running.http->tls, next.http->tls);
     compare_allow(all, endpoint, running.http->allow, next.http->allow);
     compare_hosts(all, *running.http, *next.http);
-    const Standing was = running.http->anonymous_standing();
-    const Standing anonymous = next.http->anonymous_standing();
-    if (may_more(anonymous, was))
-        all.push_back("http: anonymous " + std::string(was.name()) + " -> " +
-                      std::string(anonymous.name()));
+    const Standing& was = running.http->anonymous;
+    const Standing& anonymous = next.http->anonymous;
+    if (anonymous.exceeds(was)) all.push_back("http: anonymous " + change_of(was, anonymous));
     compare_tokens(all, *running.http, *next.http);
 }
 
@@ -321,7 +318,7 @@ void compare_rules(Lines& all, const access::Settings& running, const access::Se
     for (const OwnRole& role : next.roles) {
         const auto was = std::ranges::find(running.roles, role.name, &OwnRole::name);
         const Standing before{Role::none, was == running.roles.end() ? OwnRole{} : *was};
-        if (may_more({Role::none, role}, before))
+        if (Standing(Role::none, role).exceeds(before))
             all.push_back("access: role " + role.name + " has more rights");
     }
     std::vector<std::string> kept;

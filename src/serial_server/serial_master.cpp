@@ -36,7 +36,7 @@ WhoRef known_as(const std::string& master) {
     return make_who({.face = Face::serial_master,
                      .name = std::string(kProtocol) + ' ' + master,
                      .listener = master,
-                     .role = Role::operator_,
+                     .standing = Role::operator_,
                      .host = host_number(kProtocol + master)});
 }
 

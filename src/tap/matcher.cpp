@@ -34,52 +34,16 @@ std::optional<Duration> GiveUp::least() const {
 void Habits::answered(Duration think) {
     constexpr int kMemory = 64;  // replies, until one slow reply is nearly forgotten
     longest_ = longest_ ? std::max(think, *longest_ - (*longest_ - think) / kMemory) : think;
-    unanswered_.clear();
     usual_ = 0;
 }
 
-void Habits::answered_perhaps(Duration think) {
+bool Habits::answered_as_usual(Duration think) {
     constexpr int kEnough = 2;
     constexpr Duration kJitter = 2ms;
     const bool usual = longest_ && think <= *longest_ + *longest_ / 4 + kJitter;
     usual_ = usual ? usual_ + 1 : 0;
-    if (usual_ < kEnough) return;
-    unanswered_.clear();
+    if (usual_ < kEnough) return false;
     usual_ = 0;
-}
-
-void Habits::on_unanswered(TimePoint asked, const Bytes& request) {
-    unanswered_.push_back({asked, request});
-    if (unanswered_.size() > settings_.unanswered) unanswered_.pop_front();
-    usual_ = 0;
-}
-
-bool Habits::may_answer_other(TimePoint now, const Bytes& request, ByteView reply) const {
-    return std::ranges::any_of(unanswered_, [&](const Unanswered& one) {
-        return is_open(one, now) && one.request != request && modbus::answers(one.request, reply);
-    });
-}
-
-std::optional<TimePoint> Habits::first_asked(TimePoint now, const Bytes& request) const {
-    const auto same = std::ranges::find_if(unanswered_, [&](const Unanswered& one) {
-        return is_open(one, now) && one.request == request;
-    });
-    if (same == unanswered_.end()) return std::nullopt;
-    return same->asked;
-}
-
-bool Habits::may_answer_earlier(TimePoint now, ByteView reply) const {
-    return std::ranges::any_of(unanswered_, [&](const Unanswered& one) {
-        return is_open(one, now) && modbus::answers(one.request, reply);
-    });
-}
-
-bool Habits::settle(TimePoint now, ByteView reply) {
-    const auto answered = std::ranges::find_if(unanswered_, [&](const Unanswered& one) {
-        return is_open(one, now) && modbus::answers(one.request, reply);
-    });
-    if (answered == unanswered_.end()) return false;
-    unanswered_.erase(unanswered_.begin(), answered + 1);
     return true;
 }
 
@@ -100,7 +64,8 @@ bool has_form_of_reply(ByteView frame) {
 
 }  // namespace
 
-Matcher::Matcher(const Settings& settings) : settings_(settings), cutter_(settings) {}
+Matcher::Matcher(const Settings& settings)
+    : settings_(settings), cutter_(settings), book_(settings.unanswered) {}
 
 void Matcher::on_rx(TimePoint now, ByteView bytes) {
     cutter_.hear(now, bytes);
@@ -123,7 +88,7 @@ void Matcher::on_line_down(TimePoint now) {
         asked_->doubtful = true;
         give_up(now);
     }
-    for (auto& [id, habits] : habits_) habits.forget_unanswered();
+    for (const auto& [id, habits] : habits_) book_.settle(id);
     noise_ = false;
 }
 
@@ -232,12 +197,13 @@ void Matcher::answer(Piece piece, bool in_doubt) {
     const Bytes& request = asked.pending.pdu;
     const ByteView reply = pdu_of(piece);
     const Duration think = std::max<Duration>(piece.begin - asked.end, Duration::zero());
-    const bool late = habits.may_answer_other(piece.end, request, reply);
+    const std::uint8_t station = asked.pending.station;
+    const bool late = claims(piece, request).other_outstanding;
     const bool repeats = habits.repeated && piece.end - *habits.repeated < settings_.late_window;
     const bool duplicate =
-        repeats && piece.bytes == habits.last_reply && request != habits.last_request;
+        repeats && repeats_last(piece) && request != book_.last_reply(station)->pdu;
     Transaction made;
-    made.station = asked.pending.station;
+    made.station = station;
     made.request = request;
     made.reply = copy_of(reply);
     made.end = End::answered;
@@ -253,14 +219,12 @@ void Matcher::answer(Piece piece, bool in_doubt) {
     made.sent = asked.end;
     made.replied = piece.begin;
     made.ended = piece.end;
-    made.sampled = habits.first_asked(piece.end, request).value_or(asked.begin);
-    if (!made.doubtful) {
-        habits.answered(think);
-    } else {
-        habits.answered_perhaps(think);
-    }
-    habits.last_request = request;
-    habits.last_reply = piece.bytes;
+    made.sampled = book_.first_asked(station, request, piece.end - settings_.late_window)
+                       .value_or(asked.begin);
+    // A panel answers in order: no earlier reply is outstanding any more.
+    if (!made.doubtful) habits.answered(think);
+    if (!made.doubtful || habits.answered_as_usual(think)) book_.settle(station);
+    book_.on_reply(station, piece.end, request, reply);
     note(FrameKind::reply, made.station, piece);
     report(std::move(made));
     noise_ = false;
@@ -268,9 +232,8 @@ void Matcher::answer(Piece piece, bool in_doubt) {
 }
 
 void Matcher::on_request(Piece piece) {
-    const Habits& habits = of(piece.bytes.front());
     // A waiting master does not ask: this is an old reply that looks like a request.
-    if (asked_ && is_old_reply(habits, piece) &&
+    if (asked_ && is_old_reply(piece) &&
         piece.begin - asked_->end < patience(of(asked_->pending.station))) {
         return on_reply(std::move(piece));
     }
@@ -278,15 +241,27 @@ void Matcher::on_request(Piece piece) {
                        std::ranges::equal(asked_->pending.pdu, pdu_of(piece));
     const bool noise = asked_ ? asked_->damaged : noise_;
     const bool doubtful =
-        (noise && has_form_of_reply(piece.bytes)) || (!again && is_old_reply(habits, piece));
+        (noise && has_form_of_reply(piece.bytes)) || (!again && is_old_reply(piece));
     give_up_for(piece);
     ask(piece, doubtful);
 }
 
+/// What the frame may be besides the answer to the request that is open.
+arbiter::Claims Matcher::claims(const Piece& piece, ByteView open) const {
+    arbiter::OutstandingRequests::Windows windows;
+    windows.outstanding = piece.end - settings_.late_window;
+    return book_.claims(piece.end, piece.bytes.front(), pdu_of(piece), windows, open);
+}
+
+/// True if its station has said the same last.
+bool Matcher::repeats_last(const Piece& piece) const {
+    const arbiter::Asked* const last = book_.last_reply(piece.bytes.front());
+    return last != nullptr && std::ranges::equal(last->reply, pdu_of(piece));
+}
+
 /// True if it may be a late reply or a duplicate, by earlier requests and replies.
-bool Matcher::is_old_reply(const Habits& habits, const Piece& piece) const {
-    if (!has_form_of_reply(piece.bytes)) return false;
-    return piece.bytes == habits.last_reply || habits.may_answer_earlier(piece.end, pdu_of(piece));
+bool Matcher::is_old_reply(const Piece& piece) const {
+    return has_form_of_reply(piece.bytes) && (repeats_last(piece) || claims(piece).outstanding);
 }
 
 /// The master goes on with another request.
@@ -305,7 +280,8 @@ void Matcher::give_up_for(const Piece& request) {
 
 void Matcher::give_up(TimePoint now) {
     const Asked asked = *std::exchange(asked_, std::nullopt);
-    of(asked.pending.station).on_unanswered(asked.begin, asked.pending.pdu);
+    of(asked.pending.station).on_unanswered();
+    book_.on_unanswered(asked.pending.station, asked.begin, asked.pending.pdu);
     Transaction made;
     made.station = asked.pending.station;
     made.request = asked.pending.pdu;
@@ -320,6 +296,7 @@ void Matcher::give_up(TimePoint now) {
 
 void Matcher::ask(const Piece& piece, bool doubtful) {
     const std::uint8_t station = piece.bytes.front();
+    of(station);  // known from now on
     note(FrameKind::heard_request, station, piece);
     noise_ = false;
     last_end_ = piece.end;
@@ -344,17 +321,27 @@ void Matcher::ask(const Piece& piece, bool doubtful) {
 /// Not the answer to the pending request: a late reply, a duplicate, or unknown.
 void Matcher::on_reply(Piece piece) {
     const std::uint8_t station = piece.bytes.front();
-    Habits& habits = of(station);
     const bool missed_request = asked_ ? asked_->damaged : noise_;  // a request, perhaps
     if (asked_) asked_->disturbed = true;
-    if (!missed_request && piece.bytes == habits.last_reply) {
-        habits.repeated = piece.end;
+    if (!missed_request && repeats_last(piece)) {
+        of(station).repeated = piece.end;
         return note(FrameKind::copy, station, piece);
     }
-    const bool late = habits.settle(piece.end, pdu_of(piece));
-    if (late) habits.last_reply = piece.bytes;
+    const bool late = claims(piece).outstanding;
+    if (late) close(piece);
     if (!late && asked_ && asked_->pending.station == station) asked_->wrong = true;
     note(late ? FrameKind::late : FrameKind::foreign, station, piece);
+}
+
+/// The late reply closes its request and all earlier ones.
+void Matcher::close(const Piece& piece) {
+    const std::uint8_t station = piece.bytes.front();
+    const ByteView reply = pdu_of(piece);
+    const TimePoint open = piece.end - settings_.late_window;
+    const Bytes request = book_.first(station, reply, open)->pdu;
+    book_.lapse(station, open);
+    book_.close(station, reply, false);
+    book_.on_reply(station, piece.end, request, reply);
 }
 
 void Matcher::on_damaged(Piece piece) {
@@ -367,9 +354,7 @@ void Matcher::on_damaged(Piece piece) {
     note(FrameKind::damaged, asked_ ? asked_->pending.station : piece.bytes.front(), piece);
 }
 
-Habits& Matcher::of(std::uint8_t station) {
-    return habits_.try_emplace(station, settings_).first->second;
-}
+Habits& Matcher::of(std::uint8_t station) { return habits_.try_emplace(station).first->second; }
 
 void Matcher::note(FrameKind kind, std::uint8_t station, const Piece& piece) {
     events_.emplace_back(Frame{piece.end, kind, station, piece.bytes});

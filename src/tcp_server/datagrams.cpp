@@ -267,7 +267,7 @@ Datagrams::Peer* Datagrams::peer(const Endpoint& from) {
                            .name = "modbus_tcp " + name,
                            .address = address,
                            .listener = shared_->settings.name(),
-                           .role = Role::operator_});
+                           .standing = Role::operator_});
     Caller caller(std::move(name), std::move(who));
     const auto on_answer = [weak = weak_from_this(), from] {
         if (const auto self = weak.lock()) self->answer(from);

@@ -77,9 +77,7 @@ void Caller::certify(std::string subject, std::optional<std::string> role,
     who.certificate = std::move(subject);
     by_certificate_ = role.has_value();
     if (role) {
-        Standing standing = standing_named(*role, own_roles);
-        who.role = standing.role;
-        who.own_role = std::move(standing.own);
+        who.standing = standing_named(*role, own_roles);
         who.certificate_role = std::move(*role);
     }
     who_ = make_who(std::move(who));

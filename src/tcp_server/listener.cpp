@@ -246,7 +246,7 @@ void Listener::Core::admit(tcp::socket socket, const tcp::endpoint& peer) {
                            .name = "modbus_tcp " + text(peer),
                            .address = peer.address().to_string(),
                            .listener = shared_->settings.name(),
-                           .role = Role::operator_});
+                           .standing = Role::operator_});
     session->start(Caller(text(peer), std::move(who)));
 }
 

@@ -18,8 +18,8 @@ import traceback
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
-from measures import (audit, counts, crowd, dead, figures, growth, latency, lines, master, memory,  # noqa: E402
-                      micro, plot, readers, reload, report, rig, rivals, rules, saturated, scrape)
+from measures import (cost, counts, crowd, dead, figures, growth, latency, lines, master, memory,  # noqa: E402
+                      micro, plot, readers, reload, report, rig, rivals, saturated, scrape)
 
 Run = collections.namedtuple("Run", "tools gateways rivals quick rates left_out")
 Run.__doc__ = """`gateways`: builds of ours, the judged one first; `rivals`: programs of others; `left_out`:
@@ -44,14 +44,12 @@ TOPICS = {
     "allocations": counts.measure_allocations,
     "scrape": scrape.measure,
     "reload": reload.measure,
-    "audit": audit.measure,
-    "rules": rules.measure,
+    "cost": cost.measure,
     "growth": growth.measure,
     "micro": micro.measure,
 }
 BROKEN = "broken off:"
-BARS = [bar for topic in (saturated, latency, crowd, master, lines, memory, counts, scrape, readers, reload, audit,
-                          rules)
+BARS = [bar for topic in (saturated, latency, crowd, master, lines, memory, counts, scrape, readers, reload, cost)
         for bar in topic.BARS]
 
 

@@ -1,4 +1,5 @@
 """Gateways with generated rules, their panels and the ways in, for test_access_cases."""
+import collections
 import contextlib
 import http.client
 import json
@@ -13,8 +14,10 @@ import tty
 
 import config
 import harness
+import mqtt_side
 from access_reference import COILS, DISCRETE, HOLDING, INPUT, Panel, Range, Rule, Station, Who
 from rtu_bus import RtuBus
+from test_points import until
 
 SOURCES = ("127.0.0.1", "127.0.0.7", "127.0.1.7", "127.5.0.1")
 NETWORKS = ("127.0.0.0/24", "127.0.0.7/32", "127.0.0.0/16", "127.0.0.0/8", "127.5.0.0/16", "0.0.0.0/0", "10.0.0.0/8", "fd00::/8")
@@ -38,10 +41,6 @@ exceptions: [{code: 2, meaning: no such word}]
 """
 
 
-def plain(address):
-    return str(address)
-
-
 PANELS = {
     "generic": Panel(frozenset((1, 2, 3, 4, 5, 6, 7, 8, 11, 12, 15, 16, 17, 20, 21, 22, 23, 24, 43)),
                      {"0": (COILS, 0, 65535), "1": (DISCRETE, 0, 65535), "3": (INPUT, 0, 65535), "4": (HOLDING, 0, 65535)}),
@@ -57,6 +56,10 @@ WRITABLE = {"generic": {HOLDING: (0, 65535), COILS: (0, 65535)}, "panasonic-gt":
             "acme-twin": {HOLDING: (0, 999)}}
 LISTED = (("floor1", 1, "filler", "omron-cp2e"), ("floor1", 7, "meter", "generic"), ("floor1", 20, "oven", "panasonic-gt"),
           ("floor1", 31, "press", "autonics-gplp-s"), ("floor1", 40, "twin", "acme-twin"), ("floor2", 7, "annex", "generic"))
+Point = collections.namedtuple("Point", "station name table first count")
+READS_OF = {COILS: 1, HOLDING: 3}
+# What the face `mqtt` needs.
+BROKERS = bool(mqtt_side.BROKER and mqtt_side.paho)
 ALIASES = {101: ("floor1", 7), 131: ("floor1", 31), 77: ("floor2", 7)}  # of the second listener
 
 
@@ -86,8 +89,9 @@ def answer(frame):
 class Generator:
     """Rules and requests that meet each other at their edges."""
 
-    def __init__(self, random):
-        self.random = random
+    def __init__(self, random, broker=None):
+        self.random, self.broker = random, broker
+        self.listeners = (NEAR, ALIASED, WEB, PLC, *([broker_name(broker)] if broker else []))
         translating = {name: random.random() < 0.7 for _, _, name, _ in LISTED}
         self.stations = [Station(line, number, PANELS[profile], name, translating[name])
                          for line, number, name, profile in LISTED]
@@ -98,6 +102,7 @@ class Generator:
         # One client who may see all: the test itself.
         self.rules = [Rule("auditor-reads", True, ("read",), tokens=("auditor",))]
         self.rules += [self._rule(i) for i in range(random.randint(3, 24))]
+        self.points = [point for one in self.stations for point in self._points(one)] if broker else []
 
     def _some(self, chance, of, most=3):
         if self.random.random() >= chance:
@@ -111,8 +116,8 @@ class Generator:
         return Rule(f"rule-{number}", random.random() < 0.5,
                     tuple(random.sample(("read", "write", "broadcast", "raw"), random.randint(1, 4))),
                     sources=self._some(0.3, NETWORKS), roles=self._some(0.25, ROLES), tokens=self._some(0.1, list(TOKENS)),
-                    faces=self._some(0.25, ("modbus_tcp", "http", "serial_master")),
-                    listeners=self._some(0.15, (NEAR, ALIASED, WEB, PLC)), places=tuple(one.place for one in stations),
+                    faces=self._some(0.25, ("modbus_tcp", "http", "serial_master", "mqtt")),
+                    listeners=self._some(0.15, self.listeners), places=tuple(one.place for one in stations),
                     functions=self._some(0.25, (1, 3, 4, 5, 6, 15, 16, 20, 22, 23, 24, 43, 65), 6), range=found)
 
     def _range(self, stations):
@@ -133,6 +138,16 @@ class Generator:
         if random.random() < 0.05 and letter in ("", "0", "1", "3", "4"):
             base, count = 65535 - count, count + 1  # to the very end
         return Range(table, base, base + count - 1, letter)
+
+    def _points(self, station):
+        """One in each table in which it has writable memory: no two of them are read together."""
+        for letter, (table, _, _) in station.panel.letters.items():
+            limits = WRITABLE[self.profiles[station.name]].get(table)
+            if limits is None:
+                continue
+            first, count = self.span(station, table, *limits)
+            count = 1 if table == COILS else min(count, 2)
+            yield Point(station, f"{'bit' if table == COILS else 'word'}-{letter.lower()}", table, first, count)
 
     def edges(self, station, table):
         """Addresses around which somebody's rights change."""
@@ -187,7 +202,14 @@ class Generator:
         def station(one):
             more = f", max_age: {self.max_age}, poll: [{{read: \"400301\", count: {POLLED[1]}, every: 200ms}}]" if one.name == "meter" else ""
             profile = self.profiles[one.name]
-            return f"{{id: {one.id}, name: {one.name}, profile: {profile}, translate: {'auto' if one.translates else 'off'}{more}}}"
+            points = ", ".join(point(each) for each in self.points if each.station is one)
+            return (f"{{id: {one.id}, name: {one.name}, profile: {profile}, translate: {'auto' if one.translates else 'off'}{more}"
+                    f"{f', points: [{points}]' if points else ''}}}")
+
+        def point(one):
+            letter = next(letter for letter, known in one.station.panel.letters.items() if known[0] == one.table)
+            kind = "" if one.table == COILS else f", type: u{16 * one.count}"
+            return f'{{name: {one.name}, at: "{notation(letter, one.first)}"{kind}, writable: true, every: 600min}}'
         quick = {"echo": "off", "timing": "{broadcast_turnaround: 5ms}", "serial": "{baud: 38400, parity: none}"}
         lines = []
         for name, link in buses.items():
@@ -202,6 +224,8 @@ class Generator:
                                                                   "serial: {baud: 38400, parity: none}}]")
         text += f'modbus_tcp:\n  - {{listen: "{NEAR}", lines: [floor1], udp: true}}\n'
         text += f'  - {{listen: "{ALIASED}", lines: [floor1], units: {{{units}}}}}\n'
+        if self.broker:
+            text += f"mqtt: {{broker: '{broker_name(self.broker)}', topic: {mqtt_side.TOPIC}, write: points}}\n"
         text += f"access:\n  default: {'allow' if self.default else 'deny'}\n  rules:\n"
         return text + "".join(f"    - {self._yaml(rule)}\n" for rule in self.rules)
 
@@ -219,6 +243,10 @@ class Generator:
             else:
                 keys["range"] = f"{{table: {named.table}, address: {named.first}, count: {named.last - named.first + 1}}}"
         return "{" + ", ".join(f"{key}: {value}" for key, value in keys.items() if value != "[]") + "}"
+
+
+def broker_name(broker):
+    return f"mqtt://127.0.0.1:{broker.port}"
 
 
 def _list(words):
@@ -293,18 +321,41 @@ class Rest:
         return response.status, json.loads(response.read())
 
 
-class Plant:
-    """A running gateway with the generator's rules."""
+class Mqtt:
+    """A client of the broker; its answers are (status, body)."""
 
-    def __init__(self, program, buses, master):
+    def __init__(self, listener, broker):
+        self.who = Who("mqtt", "operator", broker_name(broker))
+        self._listener, self._result, self._before = listener, None, 0
+
+    def close(self):
+        pass
+
+    def start(self, place, value):
+        topic = f"{mqtt_side.TOPIC}/{place}/set"
+        self._result = f"{topic}/result"
+        self._before = len(self._listener.of(self._result))
+        self._listener.publish(topic, json.dumps(value))
+
+    def finish(self):
+        body = self._listener.wait_for(self._result, after=self._before)
+        return (200 if body["ok"] else body["status"]), body
+
+
+class Plant:
+    """A running gateway with the generator's rules. `listener`: at the broker."""
+
+    def __init__(self, program, buses, master, broker=None, listener=None):
         self.program, self.buses = program, buses
+        self.broker, self.listener = broker, listener
         self._master = master
         self._clients = {}
+        self._looker = None
         port = lambda listener: int(program.log.wait_for(rf"listening modbus_tcp={re.escape(listener[:-1])}(\d+)$").group(1))
         self._ports = {NEAR: port(NEAR), ALIASED: port(ALIASED)}
 
     def client(self, kind, *of):
-        """modbus LISTENER SOURCE | udp SOURCE | http SOURCE TOKEN | serial; one of each is kept."""
+        """modbus LISTENER SOURCE | udp SOURCE | http SOURCE TOKEN | serial | mqtt; one of each is kept."""
         key = (kind, *of)
         if key not in self._clients:
             self._clients[key] = self._made(kind, *of)
@@ -315,7 +366,26 @@ class Plant:
             return Modbus(self._ports[of[0]], *of)
         if kind == "udp":
             return Modbus(self._ports[NEAR], NEAR, of[0], datagrams=True)
+        if kind == "mqtt":
+            return Mqtt(self.listener, self.broker)
         return Serial(self._master) if kind == "serial" else Rest(self.program.http_port(), *of)
+
+    def has_read(self, count):
+        """So many points; none is read again by itself."""
+        self._looker = self._looker or Rest(self.program.http_port(), SOURCES[0], "auditor")
+        self._looker.start("GET", "/api/v1/points")
+        points = self._looker.finish()[1]["points"]
+        return len(points) == count and all(one["quality"] == "good" for one in points)
+
+    def published(self):
+        """"STATION/POINT" of all points that the broker has been told of by now."""
+        until(lambda: mqtt_side.metric(self.program, "stored") == 0)
+        marker = f"{mqtt_side.TOPIC}/marker"  # behind all of them
+        self.listener.publish(marker, "0")
+        self.listener.wait_for(marker)
+        beginning = f"{mqtt_side.TOPIC}/"
+        told = {topic.removeprefix(beginning) for topic, _, _ in self.listener.received}
+        return {place for place in told if re.fullmatch(r"[^/]+/(bit|word)-[^/]+", place)}
 
     def frames(self):
         """{line: how many so far}"""
@@ -326,7 +396,7 @@ class Plant:
         return [(line, frame.bytes[0], frame.bytes[1:-2]) for line, bus in self.buses.items() for frame in bus.frames()[before[line]:]]
 
     def close(self):
-        for one in self._clients.values():
+        for one in (*self._clients.values(), *([self._looker] if self._looker else [])):
             one.close()
 
 
@@ -345,11 +415,16 @@ def running(generator):
         stack.callback(os.close, master)
         stack.callback(os.close, slave)
         tty.setraw(slave)
+        broker = generator.broker
+        listener = stack.enter_context(mqtt_side.Listener(broker)) if broker else None
         text = generator.text(folder, links, os.ttyname(slave))
         with harness.configured(text) as program:
             program.log.wait_for("line up line=floor2")
             program.log.wait_for("line up line=floor1")
             program.log.wait_for("serial master up")  # what came before is not heard
-            plant = Plant(program, buses, master)
+            plant = Plant(program, buses, master, broker, listener)
             stack.callback(plant.close)
+            if broker:
+                program.log.wait_for("mqtt connected")
+                until(lambda: plant.has_read(len(generator.points)))
             yield plant

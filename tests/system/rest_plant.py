@@ -1,5 +1,7 @@
 """The plant that the examples of tests/golden/rest are asked of: every kind of refusal can be had there."""
 import contextlib
+import http.client
+import json
 import pathlib
 import tempfile
 
@@ -20,18 +22,34 @@ FLOOR3 = config.line("floor3", device="/dev/null", stations="{id: 8, name: scale
 FLOOR4 = config.line("floor4", device="/dev/zero", mode="listen", stations="{id: 9, name: heard}")
 
 
+def tokens(folder, roles):
+    """A list of YAML: {name: role}."""
+    listed = []
+    for name, role in roles.items():
+        file = pathlib.Path(folder) / name
+        file.write_text(f"token-of-{name}-0123456789")
+        file.chmod(0o600)
+        listed.append(f"{{name: {name}, role: {role}, file: {file}}}")
+    return f"[{', '.join(listed)}]"
+
+
+def ask(program, method, path, token=None, body=None):
+    """(status, text)"""
+    connection = http.client.HTTPConnection("127.0.0.1", program.http_port(), timeout=harness.PATIENCE)
+    headers = {"Authorization": f"Bearer token-of-{token}-0123456789"} if token else {}
+    connection.request(method, path, json.dumps(body) if body is not None else None, headers)
+    response = connection.getresponse()
+    text = response.read().decode(errors="replace")
+    connection.close()
+    return response.status, text
+
+
 @contextlib.contextmanager
 def running():
     """The program with that plant, when its points have been read and its relay has written once."""
     with tempfile.TemporaryDirectory() as folder:
-        tokens = []
-        for name, role in (("panel", "viewer"), ("ops", "operator")):
-            file = pathlib.Path(folder) / name
-            file.write_text(f"token-of-{name}")
-            file.chmod(0o600)
-            tokens.append(f"{{name: {name}, role: {role}, file: {file}}}")
-        http = config.ADMIN + f", tokens: [{', '.join(tokens)}]"
-        text = config.gateway(FLOOR1, FLOOR2, FLOOR3, FLOOR4, http=http,
+        door = config.ADMIN + f", tokens: {tokens(folder, {'panel': 'viewer', 'ops': 'operator'})}"
+        text = config.gateway(FLOOR1, FLOOR2, FLOOR3, FLOOR4, http=door,
                               modbus=config.FREE_PORT + ", lines: [floor1]",
                               relays="[{from: press/UW160, to: press/UW170, every: 1s}]")
         with harness.configured(text) as program:

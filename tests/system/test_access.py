@@ -1,6 +1,5 @@
 """Who may do what: rules of access over all faces, and what a viewer of one station sees."""
 import contextlib
-import http.client
 import json
 import pathlib
 import subprocess
@@ -13,6 +12,7 @@ import harness
 import mqtt_side
 from harness import read_registers, write_register
 from openapi import Document
+from rest_plant import ask, tokens
 from test_points import until
 
 STATIONS = """
@@ -34,13 +34,7 @@ ILLEGAL = b"\x01"
 @contextlib.contextmanager
 def plant(rules=RULES, roles=None, **more):
     with tempfile.TemporaryDirectory() as folder:
-        tokens = []
-        for name, role in (roles or {"eye": "viewer", "lab": "engineer"}).items():
-            file = pathlib.Path(folder) / name
-            file.write_text(f"token-of-{name}-0123456789")
-            file.chmod(0o600)
-            tokens.append(f"{{name: {name}, role: {role}, file: {file}}}")
-        door = config.ADMIN + f", tokens: [{', '.join(tokens)}]"
+        door = config.ADMIN + f", tokens: {tokens(folder, roles or {'eye': 'viewer', 'lab': 'engineer'})}"
         text = config.gateway(config.line(stations=STATIONS.strip()), http=door, access=rules, **more)
         file = pathlib.Path(folder) / "panelgate.yaml"
         file.write_text(text)
@@ -49,17 +43,6 @@ def plant(rules=RULES, roles=None, **more):
             program.http_port()  # the last that it opens
             until(lambda: ask(program, "GET", "/api/v1/stations/oven/points/secret-heat")[1].find('"good"') > 0)
             yield program
-
-
-def ask(program, method, path, token=None, body=None):
-    """(status, text)"""
-    connection = http.client.HTTPConnection("127.0.0.1", program.http_port(), timeout=harness.PATIENCE)
-    headers = {"Authorization": f"Bearer token-of-{token}-0123456789"} if token else {}
-    connection.request(method, path, json.dumps(body) if body is not None else None, headers)
-    response = connection.getresponse()
-    text = response.read().decode(errors="replace")
-    connection.close()
-    return response.status, text
 
 
 def frames(program):
@@ -136,6 +119,25 @@ class Viewer(unittest.TestCase):
                     for word in OTHERS:
                         self.assertNotIn(word, text.replace(path, ""), f"{verb} {path} -> {status}")
             self.assertGreater(asked, 30)
+
+    def test_what_is_wrong_with_a_request_to_a_hidden_station_is_not_told(self):
+        entries = ({"point": "oven/hidden-mode", "value": 1e9}, {"point": "oven/secret-heat", "value": 1},
+                   {"station": "oven", "device": "UW100", "value": 1}, {"station": "floor1:20", "device": "XY1", "value": 1})
+        with plant(roles={"eye": "operator"}) as program:
+            asked = [("PUT", f"/api/v1/stations/{one}/{rest}", body) for one in ("oven", "floor1:20")
+                     for rest, body in (("points/hidden-mode", {"value": 1e9}), ("points/secret-heat", {"value": 1}),
+                                        ("devices/UW100", {"values": [1]}), ("holding-registers/9999", {"values": [1] * 200}))]
+            asked += [("GET", f"/api/v1/stations/floor1:20/{rest}", None) for rest in ("devices/UW100", "coils/9?count=9999")]
+            asked += [("POST", "/api/v1/write", {"items": [one]}) for one in entries]
+            asked += [("POST", "/api/v1/read", {"items": [{"station": "floor1:20", "device": "XY1"}]})]
+            for verb, path, body in asked:
+                status, text = ask(program, verb, path, "eye", body)
+                said = json.loads(text)
+                status, said = (said["results"][0]["status"], said["results"][0]) if "results" in said else (status, said)
+                self.assertEqual((status, said.get("rule")), (403, "eye-sees-no-more"), (verb, path, body, text))
+                said.pop("item", None)
+                for word in OTHERS:
+                    self.assertNotIn(word, json.dumps(said), (verb, path, body))
 
     def test_a_relay_is_there_but_not_what_it_writes_to(self):
         with plant(relays="[{from: press/UW100, to: oven/GDT200, every: 50ms}]") as program:
@@ -249,8 +251,10 @@ class Mqtt(unittest.TestCase):
                 self.assertIn('rule="mode-is-fixed"} 1', program.get("/metrics")[1])
 
 
-OWN_ROLES = """{roles: [{name: setter, rights: [read, write]}, {name: caller, rights: [read, raw]}, {name: keeper, rights: [reload]}],
-  rules: [{name: setters-leave-the-oven, deny: [write], roles: [setter], stations: [oven]}]}"""
+OWN_ROLES = """{roles: [{name: setter, rights: [read, write]}, {name: caller, rights: [read, raw]}, {name: keeper, rights: [reload]},
+    {name: finder, rights: [discover]}, {name: faker, rights: [simulator]}],
+  rules: [{name: setters-leave-the-oven, deny: [write], roles: [setter], stations: [oven]},
+    {name: fakers-leave-the-oven, deny: [read], roles: [faker], stations: [oven]}]}"""
 
 
 class OwnRoles(unittest.TestCase):
@@ -274,11 +278,65 @@ class OwnRoles(unittest.TestCase):
             self.assertEqual(json.loads(text)["rule"], "setters-leave-the-oven")
             status, text = ask(program, "POST", "/api/v1/lines/floor1/raw", "caller", {"station": 31, "pdu": "1000640001020001"})
             self.assertEqual(json.loads(text)["rule"], "caller")
+            self.assertIn("the role 'caller' does not have the right write", json.loads(text)["detail"])
             self.assertIn('panelgate_access_denied_total{rule="caller"} 2', ask(program, "GET", "/metrics")[1])
             status, text = ask(program, "POST", "/api/v1/lines/floor1/broadcast", "setter", broadcast)
             self.assertEqual(json.loads(text)["detail"], "this needs the right broadcast, which the role 'setter' does not have")
             said = json.loads(ask(program, "GET", "/api/v1/configuration", "setter")[1])
             self.assertEqual((said["role"], said["rights"]), ("setter", ["read", "write"]))
+
+    def test_a_right_is_enough_for_what_it_names_and_shows_no_more(self):
+        rows = (("finder", "POST", "/api/v1/lines/floor1/discover", {"stations": "31"}, 202),
+                ("finder", "GET", "/api/v1/lines/floor1/discover", None, 200),
+                ("finder", "DELETE", "/api/v1/lines/floor1/discover", None, 200),
+                ("finder", "GET", "/api/v1/simulator/press", None, 403),
+                ("faker", "PUT", "/api/v1/simulator/press", {"dead": 0}, 200),
+                ("faker", "GET", "/api/v1/simulator/press", None, 200),
+                ("faker", "PUT", "/api/v1/simulator/oven", {"dead": 0}, 403),
+                ("faker", "DELETE", "/api/v1/lines/floor1/discover", None, 403),
+                ("keeper", "GET", "/api/v1/reload", None, 200))
+        with plant(OWN_ROLES, roles={"finder": "finder", "faker": "faker", "keeper": "keeper"}) as program:
+            for token, verb, path, body, wanted in rows:
+                status, text = ask(program, verb, path, token, body)
+                self.assertEqual(status, wanted, (token, verb, path, text))
+            for token in ("finder", "faker", "keeper"):
+                for path in ("/metrics", "/api/v1/stations", "/api/v1/stations/press", "/api/v1/configuration", "/api/v1/events"):
+                    self.assertEqual(ask(program, "GET", path, token)[0], 403, (token, path))
+
+    def test_who_may_only_reload_hears_whether_it_was_applied(self):
+        with plant(OWN_ROLES, roles={"keeper": "keeper"}) as program:
+            text = program.file.read_text()
+            program.file.write_text(text.replace("UW105", "UW107"))
+            status, said = ask(program, "POST", "/api/v1/reload", "keeper")
+            self.assertEqual((status, json.loads(said)["outcome"], json.loads(said)["changes"]), (200, "applied", []))
+            self.assertNotEqual(json.loads(ask(program, "GET", "/api/v1/reload")[1])["changes"], [])
+            program.file.write_text(text.replace("UW105", "WU105"))
+            for verb, wanted in (("POST", 422), ("GET", 200)):
+                status, said = ask(program, verb, "/api/v1/reload", "keeper")
+                self.assertEqual((status, json.loads(said)["outcome"]), (wanted, "invalid"))
+                self.assertNotIn("WU105", said)
+            self.assertIn("WU105", ask(program, "GET", "/api/v1/reload")[1])
+
+    def test_a_stream_ends_when_its_role_may_no_longer_read(self):
+        with plant(OWN_ROLES, roles={"caller": "caller"}) as program:
+            url = program.url("/api/v1/events")
+            command = ["curl", "-sN", "--max-time", str(harness.PATIENCE), "-H", "Authorization: Bearer token-of-caller-0123456789", url]
+            with subprocess.Popen(command, stdout=subprocess.PIPE) as stream:
+                self.assertTrue(stream.stdout.readline())
+                # The least default role that has all its rights is the same.
+                program.file.write_text(program.file.read_text().replace("rights: [read, raw]", "rights: [raw]"))
+                self.assertEqual(ask(program, "POST", "/api/v1/reload")[0], 200)
+                stream.stdout.read()
+                self.assertNotEqual(stream.wait(harness.PATIENCE), 28, "it was not ended, but its time was over")
+
+    def test_a_rollback_says_that_a_role_of_the_same_name_has_more_rights(self):
+        with plant(OWN_ROLES, roles={"keeper": "keeper"}) as program:
+            text = program.file.read_text()
+            program.file.write_text(text.replace("rights: [read, raw]", "rights: [read]").replace("rights: [reload]", "rights: [read]"))
+            self.assertEqual(ask(program, "POST", "/api/v1/reload")[0], 200)
+            status, said = ask(program, "POST", "/api/v1/reload", None, {"rollback": True})
+            self.assertEqual((status, sorted(json.loads(said)["weaker"])),
+                             (409, ["access: role caller has more rights", "access: role keeper has more rights"]))
 
     def test_check_names_what_is_wrong_and_explains(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -320,6 +378,9 @@ class Explain(unittest.TestCase):
                     ("role=viewer write oven/GDT100", 1, "denied: over http this needs the role operator"),
                     ("role=nothing read press/UW102", 0, "allowed"),
                     ("role=nothing write press/UW102", 1, "denied: the role 'nothing' of a certificate is no role"),
+                    ("role=engineer raw press/UW200", 0, "allowed: no rule matches"),
+                    ("role=engineer face=modbus_tcp raw read press/UW200", 0, "allowed: no rule matches"),
+                    ("role=operator raw read press/UW200", 1, "denied: over http this needs the role engineer"),
                     ("write nobody/UW1", 64, ""), ("role=operator press/UW102", 64, ""))
             for question, code, text in rows:
                 done = harness.run("check", "-c", file, "--explain", question)

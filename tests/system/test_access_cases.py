@@ -1,13 +1,16 @@
 """Generated gateways, each with many rules, asked over all faces: what is answered, and what is on the wire, is what a reference
 evaluator says that was written from the contract alone. ACCESS_CASES says how many, ACCESS_SEED which."""
 import collections
+import contextlib
 import http.client
 import os
 import random
 import re
 import unittest
 
-from access_plant import (ALIASED, ALIASES, NEAR, POLLED, SOURCES, TOKENS, UNLISTED, WRITABLE, Generator, answer, notation, running)
+import mqtt_side
+from access_plant import (ALIASED, ALIASES, BROKERS, NEAR, POLLED, READS_OF, SOURCES, TOKENS, UNLISTED, WRITABLE, Generator, answer,
+                          notation, running)
 from access_reference import COILS, DISCRETE, HOLDING, INPUT, denying, touches
 
 CASES = int(os.environ.get("ACCESS_CASES", "200"))
@@ -22,7 +25,7 @@ class Ask:
     """One thing that somebody asks. parts: [(stations, PDU as asked)], more than one of a batch; besides: raw, broadcast."""
 
     def __init__(self, client, start, parts, besides=(), needed="viewer"):
-        self.client, self.start, self.parts, self.besides = client, start, parts, besides
+        self.client, self.start, self.parts, self.besides, self.hidden = client, start, parts, besides, False
         self.knocks_in_vain = client.who.face == "http" and RANKS.index(client.who.role) < RANKS.index(needed)
 
     def denials(self, of):
@@ -154,12 +157,41 @@ class Gateway:
         random.shuffle(asks)
         return asks[:random.randint(2, len(asks))]
 
+    def mqtt(self):
+        """A write of a point by way of the broker."""
+        point = self.random.choice(self.of.points)
+        client = self.plant.client("mqtt")
+        value = self.random.randint(0, 1 if point.table == COILS else 60000)
+        values = [value] if point.count == 1 else [0, value]
+        alone = point.count == 1 and (5 if point.table == COILS else 6) in point.station.panel.functions
+        place = f"{point.station.name}/{point.name}"
+        part = ([point.station], written(point.table, point.first, values, alone))
+        ask = Ask(client, (place, bool(value) if point.table == COILS else value), [part])
+        ask.hidden = place not in self.readable()
+        return ask
+
+    def readable(self):
+        """"STATION/POINT" of what the broker's clients may read."""
+        who = self.plant.client("mqtt").who
+        return {f"{one.station.name}/{one.name}" for one in self.of.points
+                if not denying(self.of.rules, self.of.default, who, [one.station], self.read_of(one))}
+
+    def read_of(self, point):
+        return self.of.pdu_of(point.station, READS_OF[point.table], point.first, point.count)
+
     # What is made of it
+
+    def compare_published(self):
+        """The broker is told of what its clients may read, and of nothing else."""
+        self.test.assertEqual(self.plant.published(), self.readable(), "topics of points")
 
     def step(self):
         """Returns how many cases it was."""
         chance = self.random.random()
-        asks = self.same_read() if chance < 0.2 else [self.modbus() if chance < 0.6 else self.rest()]
+        if self.of.points and chance > 0.85:
+            asks = [self.mqtt()]
+        else:
+            asks = self.same_read() if chance < 0.2 else [self.modbus() if chance < 0.6 else self.rest()]
         before = self.plant.frames()
         for ask in asks:
             ask.client.start(*ask.start)
@@ -179,7 +211,13 @@ class Gateway:
     def judge(self, ask, got):
         """Compares an answer; returns [(line, station, PDU)] of what may have been sent for it."""
         denials = ask.denials(self.of)
-        if ask.client.who.face != "http":
+        if ask.hidden:  # it has no topics
+            self.test.assertEqual((got[0], got[1].get("detail")), (400, "there is no such point"), (ask, got))
+            self.tally["hidden", "mqtt"] += 1
+            return []
+        if ask.client.who.face == "mqtt":
+            results = [(got[0] == 200, got[0], got[1].get("rule"))]
+        elif ask.client.who.face != "http":
             results = [(got[0] & 0x80 == 0, got[1] if got[0] & 0x80 else None, None)]
         elif ask.knocks_in_vain:
             self.test.assertIn(got[0], (401, 403), (ask, got))
@@ -202,7 +240,7 @@ class Gateway:
             self.test.assertIn(code, (1, 403), about)
             if code == 403:
                 self.test.assertIn(rule, names, about)
-        if allowed and ask.client.who.face != "http" and ask.parts[0][1][0] in (1, 2, 3, 4, 23):
+        if allowed and ask.client.who.face not in ("http", "mqtt") and ask.parts[0][1][0] in (1, 2, 3, 4, 23):
             self.test.assertEqual(got, answer(b"\0" + ask.parts[0][1] + b"\0\0"), ask)
         return allowed
 
@@ -217,8 +255,9 @@ class Gateway:
                 self.test.assertIn(pdu[0], READING, about)
                 may = {one for where, which, sent in allowed if (where, which) == (line, station) for one in named(sent)}
                 asked = set(named(pdu))
-                polled = set(named(POLL)) if (line, station) == ("floor1", 7) else set()
-                with_poll = bool(polled) and polled <= asked <= polled | may
+                polled = [set(named(POLL))] if (line, station) == ("floor1", 7) else []
+                polled += [set(named(self.read_of(one))) for one in self.of.points if one.station.place == (line, station)]
+                with_poll = any(poll <= asked <= poll | may for poll in polled)
                 self.test.assertTrue(asked <= may or with_poll or self.joins(line, station, pdu, asks), about)
         self.test.assertEqual(+writes, collections.Counter(), f"sent: {frames}, for {asks}")
         is_cached = any(one[:2] == ("floor1", 7) for one in allowed)
@@ -265,10 +304,14 @@ class Cases(unittest.TestCase):
         print(f"ACCESS_CASES={CASES} ACCESS_SEED={SEED}", flush=True)
         tally, done, number = collections.Counter(), 0, 0
         while done < CASES:
-            generator = Generator(random.Random(f"{SEED} {number}"))
             number += 1
-            with self.subTest(gateway=number, seed=SEED), running(generator) as plant:
+            with contextlib.ExitStack() as stack, self.subTest(gateway=number, seed=SEED):
+                broker = stack.enter_context(mqtt_side.Broker()) if BROKERS else None
+                generator = Generator(random.Random(f"{SEED} {number - 1}"), broker)
+                plant = stack.enter_context(running(generator))
                 gateway, asked = Gateway(self, generator, plant), 0
+                if generator.points:
+                    gateway.compare_published()
                 while asked < min(EACH, CASES - done):
                     asked += gateway.step()
                 self.assertEqual(gateway.counted(), gateway.denied, "refusals, by the metric")

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,6 +32,14 @@ struct Verdict {
         return rule == nullptr ? kDefaultRule : rule->name;
     }
 };
+
+/// A rule that matches somebody at a station.
+struct RuleAtStation {
+    const Rule* rule = nullptr;
+    const std::vector<modbus::Span>* items = nullptr;  ///< null: every item
+    friend auto operator<=>(const RuleAtStation&, const RuleAtStation&) = default;
+};
+class Ruling;
 
 /// The rules as one line's stations meet them. Copies share nothing; single-threaded: judging fills
 /// a cache, so that many rules cost next to nothing. Pure.
@@ -76,37 +86,23 @@ class LineRules {
     bool is_open() const { return settings_ == nullptr || settings_->is_open(); }
 
   private:
-    /// A rule that matches somebody at a station.
-    struct Applied {
-        const Rule* rule = nullptr;
-        const std::vector<modbus::Span>* items = nullptr;  ///< null: every item
-    };
     /// What somebody meets at a station.
     struct Meeting {
         WhoRef who;  ///< keeps the key's address from being used again
-        std::vector<Applied> rules;
+        std::shared_ptr<const Ruling> ruling;
         std::optional<bool> reads_some{};
         std::optional<bool> reads_all{};
-    };
-    struct Interval {
-        std::uint32_t first = 0;
-        std::uint32_t end = 0;
     };
     using Meetings = std::unordered_map<const Who*, std::unique_ptr<Meeting>>;
 
     Meeting& meet(const WhoRef& who, std::uint8_t station) const;
-    std::vector<Applied> rules_for(const WhoRef& who, std::uint8_t station) const;
+    std::shared_ptr<const Ruling> ruling_for(const WhoRef& who, std::uint8_t station) const;
+    std::vector<RuleAtStation> rules_for(const WhoRef& who, std::uint8_t station) const;
     Verdict judge_request(const WhoRef& who, std::uint8_t station, const Question& question) const;
     Verdict judge_as(const Meeting& meeting, const modbus::Request& request,
                      std::optional<Act> besides) const;
-    Verdict decide(const Meeting& meeting, Act act, std::uint8_t function,
-                   const std::optional<modbus::Span>& items) const;
-    Verdict decide_items(const Meeting& meeting, Act act, std::uint8_t function,
-                         const modbus::Span& items) const;
-    bool some_allowed(const Meeting& meeting, Act act, modbus::Table table) const;
-    Verdict by_default(Act act) const;
-    /// Takes these items out of what is left to be decided. True if any of them was there.
-    bool take_out(const modbus::Span& items) const;
+    static Verdict decide(const Meeting& meeting, Act act, std::uint8_t function,
+                          const std::optional<modbus::Span>& items);
 
     std::shared_ptr<const Settings> settings_;
     std::string line_;
@@ -115,7 +111,7 @@ class LineRules {
     std::vector<std::vector<modbus::Span>> unlisted_items_;
     mutable std::vector<Meetings> meetings_;
     mutable std::size_t met_ = 0;
-    mutable std::vector<Interval> left_;  ///< items that no rule has decided yet
+    mutable std::map<std::vector<RuleAtStation>, std::shared_ptr<const Ruling>> rulings_;
 };
 
 /// True if `who` fulfils the conditions on who asks.

@@ -12,6 +12,7 @@
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/job_queue.hpp"
+#include "panelgate/arbiter/judge.hpp"
 #include "panelgate/arbiter/outbox.hpp"
 #include "panelgate/arbiter/quiet.hpp"
 #include "panelgate/arbiter/read_cache.hpp"
@@ -179,8 +180,7 @@ class Arbiter {
     void check_active(TimePoint now);
     void conclude(TimePoint now, Verdict verdict);
     void end_broadcast(TimePoint now);
-    enum class Take : std::uint8_t;
-    Take judge_reply(TimePoint now, const Station& station, bool early) const;
+    Facts facts_of_reply(TimePoint now, const Station& station, bool early) const;
     bool takes_reply(TimePoint now, const Station& station, bool early);
     void settle(TimePoint now);
     void ask_again(TimePoint now);

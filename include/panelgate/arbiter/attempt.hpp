@@ -11,7 +11,6 @@
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/input_pace.hpp"
 #include "panelgate/arbiter/job.hpp"
-#include "panelgate/arbiter/outstanding.hpp"
 #include "panelgate/arbiter/reply_times.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/bytes.hpp"
@@ -226,13 +225,9 @@ class Attempt {
     /// True if the reply to a write equals the echo of its request: only timing distinguishes them.
     bool may_be_its_echo() const {
         return !group_.request.is_read() && !echo_.complete() && !own_.seen &&
-               std::ranges::equal(adu_of(*reply_), echo_.frame());
+               echo_.is_own(*reply_);
     }
-    /// True if the reply also answers another master's request to the same station.
-    bool is_contested() const {
-        return !foreign_requests_.empty() && foreign_requests_.fit(adu_of(*reply_));
-    }
-    /// Rejects such a reply as ambiguous; the station was not silent.
+    /// Rejects a reply that also answers another master's request; the station was not silent.
     void reject_contested() {
         contested_ = true;
         reject_reply();
@@ -342,9 +337,8 @@ class Attempt {
     Duration longest_pause_{};
     bool heard_ = false;
     bool disturbed_ = false;
-    ForeignRequests foreign_requests_;  ///< of other masters
-    std::size_t noise_in_front_ = 0;    ///< bytes
-    bool frames_in_front_ = false;      ///< good frames
+    std::size_t noise_in_front_ = 0;  ///< bytes
+    bool frames_in_front_ = false;    ///< good frames
     bool contested_ = false;
     bool refusal_rejected_ = false;
     bool echo_suspected_ = false;

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/words.hpp"
 #include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::arbiter {
 
@@ -37,6 +39,11 @@ class EchoFilter {
     bool expected() const { return expect_ != Expect::nothing; }
     /// The frame that it looks for: the one sent last.
     ByteView frame() const { return frame_; }
+    /// True if it is the frame of this PDU.
+    bool is_own(ByteView pdu) const {
+        return frame_.size() == pdu.size() + modbus::kAduOverhead &&
+               std::ranges::equal(modbus::pdu_of(frame_), pdu);
+    }
     /// True if the whole frame came back.
     bool complete() const { return complete_; }
     /// True if an echo was certain and other bytes came.
@@ -57,7 +64,7 @@ struct OwnFrame {
     explicit OwnFrame(bool is_expected) : possible(is_expected) {}
     /// The first frame that equals our own confirms nothing, unless a part of the echo came before
     /// it. Remembers it.
-    bool may_be_echo(const EchoFilter& filter, ByteView adu);
+    bool may_be_echo(const EchoFilter& filter, ByteView pdu);
 
     bool possible;          ///< the line may have an echo
     bool seen = false;      ///< after other bytes, where only its echo was expected

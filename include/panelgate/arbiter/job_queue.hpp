@@ -57,10 +57,12 @@ class JobQueue {
     /// never refused, never drops others.
     void put_back(Job job);
 
-    /// The next in turn of the runnable jobs, nullptr if there is none. Valid until the next
-    /// change.
+    class Choice;
+    /// The next in turn of the runnable jobs, if there is one. Valid until the next change.
+    Choice choose(const Test& may_run) const;
+    /// Takes the job that was chosen and advances the turns. There must be one.
+    Job take(const Choice& choice);
     const Job* peek(const Test& may_run) const;
-    /// Takes the job that peek() returns and advances the turns.
     std::optional<Job> pop(const Test& may_run);
     /// Takes the matching first jobs of all lanes for this station, repeatedly until none matches;
     /// `wanted` may depend on what it accepted. Turns do not advance. In order of tickets.
@@ -119,11 +121,6 @@ class JobQueue {
         Client client = 0;
         std::uint8_t station = 0;
     };
-    struct Choice {
-        std::array<std::optional<Place>, kRanks> first;  ///< first runnable one of each class
-        std::size_t rank = kRanks;                       ///< kRanks: none is runnable
-        bool passed_over = false;
-    };
     /// Drop order: the greatest is dropped first.
     struct Merit {
         bool is_write = false;
@@ -153,7 +150,6 @@ class JobQueue {
     const Lane& lane_at(const Place& place) const;
     bool has_first(const Place& place) const;
     std::optional<Place> first_of(std::size_t rank, const Test& may_run) const;
-    Choice choose(const Test& may_run) const;
     bool is_polls_turn(const Choice& choice, std::size_t top) const;
     void count_turn(const Choice& choice);
     void move_to_back(const Place& place, std::size_t rank);
@@ -188,6 +184,19 @@ class JobQueue {
     /// Turns of other classes while one of this class was runnable.
     std::array<int, kRanks> passed_{};
     bool last_was_passed_over_ = false;
+};
+
+class JobQueue::Choice {
+  public:
+    /// Null: none is runnable.
+    const Job* job() const { return job_; }
+
+  private:
+    friend class JobQueue;
+    const Job* job_ = nullptr;
+    std::array<std::optional<Place>, kRanks> first_;  ///< first runnable one of each class
+    std::size_t rank_ = kRanks;
+    bool passed_over_ = false;
 };
 
 }  // namespace panelgate::arbiter

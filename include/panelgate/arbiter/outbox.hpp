@@ -12,6 +12,7 @@
 #include "panelgate/arbiter/attempt.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/judge.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station.hpp"
 #include "panelgate/base/pool.hpp"
@@ -58,20 +59,9 @@ class Outbox {
     /// Emits an event at most every 10 seconds: each would be a log line.
     void on_echo_mismatch(TimePoint now, std::uint8_t station);
 
-    /// Classification of an unsolicited good frame, or of damaged bytes.
-    enum class Part : std::uint8_t {
-        damaged,
-        echo,
-        request,
-        late,
-        duplicate,
-        broadcast_reply,
-        unasked,
-        unknown,
-    };
-    /// Traces and counts it; `asked`: the station asked last. Damage inside an attempt is counted
-    /// there.
-    void on_unsolicited(TimePoint now, const modbus::Unused& part, Part what, std::uint8_t asked,
+    /// Traces and counts a frame, or damaged bytes, that answers no open request; `asked`: the
+    /// station asked last. Damage inside an attempt is counted there.
+    void on_unsolicited(TimePoint now, const modbus::Unused& part, Done done, std::uint8_t asked,
                         Duration lateness = {});
     void inside_attempt(bool inside) { inside_attempt_ = inside; }
 
@@ -85,8 +75,6 @@ class Outbox {
     void count_damaged(const Attempt& attempt);
     void remember_unanswered(const Attempt& attempt, std::uint64_t mute_before);
     void credit_unanswered(const Group& group);
-    void count_unsolicited(const modbus::Unused& part, Part what, std::uint8_t asked,
-                           Duration lateness);
 
     bool explain_ = false;
     modbus::CrcOrders orders_;

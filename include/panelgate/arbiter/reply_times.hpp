@@ -29,6 +29,7 @@ class LateWindow {
         window_ = std::max(window_, timeout_);
     }
     Duration value() const { return fixed_.value_or(window_); }
+    Duration timeout() const { return timeout_; }
     /// A reply came this long after the timeout of its request.
     void on_late(Duration lateness) {
         worst_ = std::max(worst_, lateness);
@@ -214,6 +215,12 @@ class Trail {
         return often < kOften ? Duration::zero() : *std::ranges::max_element(delays_) * 5 / 4;
     }
     bool seen() const { return seen_; }
+    /// The settle time, once: when something has come to follow its replies usually.
+    std::optional<Duration> take_report() {
+        if (reported_ || settle_time() == Duration::zero()) return std::nullopt;
+        reported_ = true;
+        return settle_time();
+    }
 
   private:
     Duration longest_;
@@ -222,6 +229,7 @@ class Trail {
     Duration last_{};
     TimePoint at_{};
     bool seen_ = false;
+    bool reported_ = false;
 };
 
 /// Recent think times of one station. Pure.

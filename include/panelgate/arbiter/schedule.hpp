@@ -10,7 +10,6 @@
 #include "panelgate/arbiter/attempt.hpp"
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/job_queue.hpp"
-#include "panelgate/arbiter/outstanding.hpp"
 #include "panelgate/arbiter/quiet.hpp"
 #include "panelgate/arbiter/read_cache.hpp"
 #include "panelgate/arbiter/settings.hpp"
@@ -32,7 +31,8 @@ class Sharing {
     /// Returns the leader and the jobs that the same transaction can answer: contained reads
     /// always; touching ones up to the length that the panel is known to answer. Joining adjacent
     /// reads saves a request, a reply header and two gaps.
-    Group gather(Job leader, const Station& station, JobQueue& queue) const;
+    Group gather(Job leader, const Station& station, const OutstandingRequests& book,
+                 JobQueue& queue) const;
     /// The joined read failed: its parts are sent alone from now on. Returns them in the order in
     /// which to put them back; jobs that asked for the whole, and jobs of clients that have left,
     /// stay in the group.
@@ -41,7 +41,8 @@ class Sharing {
     static Bytes part_for(const Group& group, const Bytes& reply, const Job& job);
 
   private:
-    bool joins(const Group& group, const Job& job, const Station& station) const;
+    bool joins(const Group& group, const Job& job, const Station& station,
+               const OutstandingRequests& book) const;
 
     bool share_;
     PoolDeque<ReadSpan> refused_;
@@ -114,15 +115,11 @@ class Schedule {
     std::optional<TimePoint> line_rests_until(TimePoint now, const Group& failed, TimePoint sent,
                                               const Station& station) const;
 
-    /// Where the transport may stall (Settings::may_stall): it was opened; a request that was
-    /// started then was answered.
-    void on_transport_opened(TimePoint now) { transport_.on_opened(now); }
-    void on_transport_proved(TimePoint started) { transport_.on_proved(started); }
     /// True if the station's outstanding requests or replies may still be in transit, however long
-    /// ago.
-    bool in_transit(const Station& station) const {
-        return may_stall_ && station.requests().any_since(transport_.proved()) &&
-               !station.requests().answered_since_reopen();
+    /// ago, where the transport may stall (Settings::may_stall).
+    bool in_transit(const Stations& stations, const Station& station) const {
+        return may_stall_ && stations.book().any_since(station.id(), stations.book().proved()) &&
+               !station.replies().answered_since_reopen();
     }
 
     Backlog& backlog() { return backlog_; }
@@ -147,14 +144,13 @@ class Schedule {
     std::optional<Next> read_before(TimePoint now, const Job& job, Stations& stations,
                                     const EchoMemory& echo);
     TimePoint ready_at(const Stations& stations, const Job& job) const;
-    bool can_prove(const Station& station) const;
+    bool can_prove(const OutstandingRequests& book, const Station& station) const;
     TimePoint repeat_from(const Group& group, const Stations& stations) const;
     JobQueue::Test runnable(TimePoint now, const Stations& stations, const Quiet& quiet) const;
 
     Quarantine quarantine_;
     bool may_stall_;
     bool echo_known_ = false;
-    TransportEpoch transport_;
     Backlog backlog_;
     Sharing sharing_;
     Ticket learned_for_ = 0;        ///< a read was sent for it to detect the echo (P8)

@@ -6,8 +6,10 @@
 #include <optional>
 
 #include "panelgate/arbiter/attempt.hpp"
+#include "panelgate/arbiter/judge.hpp"
+#include "panelgate/arbiter/outstanding_requests.hpp"
+#include "panelgate/arbiter/reply_habits.hpp"
 #include "panelgate/arbiter/reply_times.hpp"
-#include "panelgate/arbiter/requests.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/arbiter/timing.hpp"
@@ -16,8 +18,8 @@
 
 namespace panelgate::arbiter {
 
-/// State of one station: its book of outstanding requests, when it may be asked, how long to wait
-/// for it, and what its failures may cost. Pure.
+/// State of one station: how it answers, when it may be asked, how long to wait for it, and what
+/// its failures may cost. What was asked of it is in the line's book. Pure.
 class Station {
   public:
     /// `frame`: duration of a usual reply on this line.
@@ -28,9 +30,9 @@ class Station {
     /// that has begun is not shortened.
     void apply(const StationSettings& settings, const OfflineSettings& offline, bool listed);
 
-    /// Whose its replies are (P1).
-    const OutstandingRequests& requests() const { return requests_; }
-    OutstandingRequests& requests() { return requests_; }
+    /// How it answers (P1).
+    const ReplyHabits& replies() const { return replies_; }
+    ReplyHabits& replies() { return replies_; }
 
     // When it may be asked
 
@@ -38,40 +40,46 @@ class Station {
     /// it has had four writes in a row (P9). Where it rests after each reply, other stations have
     /// the turns between, and its reads would have too few: then every other one.
     bool has_read_turn() const {
-        const bool rests = requests_.duplicates_until(Duration::max()) != TimePoint{};
+        const bool rests = replies_.duplicates_until(Duration::max()) != TimePoint{};
         return read_turn_ || writes_in_a_row_ >= (rests ? 1 : kWritesInARow);
     }
     /// True if it has answered reads and the last one too: failed writes do not postpone reads.
-    bool answers_reads() const { return requests_.has_answered_reads() && !read_missed_; }
+    bool answers_reads() const { return replies_.reads().any() && !read_missed_; }
     /// True if so many writes in a row failed that a read must check whether it is there.
     bool wants_check() const { return wants_check_; }
     /// True if sending a proof is quicker than waiting.
-    bool may_prove() const { return !health_.offline() && requests_.may_prove(); }
+    bool may_prove(const OutstandingRequests& book) const {
+        return !health_.offline() && replies_.may_prove(book);
+    }
     /// True if it has answered its last request.
     bool is_answering() const { return !missed_ && health_.silent_in_a_row() == 0; }
     /// When its next probe may be sent: usually the probe is the outstanding request itself.
-    TimePoint probe_due() const {
-        const modbus::Request probe = requests_.probe();
-        if (wants_check_) return requests_.clear_at(probe);
-        return std::max(health_.next_probe(),
-                        requests_.is_only(probe) ? TimePoint{} : requests_.rested());
+    TimePoint probe_due(const OutstandingRequests& book) const {
+        const modbus::Request probe = replies_.reads().probe();
+        if (wants_check_) return replies_.clear_at(book, probe);
+        const bool is_only = book.is_only(id(), probe.pdu());
+        return std::max(health_.next_probe(), is_only ? TimePoint{} : replies_.rested());
     }
     /// A request is sent; `in_transit`: what is outstanding may still come at any time.
-    void on_asked(TimePoint now, const Group& group, bool in_transit = false);
+    void on_asked(OutstandingRequests& book, TimePoint now, const Group& group,
+                  bool in_transit = false);
     void on_line_down() { health_.on_line_down(); }
     /// The line was reopened, on a transport that may stall.
-    void on_opened(TimePoint now) { requests_.on_opened(now, usual()); }
+    void on_opened(const OutstandingRequests& book, TimePoint now) {
+        replies_.on_opened(book, now, usual());
+    }
 
     // Replies and failures
 
-    struct Heard : OutstandingRequests::Heard {
+    struct Heard : ReplyHabits::Heard {
         bool back = false;  ///< it was offline
     };
     /// How long after a broadcast it may answer it.
-    Duration broadcast_window() const { return requests_.broadcast_window(usual()); }
-    /// A good frame came that is no answer. `pdu`: without address and CRC. `asked`: a request to
-    /// it is on the wire.
-    Heard on_unsolicited_frame(TimePoint now, ByteView pdu, bool asked = false);
+    Duration broadcast_window() const { return replies_.broadcast_window(usual()); }
+    /// A good frame came that is no answer, and was judged. `pdu`: without address and CRC.
+    /// `asked`: a request to it is on the wire.
+    Heard on_unsolicited_frame(OutstandingRequests& book, TimePoint now, Done done, ByteView pdu,
+                               bool asked = false);
     /// Unsolicited bytes followed its reply.
     void on_unsolicited_bytes(TimePoint now) { trail_.on_unsolicited(now); }
 
@@ -84,7 +92,8 @@ class Station {
     };
     /// An attempt was answered. `waited`: from the end of the request to the first sign of the
     /// reply; `think`: without the silence by which the panel detects the end of the request.
-    Replied on_reply(TimePoint now, const Attempt& attempt, Duration waited, Duration think);
+    Replied on_reply(OutstandingRequests& book, TimePoint now, const Attempt& attempt,
+                     Duration waited, Duration think);
     /// The reply to a failed attempt broke off for so long.
     void on_broken_reply(TimePoint now, Duration pause) {
         hole_.on_broken(now, pause, settings_.response_timeout);
@@ -97,9 +106,10 @@ class Station {
     /// The whole transaction failed. Returns true if that took the station offline.
     bool on_given_up(TimePoint now, Fault fault, bool is_read = true);
     /// True if this answer may be a duplicate; `early`: it came before the request can have left.
-    bool may_be_duplicate(TimePoint now, const Attempt& attempt, bool early) const {
+    bool may_be_duplicate(TimePoint now, const Attempt& attempt, const Claims& claims,
+                          bool early) const {
         const bool quicker = is_quicker_than_ever(attempt.first_sign(now));
-        return requests_.may_be_duplicate(now, attempt, early, quicker);
+        return replies_.may_be_duplicate(now, attempt, claims, early, quicker);
     }
     /// True if no recent reply began this soon after the request.
     bool is_quicker_than_ever(Duration first_sign) const {
@@ -116,6 +126,7 @@ class Station {
     // How to ask it
 
     const StationSettings& settings() const { return settings_; }
+    std::uint8_t id() const { return settings_.id; }
     const StationHealth& health() const { return health_; }
     /// Returns true if this client's request may be the probe, once per interval. A write that was
     /// ignored does not prevent a read from being the next one.
@@ -124,8 +135,8 @@ class Station {
     Condition condition() const;
     /// True if it is neither listed nor was ever heard: there may be no such station.
     bool speculative() const { return !listed_ && !health_.last_heard(); }
-    bool forgettable(TimePoint now) const {
-        return speculative() && !requests_.any() && now >= asked_ + timing::kForgetUnheard;
+    bool forgettable(const OutstandingRequests& book, TimePoint now) const {
+        return speculative() && !book.any(id()) && now >= asked_ + timing::kForgetUnheard;
     }
     /// True if it missed its last request, and is not offline yet.
     bool missed_last() const {
@@ -176,7 +187,7 @@ class Station {
     const Drift& clock_drift() const { return clock_drift_; }
     /// Time until which the line should rest because of what follows its replies.
     TimePoint trail_until() const {
-        return std::max(trail_.until(), requests_.duplicates_until(trail_.longest()));
+        return std::max(trail_.until(), replies_.duplicates_until(trail_.longest()));
     }
     std::optional<Duration> slowest() const { return slowest_.value(); }
     /// Enough replies have shown how long it may need.
@@ -217,7 +228,7 @@ class Station {
 
     StationSettings settings_;
     bool listed_;
-    OutstandingRequests requests_;
+    ReplyHabits replies_;
     StationHealth health_;
     Turnaround turnaround_;
     AdaptiveTimeout adaptive_;
@@ -242,8 +253,7 @@ class Station {
     bool read_missed_ = false;  ///< the last read was unanswered
     bool wants_check_ = false;
     bool woken_by_write_ = false;  ///< its last probe was a client's write
-    bool trail_reported_ = false;
-    int probes_ = 0;  ///< unanswered, since it was last heard
+    int probes_ = 0;               ///< unanswered, since it was last heard
 };
 
 }  // namespace panelgate::arbiter

@@ -3,6 +3,7 @@
 #include <map>
 #include <optional>
 
+#include "panelgate/arbiter/outstanding_requests.hpp"
 #include "panelgate/arbiter/reply_times.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station.hpp"
@@ -11,8 +12,9 @@
 
 namespace panelgate::arbiter {
 
-/// All stations of a line: created when first asked; unheard ones are forgotten again. Knows what
-/// unanswered attempts may cost together, and which probe is due. Pure.
+/// All stations of a line and the book of what was asked: created when first asked; unheard ones
+/// are forgotten again. Knows what unanswered attempts may cost together, and which probe is due.
+/// Pure.
 class Stations {
   public:
     explicit Stations(const Settings& settings);
@@ -20,6 +22,8 @@ class Stations {
     /// Keeps what is known of stations that both settings list.
     void apply(const Settings& settings);
 
+    const OutstandingRequests& book() const { return book_; }
+    OutstandingRequests& book() { return book_; }
     Station& of(std::uint8_t id);
     const Station* find(std::uint8_t id) const;
     /// Returns the station's settings, or those for unlisted stations.
@@ -33,36 +37,36 @@ class Stations {
         const auto found = stations_.find(id);
         if (found != stations_.end()) found->second.on_unsolicited_bytes(now);
     }
-    /// The last bit of a broadcast has left, or the line was lost meanwhile.
-    void on_broadcast(TimePoint sent, ByteView request) { broadcasts_.on_sent(sent, request); }
-    const BroadcastReplies& broadcasts() const { return broadcasts_; }
     /// A station has answered a broadcast, which is wrong, so long after it.
     void on_broadcast_answered(std::uint8_t id, Duration delay, bool refused) {
         const auto found = stations_.find(id);
-        if (found != stations_.end())
-            found->second.requests().on_broadcast_answered(delay, refused);
+        if (found != stations_.end()) found->second.replies().on_broadcast_answered(delay, refused);
     }
     /// Time from which no reply to a broadcast can be taken for the reply to this request.
     TimePoint broadcasts_over(std::uint8_t id, const modbus::Request& request) const {
         const Station* station = find(id);
-        if (station == nullptr) return broadcasts_.over(request, settings(id).response_timeout);
-        return broadcasts_.over(request, station->broadcast_window(),
-                                station->requests().refuses_broadcasts());
+        if (station == nullptr)
+            return book_.broadcasts_over(request, settings(id).response_timeout, false);
+        return book_.broadcasts_over(request, station->broadcast_window(),
+                                     station->replies().refuses_broadcasts());
     }
     /// Damaged bytes were heard.
     void on_damaged(TimePoint now, ByteView bytes) {
-        for (auto& [id, station] : stations_) station.requests().on_damaged_bytes(now, id, bytes);
+        for (auto& [id, station] : stations_)
+            station.replies().on_damaged_bytes(book_, now, bytes, station.settings().crc_order);
     }
     void on_line_down() {
         for (auto& [id, station] : stations_) station.on_line_down();
     }
     /// The line was opened, on a transport that may stall.
     void on_opened(TimePoint now) {
-        for (auto& [id, station] : stations_) station.on_opened(now);
+        book_.on_opened(now);
+        for (auto& [id, station] : stations_) station.on_opened(book_, now);
     }
     /// A request that left at `sent` was answered now, on a line that may stall.
     void on_proved(TimePoint now, TimePoint sent) {
-        for (auto& [id, station] : stations_) station.requests().on_proved(now, sent);
+        book_.on_proved(sent);
+        for (auto& [id, station] : stations_) station.replies().on_proved(book_, now, sent);
     }
     /// A station is back, or the line was reopened: others may be back for the same reason and are
     /// asked at once.
@@ -124,6 +128,7 @@ class Stations {
     void forget_unheard(TimePoint now);
 
   private:
+    StationSettings own_settings(std::uint8_t id) const;
     bool any_online() const;
     /// When it is probed; empty: never.
     std::optional<TimePoint> probe_at(const Station& station) const;
@@ -156,7 +161,7 @@ class Stations {
     ProbeBudget newly_silent_{ProbeBudget::kFailing};
     ProbeBudget unheard_{ProbeBudget::kFailing};        ///< all attempts at unheard stations
     ProbeBudget asked_unheard_{ProbeBudget::kUnheard};  ///< except the first at each
-    BroadcastReplies broadcasts_;
+    OutstandingRequests book_;
     Slowest slowest_;
     Quickest quickest_;
     TimePoint heard_{};         ///< any of them

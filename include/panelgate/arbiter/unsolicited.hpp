@@ -4,8 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include "panelgate/arbiter/judge.hpp"
 #include "panelgate/arbiter/outbox.hpp"
-#include "panelgate/arbiter/outstanding.hpp"
 #include "panelgate/arbiter/quiet.hpp"
 #include "panelgate/arbiter/stations.hpp"
 #include "panelgate/base/bytes.hpp"
@@ -31,10 +31,7 @@ class UnsolicitedFrames {
     void on_replied(std::uint8_t station) { replied_ = station; }
     /// The station that answered the frame before the one on the wire; 0: none.
     std::uint8_t replied_before() const { return replied_before_; }
-    void forget() {
-        idle_.clear();
-        foreign_requests_.clear();
-    }
+    void forget() { idle_.clear(); }
 
     /// Unsolicited bytes (MST-04): counted, never matched with a later request.
     void hear(ByteView bytes);
@@ -57,9 +54,9 @@ class UnsolicitedFrames {
                         Duration heard_after) const;
 
   private:
-    Outbox::Part judge(TimePoint now, const modbus::Unused& part, const Stations& stations) const;
-    bool answers_other_master(TimePoint now, ByteView adu) const;
-    static void learn_of_broadcasts(TimePoint now, const modbus::Unused& part, Stations& stations);
+    Facts facts_of(TimePoint now, ByteView adu, bool damaged, const Stations& stations) const;
+    static void note_reply(TimePoint now, const modbus::Unused& part, Done done, bool asked,
+                           Stations& stations, Quiet& quiet, Outbox& outbox);
     void let_reply_pass(TimePoint now, ByteView request, const Stations& stations,
                         Quiet& quiet) const;
 
@@ -67,7 +64,6 @@ class UnsolicitedFrames {
     modbus::CrcOrders orders_;
     Bytes idle_;
     Bytes last_frame_;
-    ForeignRequests foreign_requests_;
     std::uint8_t replied_ = 0;  ///< to the last frame; 0: none, or not yet
     std::uint8_t replied_before_ = 0;
 };

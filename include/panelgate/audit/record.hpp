@@ -47,6 +47,9 @@ class Composer {
     Composer& numbers(std::string_view key, std::span<const std::uint16_t> values);
     Composer& texts(std::string_view key, std::span<const std::string> values);
 
+    /// Members that were composed before: `,"client":"..."`.
+    Composer& members(std::string_view composed);
+
     std::string_view body() const { return body_; }
 
   private:

@@ -18,8 +18,7 @@ struct Settings {
     OnFailure on_failure = OnFailure::keep_on;
     std::string syslog_socket = "/dev/log";
     bool syslog = false;                   ///< each record goes to the local syslog as well
-    Duration flush = 200ms;                ///< how long a record may wait to be written
-    Duration sync = 500ms;                 ///< how long what is written may wait to be on the disk
+    Duration flush = 700ms;                ///< how long a record may wait to be on the disk
     std::size_t buffer = 2 * 1024 * 1024;  ///< bytes that wait while the disk takes nothing
     std::uint64_t anchor_every = 10'000;   ///< records between two anchors in the log
     Duration anchor_after = 10min;         ///< the same in time, if there was a record

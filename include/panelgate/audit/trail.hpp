@@ -23,10 +23,9 @@ struct Notice {
 };
 
 /// The audit trail. The loop only appends bodies to a bounded buffer; a thread chains them, writes
-/// them at most Settings::flush later, which a process that is killed does not undo, and
-/// synchronizes the file Settings::sync after that, which is what costs. While the disk takes
-/// nothing the buffer fills, and then what comes is counted as lost, and the count recorded. Used
-/// by one thread besides its own.
+/// them and synchronizes the file, at most Settings::flush later. While the disk takes nothing the
+/// buffer fills, and then what comes is counted as lost, and the count recorded. Used by one thread
+/// besides its own.
 class Trail {
   public:
     /// `tell` is called from the trail's thread. `wall` too: it tells the time of what the trail

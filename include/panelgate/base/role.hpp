@@ -61,11 +61,15 @@ struct OwnRole {
 
 /// Somebody's role: a default one, or one of the configuration.
 struct Standing {
-    Role role = Role::none;  ///< of an own role: the least default one that has
-                             ///< all its rights
+    Role role = Role::none;  ///< of an own role: the least default one that has all its rights
     std::optional<OwnRole> own{};
 
+    /// A default role is one.
+    Standing(Role role = Role::none, std::optional<OwnRole> own = {});
+
     bool may(Right right) const;
+    /// True if it may something that the other may not.
+    bool exceeds(const Standing& other) const;
     std::string_view name() const { return own ? std::string_view(own->name) : label(role); }
     friend bool operator==(const Standing&, const Standing&) = default;
 };

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -32,19 +31,13 @@ struct Who {
     std::string listener{};
     std::string token{};  ///< the token's name; empty: none
     /// The token's or the certificate's, or what the door gives to somebody without either.
-    Role role = Role::none;
+    Standing standing{};
     std::string certificate{};       ///< the subject of the client's certificate; empty: none
     std::string certificate_role{};  ///< the role that it carries, in its own words
     std::string user{};              ///< at the broker, for MQTT
     /// The same for all clients that must share one client's turns (P9), from host_number(). Not an
     /// identity: 0 is a host of its own.
     std::uint64_t host = 0;
-    std::optional<OwnRole> own_role{};  ///< the role is of the configuration; `role` is its least
-
-    /// The name of the role.
-    std::string_view role_name() const {
-        return own_role ? std::string_view(own_role->name) : label(role);
-    }
     friend bool operator==(const Who&, const Who&) = default;
 };
 /// Shared by all requests of a client; null only where nobody has said who asks.

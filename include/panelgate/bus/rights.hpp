@@ -29,7 +29,7 @@ enum class Rule : std::uint8_t {
     listening,        ///< the line is in listen mode
     write_protected,  ///< the items are read-only in the panel
     unrecorded,       ///< no write is sent while it cannot be recorded (audit.on_failure)
-    denied,           ///< a rule of `access`, or its default
+    denied,           ///< a rule of `access`, its default, or a role's lack
 };
 /// Returns "access", "function", "quantity", "range", "listen", "read-only", "audit" or "denied":
 /// stable identifiers.
@@ -81,11 +81,16 @@ struct Refusal {
     Rule rule = Rule::read_only;
     std::string station;  ///< the station that the rule protects
     modbus::ExceptionCode code = modbus::ExceptionCode::illegal_function;  ///< for Modbus clients
-    /// The guard's reason; the line's name in listen mode; the name of the rule that denies.
+    /// The guard's reason; the line's name in listen mode; the name of the rule that denies, or of
+    /// the role that lacks a right.
     std::string why{};
+    std::string_view lacking{};  ///< the right that a role lacks; empty: something else refuses
 
     friend bool operator==(const Refusal&, const Refusal&) = default;
 };
+
+/// Refuses what rules deny, or what the client's role may not.
+Refusal denial(const access::Verdict& verdict, std::string station);
 
 /// Refuses a write that could not be recorded: a client should try again later.
 Refusal unrecorded(std::string station);

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 
+#include "panelgate/arbiter/outstanding_requests.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/tap/cutter.hpp"
@@ -35,47 +36,23 @@ class GiveUp {
     bool refuted_ = false;            ///< by longer waits
 };
 
-/// How one station answers, as far as it helps to match replies to requests.
+/// How soon one station answers, as far as it helps to match replies to requests.
 class Habits {
   public:
-    explicit Habits(const Settings& settings) : settings_(settings) {}
-
-    /// A reply that surely answers its request came `think` after it. A panel answers in order: no
-    /// earlier reply is outstanding any more.
+    /// A reply that surely answers its request came `think` after it.
     void answered(Duration think);
-    /// A reply came that may answer an older request. After two in a row with the usual think time
-    /// no reply is outstanding any more: late ones would not keep that time.
-    void answered_perhaps(Duration think);
-    /// A request went unanswered: its reply may still come.
-    void on_unanswered(TimePoint asked, const Bytes& request);
-    /// True if this reply may answer another unanswered request.
-    bool may_answer_other(TimePoint now, const Bytes& request, ByteView reply) const;
-    /// When the oldest equal request was asked that this reply may answer; empty: none.
-    std::optional<TimePoint> first_asked(TimePoint now, const Bytes& request) const;
-    /// True if this is a late reply; removes its request and all earlier ones.
-    bool settle(TimePoint now, ByteView reply);
-    bool may_answer_earlier(TimePoint now, ByteView reply) const;
-    void forget_unanswered() { unanswered_.clear(); }
+    /// A reply came that may answer an older request. Returns true after two in a row with the
+    /// usual think time: late ones would not keep it.
+    bool answered_as_usual(Duration think);
+    void on_unanswered() { usual_ = 0; }
 
     /// Longest recent think time; empty before the first reply.
     std::optional<Duration> longest_think() const { return longest_; }
 
     GiveUp give_up;
-    Bytes last_request;                 ///< PDU of the last answered request
-    Bytes last_reply;                   ///< its reply: address to CRC
     std::optional<TimePoint> repeated;  ///< when it last sent a reply twice
 
   private:
-    struct Unanswered {
-        TimePoint asked;
-        Bytes request;
-    };
-    bool is_open(const Unanswered& one, TimePoint now) const {
-        return now - one.asked < settings_.late_window;
-    }
-
-    Settings settings_;
-    std::deque<Unanswered> unanswered_;
     std::optional<Duration> longest_;
     int usual_ = 0;  ///< replies in a row with the usual think time while others were outstanding
 };
@@ -115,12 +92,15 @@ class Matcher {
     void on_answer(Piece piece);
     void on_request(Piece piece);
     void on_reply(Piece piece);
+    void close(const Piece& piece);
     void on_damaged(Piece piece);
     void answer(Piece piece, bool in_doubt);
     void ask(const Piece& piece, bool doubtful);
     void give_up(TimePoint now);
     void give_up_for(const Piece& request);
-    bool is_old_reply(const Habits& habits, const Piece& piece) const;
+    arbiter::Claims claims(const Piece& piece, ByteView open = {}) const;
+    bool repeats_last(const Piece& piece) const;
+    bool is_old_reply(const Piece& piece) const;
     Reading read(const Piece& piece) const;
     Duration quick(const Habits& habits) const;
     Duration patience(const Habits& habits) const;
@@ -136,9 +116,10 @@ class Matcher {
     std::optional<Piece>
         candidate_;  ///< its answer, or the same request again: later frames decide
     std::map<std::uint8_t, Habits> habits_;
-    GiveUp give_up_;        ///< of the whole line
-    bool noise_ = false;    ///< since the last good frame
-    TimePoint last_end_{};  ///< of a good frame
+    arbiter::OutstandingRequests book_;  ///< what the line's master has asked, seen from it
+    GiveUp give_up_;                     ///< of the whole line
+    bool noise_ = false;                 ///< since the last good frame
+    TimePoint last_end_{};               ///< of a good frame
     std::deque<Event> events_;
 };
 

@@ -81,7 +81,7 @@ class Caller {
                  std::span<const OwnRole> own_roles = {});
     /// By its certificate: only operators and above write, and own roles with that right.
     bool reads_only() const {
-        return by_certificate_ && !Standing{who_->role, who_->own_role}.may(Right::write);
+        return by_certificate_ && !who_->standing.may(Right::write);
     }
     /// Passes the request to a bus for one of its stations; station 0: broadcast.
     void transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,

@@ -111,7 +111,19 @@ Parsed<ReloadWish> wish_of(const HttpRequest& request) {
     return ReloadWish{*rollback, *weaker};
 }
 
-HttpResponse answer_of(const ReloadVerdict& verdict) {
+/// What it says may be about any station.
+json::object describe_to(const ReloadVerdict& verdict, bool sees_everything) {
+    json::object object = describe(verdict);
+    if (sees_everything) return object;
+    for (const char* key : {"weaker", "restart_needed", "errors", "why"}) object.erase(key);
+    object["changes"] = object["warnings"] = json::array();
+    return object;
+}
+
+constexpr std::string_view kNotTold =
+    "what is wrong is not told to a role that does not see all of the plant";
+
+HttpResponse answer_of(const ReloadVerdict& verdict, bool sees_everything) {
     switch (verdict.outcome) {
         case ReloadOutcome::applied:
         case ReloadOutcome::unchanged:
@@ -119,19 +131,20 @@ HttpResponse answer_of(const ReloadVerdict& verdict) {
         case ReloadOutcome::invalid: {
             Problem made = problem(422, "the configuration has faults; nothing has changed",
                                    "invalid-configuration");
-            made.extensions = describe(verdict);
+            made.extensions = describe_to(verdict, sees_everything);
             return to_response(made);
         }
         case ReloadOutcome::failed:
         case ReloadOutcome::refused: {
             const bool refused = verdict.outcome == ReloadOutcome::refused;
-            Problem made = problem(409, verdict.why + "; nothing has changed",
+            const std::string why = sees_everything ? verdict.why : std::string(kNotTold);
+            Problem made = problem(409, why + "; nothing has changed",
                                    refused ? "reload-weaker" : "reload-failed");
-            made.extensions = describe(verdict);
+            made.extensions = describe_to(verdict, sees_everything);
             return to_response(made);
         }
     }
-    return json_response(200, describe(verdict));
+    return json_response(200, describe_to(verdict, sees_everything));
 }
 
 }  // namespace
@@ -139,13 +152,8 @@ HttpResponse answer_of(const ReloadVerdict& verdict) {
 Handling get_reload(HttpRequest request, const Api* api) {
     const Verdict last = api->providers.reload ? api->providers.reload->last() : nullptr;
     if (!last) co_return json_response(200, json::object{{"outcome", "none"}});
-    json::object body = describe(*last);
-    // What it says names any station.
-    if (!Sight(*api->directory, request.caller->who()).everything()) {
-        for (const char* key : {"weaker", "restart_needed", "errors", "why"}) body.erase(key);
-        body["changes"] = body["warnings"] = json::array();
-    }
-    co_return json_response(200, body);
+    const bool all = Sight(*api->directory, request.caller->who()).everything();
+    co_return json_response(200, describe_to(*last, all));
 }
 
 Handling post_reload(HttpRequest request, const Api* api) {
@@ -156,24 +164,28 @@ Handling post_reload(HttpRequest request, const Api* api) {
         source ? source->barred(wish->rollback) : "this program serves a built-in configuration";
     if (!why.empty()) co_return to_response(problem(409, why));
     request.caller->take_effect();
+    // As before it: who may not see something now is not told how it is from now on.
+    const bool sees_everything = Sight(*api->directory, request.caller->who()).everything();
     asio::awaitable<Verdict> reloading = reloaded(source, *wish, request.caller->name());
     const Verdict verdict = co_await std::move(reloading);
-    co_return answer_of(*verdict);
+    co_return answer_of(*verdict, sees_everything);
 }
 
 namespace {
 
+/// Rendered and kept; beyond, all are rendered anew.
+constexpr std::size_t kKeptConfigurations = 64;
+
 json::array rights_list(const Who& who) {
     json::array list;
-    const Standing standing{who.role, who.own_role};
     for (const Right right : kAllRights)
-        if (standing.may(right)) list.emplace_back(label(right));
+        if (who.standing.may(right)) list.emplace_back(label(right));
     return list;
 }
 
 std::string configuration_text(const Api& api, const Who& who, const std::string& configuration) {
     return "{\"version\":" + json_text(boost::json::value(api.providers.version)) +
-           ",\"role\":" + json_text(boost::json::value(who.role_name())) +
+           ",\"role\":" + json_text(boost::json::value(who.standing.name())) +
            ",\"rights\":" + json_text(rights_list(who)) + ",\"configuration\":" + configuration +
            ",\"rest\":" + json_text(offered()) + "}\n";
 }
@@ -202,28 +214,31 @@ std::string seen_configuration(const std::string& text, const Sight& sight) {
     return json_text(json::object{{"lines", std::move(lines)}, {"partial", true}});
 }
 
-HttpResponse text_answer(std::string body) {
-    HttpResponse response;
-    response.body = std::move(body);
-    return response;
+/// A sign for each station, in the order of the directory.
+std::string stations_seen(const Directory& directory, const Sight& sight) {
+    std::string signs = " ";  // no name of a role has one
+    for (const StationEntry& one : directory.stations) signs += sight.station(one) ? '1' : '0';
+    return signs;
 }
 
 }  // namespace
 
-/// The configuration is the same for all clients of a role, so it is rendered once per role.
+/// The configuration is the same for all clients of a role who see the same stations, so it is
+/// rendered once for all of them.
 Handling get_configuration(HttpRequest request, const Api* api) {
     if (!api->providers.configuration)
         co_return to_response(problem(404, "this program shows no configuration"));
+    const Who& who = *request.caller->who();
     const Sight sight(*api->directory, request.caller->who());
-    if (!sight.everything())
-        co_return text_answer(
-            configuration_text(*api, *request.caller->who(),
-                               seen_configuration(*api->providers.configuration, sight)));
-    const std::string role(request.caller->who()->role_name());
-    std::shared_ptr<KeptAnswer>& kept = (*api->configuration)[role];
+    const bool all = sight.everything();
+    std::string key(who.standing.name());
+    if (!all) key += stations_seen(*api->directory, sight);
+    if (api->configuration->size() >= kKeptConfigurations) api->configuration->clear();
+    std::shared_ptr<KeptAnswer>& kept = (*api->configuration)[key];
     if (!kept) {
+        const std::string& text = *api->providers.configuration;
         kept = std::make_shared<KeptAnswer>(
-            configuration_text(*api, *request.caller->who(), *api->providers.configuration),
+            configuration_text(*api, who, all ? text : seen_configuration(text, sight)),
             "application/json");
     }
     Handling giving = KeptAnswer::give(kept, std::move(request));

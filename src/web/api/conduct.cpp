@@ -265,6 +265,19 @@ bool add_etag(HttpResponse& response, std::string_view if_none_match, const std:
     return known;
 }
 
+namespace {
+
+/// True if it is no bus that found something wrong: that has judged who asks.
+bool is_found_wrong_here(const HttpResponse& response) {
+    const bool wrong = response.status >= 400 && response.status < 500 && response.status != 403;
+    const bool asked = std::ranges::any_of(response.headers, [](const auto& header) {
+        return header.first == "Panelgate-Transactions";
+    });
+    return wrong && !asked && response.body.find("\"modbus_exception\":") == std::string::npos;
+}
+
+}  // namespace
+
 Handling conduct(HttpRequest request, const Api* api, Handler handler, RoutePolicy policy) {
     const std::shared_ptr<Caller> caller = request.caller;
     const std::size_t gzip_from = api->providers.settings.gzip_from;
@@ -275,9 +288,14 @@ Handling conduct(HttpRequest request, const Api* api, Handler handler, RoutePoli
         if (const auto hidden = check_sight(request, *api->directory))
             co_return to_response(*hidden);
     }
+    const std::vector<std::string> path = request.path;
     Handling work = handled(std::move(request), api, handler, policy);
     HttpResponse response = co_await std::move(work);
     if (caller->has_left()) co_return response;
+    if (api->directory != nullptr && is_found_wrong_here(response)) {
+        if (const auto hidden = instead_of_telling(path, caller->who(), *api->directory))
+            co_return to_response(*hidden);
+    }
     if (wait) {
         const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(*wait).count();
         response.headers.emplace_back("Preference-Applied", "wait=" + std::to_string(seconds));

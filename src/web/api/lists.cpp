@@ -13,6 +13,8 @@
 #include <memory>
 #include <utility>
 
+#include "sight.hpp"
+
 namespace panelgate::web {
 
 namespace json = boost::json;
@@ -89,6 +91,17 @@ Parsed<Items> item_of(const json::object& entry, const Directory& directory) {
     auto station = find_station(directory, *name);
     if (!station) return station.error();
     return item_of_table(std::move(*station), *table, static_cast<std::uint16_t>(*address));
+}
+
+Problem told_of(const json::object& entry, Problem why, const WhoRef& who,
+                const Directory& directory) {
+    const json::value* named = entry.if_contains(names_point(entry) ? "point" : "station");
+    if (named == nullptr || !named->is_string()) return why;
+    const std::string name(named->as_string());
+    const std::size_t slash = std::min(name.find('/'), name.size());
+    const std::string point = slash == name.size() ? "" : name.substr(slash + 1);
+    return instead_of_telling(name.substr(0, slash), point, who, directory)
+        .value_or(std::move(why));
 }
 
 Problem in_entry(std::size_t index, Problem problem) {

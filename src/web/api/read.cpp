@@ -81,7 +81,7 @@ Parsed<BatchRead> read_of(const json::object& entry, const Api& api) {
 }
 
 /// A malformed entry fails the whole list; one that cannot be read is reported in its place.
-Parsed<std::vector<BatchRead>> reads_of(std::string_view body, const Api& api) {
+Parsed<std::vector<BatchRead>> reads_of(std::string_view body, const WhoRef& who, const Api& api) {
     const auto entries = entries_of(body, api.providers.settings.max_items);
     if (!entries) return entries.error();
     std::vector<BatchRead> reads;
@@ -89,6 +89,7 @@ Parsed<std::vector<BatchRead>> reads_of(std::string_view body, const Api& api) {
     const std::size_t most = api.providers.settings.max_values;
     for (const json::object& entry : *entries) {
         auto read = read_of(entry, api);
+        if (!read) read = told_of(entry, read.error(), who, *api.directory);
         if (!read && read.error().status == 400) return in_entry(reads.size(), read.error());
         if (read) {
             values += read->items.span.count;
@@ -140,7 +141,7 @@ const std::string* line_of(const BatchRead& read) {
 }  // namespace
 
 Handling post_read(HttpRequest request, const Api* api) {
-    auto reads = reads_of(request.body, *api);
+    auto reads = reads_of(request.body, request.caller->who(), *api);
     if (!reads) co_return to_response(reads.error());
     unsigned transactions = 0;
     std::vector<boost::asio::awaitable<void>> lines;

@@ -235,6 +235,7 @@ void Reading::take(const bus::Answer& answer, const modbus::Span& span) {
 
 namespace {
 
+/// For a plan: what is sent is judged by its bus, and counted there.
 bool is_refused_here(const Caller& caller, const StationEntry& station, const modbus::Span& span) {
     const bus::Request request{
         .station = station.id, .request = modbus::Request::read(span), .who = caller.who()};
@@ -417,7 +418,8 @@ bool is_in_vain(const Plan& plan, const points::PlannedRead& read) {
 
 void settle(Plan& plan, const points::PlannedRead& read, const bus::Answer& answer) {
     const auto failed = problem_of(answer, *plan.entries.front()->items.station.profile);
-    if (failed && is_refused(answer) && halve(plan, read)) return;
+    // Rules may have changed since it was planned.
+    if (failed && (is_refused(answer) || answer.refusal) && halve(plan, read)) return;
     Reading got;
     if (!failed) got.take(answer, read.span);
     for (const std::size_t want : read.wants) {

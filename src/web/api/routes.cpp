@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <boost/json/object.hpp>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -97,6 +98,15 @@ Right right_for(const Row& row) {
     return row.pattern.ends_with("/discover") ? Right::discover : Right::simulator;
 }
 
+/// Who may do something is told how it went.
+std::optional<Right> other_right_for(const Row& row) {
+    if (row.needed != kSee) return std::nullopt;
+    if (row.pattern.ends_with("/discover")) return Right::discover;
+    if (row.pattern.ends_with("/simulator/{}")) return Right::simulator;
+    if (row.pattern.ends_with("/reload")) return Right::reload;
+    return std::nullopt;
+}
+
 std::vector<std::string_view> words_of(std::string_view text) {
     std::vector<std::string_view> words;
     while (!text.empty()) {
@@ -116,7 +126,7 @@ std::vector<Route> routes(std::shared_ptr<const Api> api) {
             return conduct(std::move(request), api.get(), row.handler, row.policy);
         };
         made.push_back({row.verb, row.pattern, row.needed, call, words_of(row.queries), row.probe,
-                        right_for(row)});
+                        right_for(row), other_right_for(row)});
     }
     return made;
 }

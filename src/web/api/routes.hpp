@@ -22,7 +22,7 @@ struct Api {
     std::shared_ptr<KeyBook> keys;  ///< never null
     /// What is served now: for what outlives a reload. Never null.
     std::shared_ptr<const std::shared_ptr<const Directory>> current;
-    /// The answers of get_configuration(), by the client's role. Never null.
+    /// The answers of get_configuration(), by the client's role and what it sees. Never null.
     std::shared_ptr<std::map<std::string, std::shared_ptr<KeptAnswer>>> configuration;
 };
 using Handler = Handling (*)(HttpRequest request, const Api* api);

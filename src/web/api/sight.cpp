@@ -31,24 +31,33 @@ void hide_relay(std::string& text) {
                behind == text.npos ? behind : behind - at - kRelay.size() + 1);
 }
 
-/// The rule that hides something of the station.
-std::string denying_rule(const LineEntry& line, const WhoRef& who, std::uint8_t id) {
+/// What hides something of the station.
+access::Verdict hiding(const LineEntry& line, const WhoRef& who, std::uint8_t id) {
     for (const modbus::Table table : modbus::kTables) {
         const Span all{table, 0, modbus::kTableItems};
         const auto verdict =
             line.access->judge(who, id, Act::read, modbus::read_function(table), all);
-        if (!verdict.allowed) return std::string(verdict.rule_name());
+        if (!verdict.allowed) return verdict;
     }
-    return std::string(access::kDefaultRule);
+    return {.allowed = false};
 }
 
 /// Counts it as a denial, too.
 Problem denied(const LineEntry& line, const WhoRef& who, std::uint8_t id,
                const std::string& station) {
-    std::string rule = denying_rule(line, who, id);
-    line.bus->count_denied(rule);
-    return problem_of(bus::Refusal{bus::Rule::denied, station,
-                                   modbus::ExceptionCode::illegal_function, std::move(rule)});
+    const access::Verdict verdict = hiding(line, who, id);
+    line.bus->count_denied(verdict.rule_name());
+    return problem_of(bus::denial(verdict, station));
+}
+
+/// Who changes something by a right that is not reading, where that right is enough for what it
+/// names: as far as rules let him see it.
+WhoRef as_reader(const HttpRequest& request, Right right) {
+    const WhoRef& who = request.caller->who();
+    if (!who->standing.own || !who->standing.may(right)) return who;
+    Who reader = *who;
+    reader.standing.own->rights.add(Right::read);
+    return make_who(std::move(reader));
 }
 
 }  // namespace
@@ -58,8 +67,14 @@ bool Sight::everything() const {
                                [&](const LineEntry& line) { return whole(line); });
 }
 
+/// A role of the configuration may be without.
+bool Sight::reads() const {
+    return !who_ || !who_->standing.own || who_->standing.may(Right::read);
+}
+
 bool Sight::line(const LineEntry& line) const {
-    if (!line.access || line.access->is_open()) return true;
+    if (!line.access || !reads()) return reads();
+    if (line.access->is_open()) return true;
     bool listed = false;
     for (const StationEntry& one : directory_.stations) {
         if (one.line != line.name) continue;
@@ -70,7 +85,8 @@ bool Sight::line(const LineEntry& line) const {
 }
 
 bool Sight::whole(const LineEntry& line) const {
-    if (!line.access || line.access->is_open()) return true;
+    if (!line.access || !reads()) return reads();
+    if (line.access->is_open()) return true;
     const bool listed = std::ranges::all_of(directory_.stations, [&](const StationEntry& one) {
         return one.line != line.name || whole(line, one.id);
     });
@@ -97,6 +113,27 @@ bool Sight::point(const StationEntry& station, const points::Point& point) const
         ->judge(who_, station.id, Act::read, modbus::read_function(point.table),
                 Span{point.table, point.address, point.count()})
         .allowed;
+}
+
+bool Sight::concerns(const StationEntry& one, std::string_view name) const {
+    const LineEntry* on = directory_.find_line(one.line);
+    if (on == nullptr || !on->access) return true;
+    const points::Point* named = nullptr;
+    if (one.points != nullptr && !name.empty()) {
+        const auto& all = one.points->points();
+        const auto found = std::ranges::find(all, name, &points::Point::name);
+        if (found != all.end()) named = &*found;
+    }
+    if (named == nullptr)
+        return station(*on, one.id) || on->access->may_some(who_, one.id, Act::write);
+    const Span items{named->table, named->address, named->count()};
+    const auto writes = [&](std::uint8_t function) {
+        return on->access->judge(who_, one.id, Act::write, function, items).allowed;
+    };
+    const bool bits = modbus::is_bit_table(named->table);
+    return point(one, *named) ||
+           writes(bits ? modbus::kWriteMultipleCoils : modbus::kWriteMultipleRegisters) ||
+           writes(bits ? modbus::kWriteSingleCoil : modbus::kWriteSingleRegister);
 }
 
 const StationEntry* Sight::find(std::string_view line, std::string_view station) const {
@@ -164,16 +201,17 @@ namespace {
 
 /// /api/v1/lines/{line}/...
 std::optional<Problem> check_line(const HttpRequest& request, const Directory& directory,
-                                  const Sight& sight) {
+                                  const WhoRef& who) {
     const LineEntry* line = directory.find_line(request.path[3]);
-    if (line == nullptr || request.method == "POST") return std::nullopt;
     const bool discovers = request.path.size() > 4 && request.path[4] == "discover";
+    if (line == nullptr || (request.method == "POST" && !discovers)) return std::nullopt;
+    const Sight sight(directory, discovers ? as_reader(request, Right::discover) : who);
     if (discovers ? sight.whole(*line) : sight.line(*line)) return std::nullopt;
     const auto hidden = std::ranges::find_if(directory.stations, [&](const StationEntry& one) {
         return one.line == line->name && !sight.whole(*line, one.id);
     });
     const bool none = hidden == directory.stations.end();
-    return denied(*line, request.caller->who(), none ? kUnlisted : hidden->id, "");
+    return denied(*line, sight.who(), none ? kUnlisted : hidden->id, "");
 }
 
 /// What the gateway knows of a station; what is asked of the panel is judged by its bus.
@@ -194,7 +232,7 @@ std::optional<Problem> check_station(const HttpRequest& request, const Directory
         if (point != all.end()) seen = sight.point(*station, *point);
     }
     if (seen) return std::nullopt;
-    return denied(line, request.caller->who(), station->id, station->name);
+    return denied(line, sight.who(), station->id, station->name);
 }
 
 }  // namespace
@@ -202,12 +240,30 @@ std::optional<Problem> check_station(const HttpRequest& request, const Directory
 std::optional<Problem> check_sight(const HttpRequest& request, const Directory& directory) {
     const auto& path = request.path;
     if (path.size() < 4 || path[0] != "api" || !request.caller) return std::nullopt;
-    const Sight sight(directory, request.caller->who());
-    if (path[2] == "lines") return check_line(request, directory, sight);
+    if (path[2] == "lines") return check_line(request, directory, request.caller->who());
+    if (path[2] == "simulator")
+        return check_station(request, directory,
+                             Sight(directory, as_reader(request, Right::simulator)));
     const bool reads = request.method == "GET" || request.method == "HEAD";
-    if (path[2] == "simulator" || (path[2] == "stations" && reads))
-        return check_station(request, directory, sight);
+    if (path[2] == "stations" && reads)
+        return check_station(request, directory, Sight(directory, request.caller->who()));
     return std::nullopt;
+}
+
+std::optional<Problem> instead_of_telling(std::string_view station, std::string_view point,
+                                          const WhoRef& who, const Directory& directory) {
+    const auto one = directory.find_station(station);
+    if (!one || Sight(directory, who).concerns(*one, point)) return std::nullopt;
+    const LineEntry* on = directory.find_line(one->line);
+    return denied(*on, who, one->id, one->name);
+}
+
+std::optional<Problem> instead_of_telling(const std::vector<std::string>& path, const WhoRef& who,
+                                          const Directory& directory) {
+    if (path.size() < 5 || path[0] != "api" || path[2] != "stations") return std::nullopt;
+    const bool names_point = path.size() > 5 && path[4] == "points";
+    return instead_of_telling(path[3], names_point ? std::string_view(path[5]) : "", who,
+                              directory);
 }
 
 namespace {

@@ -141,6 +141,15 @@ Parsed<modbus::Table> table_to_read(const Items& items) {
 
 namespace {
 
+std::string why_denied(const bus::Refusal& refusal) {
+    if (!refusal.lacking.empty())
+        return "the role '" + refusal.why + "' does not have the right " +
+               std::string(refusal.lacking);
+    if (refusal.why == access::kDefaultRule)
+        return "no rule of access allows it, and the default is deny";
+    return "the rule '" + refusal.why + "' of access denies it";
+}
+
 std::string detail_of(const bus::Refusal& refusal) {
     const std::string station = "station '" + refusal.station + "'";
     switch (refusal.rule) {
@@ -156,10 +165,7 @@ std::string detail_of(const bus::Refusal& refusal) {
             return "a write to " + station +
                    " could not be recorded: the audit's file takes nothing now";
         case bus::Rule::denied:
-            return (refusal.why == access::kDefaultRule
-                        ? "no rule of access allows it, and the default is deny"
-                        : "the rule '" + refusal.why + "' of access denies it") +
-                   std::string(refusal.station.empty() ? "" : " at " + station);
+            return why_denied(refusal);  // who asked by an address is not told a name
         case bus::Rule::function:
         case bus::Rule::quantity:
         case bus::Rule::range:

@@ -142,6 +142,8 @@ Parsed<std::vector<BatchWrite>> writes_of(const HttpRequest& request, const Api&
     std::vector<BatchWrite> writes;
     for (const json::object& entry : *entries) {
         auto writing = write_of(entry, *api.directory);
+        if (!writing)
+            writing = told_of(entry, writing.error(), request.caller->who(), *api.directory);
         if (!writing && writing.error().status == 400)
             return in_entry(writes.size(), writing.error());
         BatchWrite& write = writes.emplace_back();

@@ -56,7 +56,7 @@ bool has_same_right(const Caller& caller, const Settings& before, const Settings
     const auto was = in(before);
     const auto is = in(now);
     return was != before.tokens.end() && is != now.tokens.end() && was->hash == is->hash &&
-           was->role == is->role;
+           was->standing == is->standing;
 }
 
 }  // namespace
@@ -92,7 +92,7 @@ void dismiss(const std::string& listener, HttpSession& session, const std::strin
 
 void HttpListener::apply_roles(const Settings& before) {
     const Settings& now = shared_->site->settings;
-    const Standing anonymous = now.anonymous_standing();
+    const Standing& anonymous = now.anonymous;
     const Standing least = only_reading(anonymous);
     const auto sessions = sessions_;
     for (const auto& [id, session] : sessions) {

@@ -9,16 +9,14 @@
 namespace panelgate::web {
 
 void Caller::identify(std::string token, Standing standing, std::string listener) {
-    if (who_ && who_->token == token && who_->listener == listener &&
-        Standing{who_->role, who_->own_role} == standing)
+    if (who_ && who_->token == token && who_->listener == listener && who_->standing == standing)
         return;
     Who who = who_ ? *who_ : Who{.face = Face::http, .address = address_};
     who.name = "http";
     if (!address_.empty()) who.name += ' ' + address_;
     if (!token.empty()) who.name += " token " + token;
     who.token = std::move(token);
-    who.role = standing.role;
-    who.own_role = std::move(standing.own);
+    who.standing = std::move(standing);
     who.listener = std::move(listener);
     who_ = make_who(std::move(who));
 }

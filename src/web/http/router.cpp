@@ -160,8 +160,9 @@ bool is_foreign_form(const HttpRequest& request) {
 }
 
 /// Default roles have what the least one has that is needed; others have what they list.
-bool suffices(const Standing& standing, Role needed, Right right) {
-    return standing.own ? standing.may(right) : standing.role >= needed;
+bool suffices(const Standing& standing, Role needed, Right right, std::optional<Right> or_right) {
+    if (!standing.own) return standing.role >= needed;
+    return standing.may(right) || (or_right && standing.may(*or_right));
 }
 
 Problem insufficient(const Standing& standing, Role needed, Right right) {
@@ -185,12 +186,13 @@ std::optional<Standing> certified_standing(const HttpRequest& request) {
 }  // namespace
 
 std::optional<Problem> check_access(const HttpRequest& request, Role needed,
-                                    const Settings& settings, Right right) {
+                                    const Settings& settings, Right right,
+                                    std::optional<Right> or_right) {
     if (needed == Role::none) return std::nullopt;
     if (is_foreign_form(request)) return problem(415, "send the body as application/json");
     if (header(request, "authorization").empty()) {
         const Standing standing = standing_of(request, settings);
-        if (suffices(standing, needed, right)) return std::nullopt;
+        if (suffices(standing, needed, right, or_right)) return std::nullopt;
         // Who has shown a role is known: another role would help.
         const auto certified = certified_standing(request);
         if (certified && certified->own) return insufficient(standing, needed, right);
@@ -205,8 +207,8 @@ std::optional<Problem> check_access(const HttpRequest& request, Role needed,
     if (token == nullptr) return unauthorized("this token is not known");
     if (has_expired(*token, request))
         return unauthorized("this token has expired, on " + rfc3339(*token->expires));
-    if (!suffices(token->standing(), needed, right))
-        return insufficient(token->standing(), needed, right);
+    if (!suffices(token->standing, needed, right, or_right))
+        return insufficient(token->standing, needed, right);
     return std::nullopt;
 }
 
@@ -233,12 +235,12 @@ Standing only_reading(const Standing& anonymous) {
 Standing standing_of(const HttpRequest& request, const Settings& settings) {
     if (header(request, "authorization").empty()) {
         const auto certified = certified_standing(request);
-        if (!certified) return settings.anonymous_standing();
+        if (!certified) return settings.anonymous;
         if (certified->own || certified->role != Role::none) return *certified;
-        return only_reading(settings.anonymous_standing());
+        return only_reading(settings.anonymous);
     }
     const Token* token = valid_token_of(request, settings);
-    return token == nullptr ? Standing{} : token->standing();
+    return token == nullptr ? Standing{} : token->standing;
 }
 
 std::string token_name(const HttpRequest& request, const Settings& settings) {
@@ -362,7 +364,7 @@ asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, const 
     const Settings& settings = shared->site->settings;
     const Role needed = route->needed;
     if (needed == Role::none || !carries_token(*request))
-        co_return check_access(*request, needed, settings, route->right);
+        co_return check_access(*request, needed, settings, route->right, route->or_right);
     const std::string& address = request->caller->address();
     const Duration turn = shared->logins.turn(shared->site->now(), address);
     if (turn > Duration::zero()) shared->places.suspect(request->caller->id());
@@ -371,7 +373,7 @@ asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, const 
     // Hanging up must reveal nothing about the token.
     if (request->caller->has_left()) co_return std::nullopt;
     shared->places.busy(request->caller->id());
-    const auto refused = check_access(*request, needed, settings, route->right);
+    const auto refused = check_access(*request, needed, settings, route->right, route->or_right);
     // With a token, only an unknown one gives 401.
     const bool failed = refused && refused->status == 401;
     const Duration hold = shared->logins.hold(shared->site->now(), address);

@@ -13,9 +13,10 @@ namespace panelgate::web {
 /// Checks whether the request has the role. 401 for a wrong token, or for none where one would
 /// help; 403 for an insufficient role. A browser's request (Origin) that changes something must be
 /// application/json (415), which a foreign page cannot send unasked.
-/// `right`: what a role of the configuration has to have.
+/// `right`: what a role of the configuration has to have; `or_right`: what is enough for it, too.
 std::optional<Problem> check_access(const HttpRequest& request, Role needed,
-                                    const Settings& settings, Right right = Right::read);
+                                    const Settings& settings, Right right = Right::read,
+                                    std::optional<Right> or_right = std::nullopt);
 
 /// True if it carries a token, right or wrong; any other Authorization is no guess.
 bool carries_token(const HttpRequest& request);

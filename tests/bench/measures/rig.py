@@ -113,21 +113,21 @@ class LoggedLine(wire.PacedLine):
     and its stations answer at once."""
 
     def __init__(self, tools, folder, baud, faults=(), stations="1-8"):
-        self._log = pathlib.Path(folder) / f"log{id(self)}"
+        self.log_path = pathlib.Path(folder) / f"log{id(self)}"
         self.baud = baud
-        options = ["--log", str(self._log)] if baud else ["--turnaround", "0"]
+        options = ["--log", str(self.log_path)] if baud else ["--turnaround", "0"]
         for fault in faults:
             options += ["--fault", fault]
         super().__init__(tools, folder, baud, options, stations=stations)
 
     def frames(self, begin, end):
-        with open(self._log, encoding="ascii") as lines:
+        with open(self.log_path, encoding="ascii") as lines:
             complete = [line for line in lines if line.endswith("\n")]
         return figures.between(figures.parse_log(complete), begin, end)
 
     def __exit__(self, *_):
         super().__exit__()
-        self._log.unlink(missing_ok=True)
+        self.log_path.unlink(missing_ok=True)
 
 
 class TcpLine:

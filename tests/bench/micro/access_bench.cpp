@@ -33,7 +33,7 @@ void judge(benchmark::State& state) {
     const WhoRef who = make_who({.face = Face::modbus_tcp,
                                  .address = "10.0.0.7",
                                  .listener = "0.0.0.0:502",
-                                 .role = Role::operator_});
+                                 .standing = Role::operator_});
     const auto request = test::request_of({3, 0, 100, 0, 10});
     for (auto _ : state) {
         const Verdict verdict = rules.judge(who, 1, request);

@@ -21,9 +21,9 @@ const WhoRef kScada = make_who({.face = Face::modbus_tcp,
                                 .name = "modbus_tcp 10.0.0.7:5000",
                                 .address = "10.0.0.7",
                                 .listener = "0.0.0.0:502",
-                                .role = Role::operator_});
+                                .standing = Role::operator_});
 const WhoRef kBoss =
-    make_who({.face = Face::http, .address = "fd00::7", .token = "boss", .role = Role::admin});
+    make_who({.face = Face::http, .address = "fd00::7", .token = "boss", .standing = Role::admin});
 
 /// 100 to 199 of oven 20 may be written from 10.0.0.0/24, nothing else by operators.
 Settings contract() {
@@ -52,7 +52,7 @@ TEST(LineRules, WhatAnOwnRoleLacksIsRefusedUnderItsName) {
     OwnRole setter{.name = "setter"};
     setter.rights.add(Right::read);
     setter.rights.add(Right::write);
-    const WhoRef who = make_who({.role = Role::operator_, .own_role = setter});
+    const WhoRef who = make_who({.standing = {Role::operator_, setter}});
     Settings settings;
     settings.roles = {setter};
     EXPECT_EQ(refused(settings, who, 20, "06 0064 0001"_hex), "");
@@ -63,7 +63,7 @@ TEST(LineRules, WhatAnOwnRoleLacksIsRefusedUnderItsName) {
     EXPECT_EQ(rules.denying_names(), std::vector<std::string>{"setter"});
     OwnRole blind{.name = "blind"};
     blind.rights.add(Right::write);
-    const WhoRef writer = make_who({.role = Role::operator_, .own_role = blind});
+    const WhoRef writer = make_who({.standing = {Role::operator_, blind}});
     EXPECT_FALSE(rules.may_some(writer, 20, Act::read));
     EXPECT_FALSE(rules.may_read_some(writer));
     EXPECT_EQ(refused(settings, writer, 20, "17 0000 0001 0064 0001 02 0001"_hex), "blind");
@@ -207,7 +207,7 @@ TEST(LineRules, ConditionsOnWhoAsks) {
     }
     Rule lead = empty;
     lead.roles = {"line-lead"};
-    EXPECT_TRUE(is_about(lead, {.role = Role::viewer, .certificate_role = "line-lead"}));
+    EXPECT_TRUE(is_about(lead, {.standing = Role::viewer, .certificate_role = "line-lead"}));
     Rule near = empty;
     near.from = {{"::", 0}};
     EXPECT_FALSE(is_about(near, {.face = Face::mqtt})) << "it has no address";

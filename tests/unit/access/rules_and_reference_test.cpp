@@ -49,7 +49,7 @@ class Draw {
              .address = one_of<std::string>({"10.0.0.7", "10.0.1.7", "192.168.1.1", ""}),
              .listener = one_of<std::string>({"0.0.0.0:502", "[::]:80", ""}),
              .token = one_of<std::string>({"", "ops", "panel"}),
-             .role = one_of<Role>(
+             .standing = one_of<Role>(
                  {Role::none, Role::viewer, Role::operator_, Role::engineer, Role::admin}),
              .certificate_role = one_of<std::string>({"", "line-lead"})});
     }

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "arbiter_fixture.hpp"
-#include "panelgate/arbiter/outstanding.hpp"
+#include "panelgate/arbiter/outstanding_requests.hpp"
 #include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"

@@ -53,8 +53,8 @@ TEST_F(OutboxTest, AnAnswerSaysWhetherItsRequestWasEverSent) {
 }
 
 TEST_F(OutboxTest, UnlistedStationsShareOneAccount) {
-    outbox.on_unsolicited(now, frame_of(98), Outbox::Part::late, 17, 5ms);
-    outbox.on_unsolicited(now, frame_of(99), Outbox::Part::late, 17, 5ms);
+    outbox.on_unsolicited(now, frame_of(98), Done::late, 17, 5ms);
+    outbox.on_unsolicited(now, frame_of(99), Done::late, 17, 5ms);
     EXPECT_EQ(of(0).late_frames, 2u);
     EXPECT_EQ(of(17).late_frames, 0u);
     EXPECT_EQ(outbox.stations().size(), 3u) << "no stranger can add one";
@@ -64,7 +64,7 @@ TEST_F(OutboxTest, DamageInsideAnAttemptIsCountedWithTheAttempt) {
     const modbus::Unused damaged{modbus::Unused::Kind::damaged, 0, Bytes(3)};
     for (const bool inside : {true, false}) {
         outbox.inside_attempt(inside);
-        outbox.on_unsolicited(now, damaged, Outbox::Part::damaged, 17);
+        outbox.on_unsolicited(now, damaged, Done::damaged, 17);
         EXPECT_EQ(of(17).symptoms.strays, inside ? 0u : 1u);
     }
     EXPECT_EQ(of(17).discarded_bytes, 6u) << "its bytes are, in both";

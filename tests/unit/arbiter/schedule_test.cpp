@@ -170,11 +170,11 @@ TEST_F(ScheduleTest, P9AWriteIsNotHeldBackByAReadWhoseHostHasOtherReads) {
     wait_of_host(1, false, kGreedy);
     wait_of_host(1, true, kGreedy + 1);
     for (int i = 0; i < Station::kWritesInARow; ++i)
-        stations.of(1).on_asked(now, test::group_of(1, "06 00 01 00 01"_hex));
+        stations.of(1).on_asked(stations.book(), now, test::group_of(1, "06 00 01 00 01"_hex));
     std::string asked;
     while (const auto group = next().group) {
         if (group->station == 1) asked += group->request.is_read() ? "r" : "w";
-        stations.of(group->station).on_asked(now, *group);
+        stations.of(group->station).on_asked(stations.book(), now, *group);
         if (asked.ends_with('w')) break;
         asked += '.';
         ASSERT_LT(asked.size(), 8u) << asked;
@@ -193,10 +193,10 @@ TEST_F(ScheduleTest, NothingElseGoesToAStationBeforeItsRetry) {
 TEST_F(ScheduleTest, P1AStationWithAnOutstandingReplyIsPassedOver) {
     wait(1);
     wait(2);
-    stations.of(1).requests().on_unanswered(now, read_of(9999), now - 500ms);
+    stations.of(1).replies().on_unanswered(stations.book(), now, read_of(9999), now - 500ms);
     EXPECT_EQ(order(), "2");
-    EXPECT_EQ(schedule.next_start(stations, quiet), stations.of(1).requests().rested());
-    now = stations.of(1).requests().rested();
+    EXPECT_EQ(schedule.next_start(stations, quiet), stations.of(1).replies().rested());
+    now = stations.of(1).replies().rested();
     EXPECT_EQ(order(), "1");
 }
 
@@ -244,16 +244,16 @@ TEST_F(ScheduleTest, P1OnALineThatMayStallOutstandingRepliesNeedAReopening) {
     settings.may_stall = true;
     rebuild();
     wait(1);
-    stations.of(1).requests().on_unanswered(now, read_of(9999), now - 500ms);
-    now = stations.of(1).requests().rested();
+    stations.of(1).replies().on_unanswered(stations.book(), now, read_of(9999), now - 500ms);
+    now = stations.of(1).replies().rested();
     EXPECT_TRUE(next().reopen);
-    schedule.on_transport_opened(now);
+    stations.book().on_opened(now);
     const auto proof = next();
     ASSERT_TRUE(proof.group) << "a connection proves nothing";
     EXPECT_TRUE(proof.group->probe);
     EXPECT_NE(proof.group->request.reply_length(), test::request_of(read_of(9999)).reply_length())
         << "no reply to one is one to the other";
-    schedule.on_transport_proved(now);
+    stations.book().on_proved(now);
     const auto proved = next();
     EXPECT_FALSE(proved.reopen) << "something that was sent later has been answered";
     ASSERT_TRUE(proved.group);
@@ -263,13 +263,13 @@ TEST_F(ScheduleTest, P1OnALineThatMayStallOutstandingRepliesNeedAReopening) {
 TEST_F(ScheduleTest, P1TheWholeLineRestsWhereTheConfigurationSaysSo) {
     const Group group = failed(1);
     Station& station = stations.of(1);
-    station.requests().on_unanswered(now, group.request.pdu(), now - 500ms);
+    station.replies().on_unanswered(stations.book(), now, group.request.pdu(), now - 500ms);
     EXPECT_FALSE(schedule.line_rests_until(now, group, now - 500ms, station))
         << "its replies have never been late";
     settings.quarantine = Quarantine::line;
     rebuild();
     EXPECT_EQ(schedule.line_rests_until(now, group, now - 500ms, station),
-              station.requests().rested());
+              station.replies().rested());
     Group probe = group;
     probe.probe = true;
     EXPECT_FALSE(schedule.line_rests_until(now, probe, now - 500ms, station))

@@ -27,7 +27,11 @@ const Bytes kOtherValue = "03 02 02 2C"_hex;
 const Bytes kThirdValue = "03 02 02 2D"_hex;
 const Bytes kLongReply = "03 06 00 01 00 02 00 03"_hex;
 
-Station station(bool listed) { return {StationSettings{}, OfflineSettings{}, listed}; }
+Station station(bool listed) {
+    StationSettings settings;
+    settings.id = kId;
+    return {settings, OfflineSettings{}, listed};
+}
 
 class StationTest : public testing::Test {
   protected:
@@ -35,7 +39,7 @@ class StationTest : public testing::Test {
     void answer(Group group, const Bytes& reply) {
         now_ += 1s;
         const auto attempt = test::answered(now_ - 30ms, now_, std::move(group), reply);
-        station_.on_reply(now_, attempt, 30ms, 25ms);
+        station_.on_reply(book_, now_, attempt, 30ms, 25ms);
     }
     void answer(const Bytes& request, const Bytes& reply) { answer(group_of(kId, request), reply); }
     /// A request was not answered.
@@ -43,16 +47,34 @@ class StationTest : public testing::Test {
         const TimePoint sent = now_;
         now_ += kTimeout;
         station_.on_failed(now_, verdict, kTimeout);
-        station_.requests().on_unanswered(now_, request, sent);
+        station_.replies().on_unanswered(book_, now_, request, sent);
     }
     /// This request is sent, for the first time or again.
     bool may_ask(TimePoint now, const Bytes& pdu) const {
-        return now >= station_.requests().clear_at(test::request_of(pdu), true);
+        return now >= station_.replies().clear_at(book_, test::request_of(pdu), true);
     }
     Duration patience(const Bytes& request) const {
         return station_.patience(group_of(kId, request), std::nullopt, false);
     }
 
+    struct Heard : Station::Heard {
+        Done done = Done::unasked;
+    };
+    /// A good frame comes that answers no open request; `asked`: one is on the wire.
+    Heard hear(TimePoint now, const Bytes& pdu, bool asked = false) {
+        const Done done = judged(now, pdu);
+        return {station_.on_unsolicited_frame(book_, now, done, pdu, asked), done};
+    }
+    /// It may answer an earlier request that is closed, rather than the open one.
+    bool may_have_passed(const Bytes& pdu, const Bytes& open) const {
+        const OutstandingRequests::Windows all;
+        return book_.claims(now_, kId, pdu, all, open).passed;
+    }
+    Done judged(TimePoint now, const Bytes& pdu) const {
+        return judge(station_.replies().facts(book_, now, pdu));
+    }
+
+    OutstandingRequests book_;
     Station station_ = station(true);
     TimePoint now_{1h};
 };
@@ -60,30 +82,30 @@ class StationTest : public testing::Test {
 TEST_F(StationTest, P1WithAnOutstandingReplyOnlyTheVerySameMayBeAskedUntilItHasRested) {
     EXPECT_TRUE(may_ask(now_, kOther));
     miss(kRead);
-    const TimePoint rested = station_.requests().rested();
+    const TimePoint rested = station_.replies().rested();
     EXPECT_GE(rested, now_ + kTimeout) << "so much later it may still come";
     EXPECT_TRUE(may_ask(now_, kRead));
     EXPECT_FALSE(may_ask(rested - 1ns, kOther));
-    station_.on_asked(rested - 1ns, group_of(kId, kRead));
-    EXPECT_TRUE(station_.requests().any());
+    station_.on_asked(book_, rested - 1ns, group_of(kId, kRead));
+    EXPECT_TRUE(book_.any(kId));
     EXPECT_TRUE(may_ask(rested, kOther));
-    station_.on_asked(rested, group_of(kId, kOther));
-    EXPECT_FALSE(station_.requests().any()) << "it has lapsed";
+    station_.on_asked(book_, rested, group_of(kId, kOther));
+    EXPECT_FALSE(book_.any(kId)) << "it has lapsed";
 }
 
 TEST_F(StationTest, P1EachAttemptHasAnOutstandingReplyAndTheLastOneThatComesEndsTheRest) {
     miss(kRead);
     miss(kRead);
     answer(group_of(kId, kRead, 3), kReply);  // to which of the three is unknown
-    const auto first = station_.on_unsolicited_frame(now_ + 10ms, kOtherValue);
-    EXPECT_EQ(first.claim, Claim::late);
+    const auto first = hear(now_ + 10ms, kOtherValue);
+    EXPECT_EQ(first.done, Done::late);
     EXPECT_EQ(first.lateness, Duration(0)) << "what can no longer come makes no other look late";
     EXPECT_FALSE(first.settled);
     EXPECT_FALSE(may_ask(now_ + 10ms, kOther));
-    const auto second = station_.on_unsolicited_frame(now_ + 20ms, kThirdValue);
-    EXPECT_EQ(second.claim, Claim::late);
+    const auto second = hear(now_ + 20ms, kThirdValue);
+    EXPECT_EQ(second.done, Done::late);
     EXPECT_TRUE(second.settled);
-    EXPECT_FALSE(station_.requests().any());
+    EXPECT_FALSE(book_.any(kId));
     EXPECT_TRUE(may_ask(now_ + 20ms, kOther));
 }
 
@@ -91,34 +113,34 @@ TEST_F(StationTest, P1EachAttemptHasAnOutstandingReplyAndTheLastOneThatComesEnds
 TEST_F(StationTest, P1AfterADamagedReplyTheRetrysReplyOfALateStationIsOutstanding) {
     const auto repeat = [&] {
         now_ += 2s;
-        station_.on_asked(now_, group_of(kId, kRead));
-        station_.requests().on_damaged_reply(now_, test::request_of(kRead), now_ - 30ms);
+        station_.on_asked(book_, now_, group_of(kId, kRead));
+        station_.replies().on_damaged_reply(book_, now_, test::request_of(kRead), now_ - 30ms);
         now_ += 60ms;
         const auto attempt =
             test::answered(now_ - 30ms, now_, group_of(kId, kRead, 2), kOtherValue);
-        station_.on_reply(now_, attempt, 30ms, 25ms);
+        station_.on_reply(book_, now_, attempt, 30ms, 25ms);
     };
     repeat();
     EXPECT_TRUE(may_ask(now_ + 150ms, kOther)) << "it has never been late";
     for (int i = 0; i < 2; ++i) {
         now_ += 2s;
         miss(kRead);
-        station_.on_unsolicited_frame(now_ + 50ms, kReply);
+        hear(now_ + 50ms, kReply);
     }
-    EXPECT_GT(station_.requests().worst_lateness(), Duration(0));
+    EXPECT_GT(station_.replies().worst_lateness(), Duration(0));
     repeat();
-    EXPECT_TRUE(station_.requests().any());
+    EXPECT_TRUE(book_.any(kId));
     EXPECT_FALSE(may_ask(now_ + kTimeout, kOther));
 }
 
 TEST_F(StationTest, P1ARepetitionOfThePreviousReplyMayBeADuplicateAndTheOutstandingOneStillComes) {
     miss(kRead);
     answer(group_of(kId, kRead, 2), kReply);
-    const auto same = station_.on_unsolicited_frame(now_ + 20ms, kReply);
-    EXPECT_EQ(same.claim, Claim::late) << "as a rule";
+    const auto same = hear(now_ + 20ms, kReply);
+    EXPECT_EQ(same.done, Done::late) << "as a rule";
     EXPECT_FALSE(same.settled);
-    EXPECT_TRUE(station_.requests().any());
-    const auto other = station_.on_unsolicited_frame(now_ + 40ms, kOtherValue);
+    EXPECT_TRUE(book_.any(kId));
+    const auto other = hear(now_ + 40ms, kOtherValue);
     EXPECT_TRUE(other.settled);
     EXPECT_TRUE(may_ask(now_ + 40ms, kOther)) << "duplicates are not its habit yet";
 }
@@ -127,7 +149,7 @@ TEST_F(StationTest, P1ADuplicateAmidDamagedBytesShowsThatTheStationSendsTwice) {
     answer(kRead, kReply);
     const Bytes adu = modbus::encode_adu(kId, kReply);
     const Bytes heard = Writer().raw("23 03"_hex).raw(adu).u8(7).take();
-    station_.requests().on_damaged_bytes(now_ + 20ms, kId, heard);
+    station_.replies().on_damaged_bytes(book_, now_ + 20ms, heard, modbus::CrcOrder::low_first);
     answer(kOther, kOtherValue);
     EXPECT_FALSE(may_ask(now_ + 20ms, kOther));
     EXPECT_TRUE(may_ask(now_ + 100ms, kOther));
@@ -137,28 +159,28 @@ TEST_F(StationTest, P1ADuplicateDetectedAfterTheReplyThatItPrecededMakesTheStati
     answer(kRead, kReply);
     answer(kOther, kOtherValue);
     EXPECT_TRUE(may_ask(now_ + 10ms, kRead));
-    station_.on_unsolicited_frame(now_ + 20ms, kOtherValue);
+    hear(now_ + 20ms, kOtherValue);
     EXPECT_FALSE(may_ask(now_ + 20ms, kRead));
 }
 
 TEST_F(StationTest, P1WhereTheLineMayStallOnlyALaterRequestThatWasAnsweredProvesThatOneHasPassed) {
     const TimePoint sent = now_;
     miss(kRead);
-    EXPECT_TRUE(station_.requests().any_since(TimePoint{}));
-    EXPECT_TRUE(station_.requests().any_since(sent));
-    EXPECT_FALSE(station_.requests().any_since(sent + 1ns));
-    const TimePoint rested = station_.requests().rested();
+    EXPECT_TRUE(book_.any_since(kId, TimePoint{}));
+    EXPECT_TRUE(book_.any_since(kId, sent));
+    EXPECT_FALSE(book_.any_since(kId, sent + 1ns));
+    const TimePoint rested = station_.replies().rested();
     now_ = rested + 1h;
-    station_.requests().on_proved(now_, sent - 1ns);
-    EXPECT_EQ(station_.requests().rested(), rested) << "that one had left before";
-    station_.requests().on_proved(now_, sent + 1ns);
-    EXPECT_GE(station_.requests().rested(), now_ + kTimeout)
+    station_.replies().on_proved(book_, now_, sent - 1ns);
+    EXPECT_EQ(station_.replies().rested(), rested) << "that one had left before";
+    station_.replies().on_proved(book_, now_, sent + 1ns);
+    EXPECT_GE(station_.replies().rested(), now_ + kTimeout)
         << "it may have reached the station only now";
 }
 
 TEST_F(StationTest, P5AReplyThatCameDamagedIsNotOutstandingButSomeResendIt) {
-    station_.requests().on_damaged_reply(now_, test::request_of(kRead), now_);
-    EXPECT_FALSE(station_.requests().any());
+    station_.replies().on_damaged_reply(book_, now_, test::request_of(kRead), now_);
+    EXPECT_FALSE(book_.any(kId));
     EXPECT_TRUE(may_ask(now_, kRead));
     EXPECT_FALSE(may_ask(now_, kOther));
     answer(group_of(kId, kRead, 2), kReply);
@@ -170,7 +192,7 @@ TEST_F(StationTest, P4AProbeWaitsAsLongAsMostRepliesTakeAndNowAndThenAsLongAsAny
     for (int i = 0; i < 20; ++i) answer(kRead, kReply);
     now_ += 1s;
     const auto slow = test::answered(now_ - 450ms, now_, group_of(kId, kRead), kReply);
-    station_.on_reply(now_, slow, 450ms, 445ms);  // once, when a network hung
+    station_.on_reply(book_, now_, slow, 450ms, 445ms);  // once, when a network hung
     while (!station_.health().offline()) {
         miss(kRead);
         station_.on_given_up(now_, Fault::timeout);
@@ -186,18 +208,18 @@ TEST_F(StationTest, P4AProbeWaitsAsLongAsMostRepliesTakeAndNowAndThenAsLongAsAny
 }
 
 TEST_F(StationTest, ClassifiesAnUnsolicitedFrameAndChangesNothingByThat) {
-    EXPECT_EQ(station_.requests().claim_of(now_, kReply), Claim::unasked);
+    EXPECT_EQ(judged(now_, kReply), Done::unasked);
     answer(kRead, kReply);
     for (int i = 0; i < 3; ++i) {
-        EXPECT_EQ(station_.requests().claim_of(now_ + 20ms, kReply), Claim::duplicate);
-        EXPECT_EQ(station_.requests().claim_of(now_ + 20ms, "03 02 00 00"_hex), Claim::second);
-        EXPECT_EQ(station_.requests().claim_of(now_ + 20ms, kLongReply), Claim::unasked);
-        EXPECT_EQ(station_.requests().claim_of(now_ + 1min, kReply), Claim::unasked);
+        EXPECT_EQ(judged(now_ + 20ms, kReply), Done::duplicate);
+        EXPECT_EQ(judged(now_ + 20ms, "03 02 00 00"_hex), Done::second);
+        EXPECT_EQ(judged(now_ + 20ms, kLongReply), Done::unasked);
+        EXPECT_EQ(judged(now_ + 1min, kReply), Done::unasked);
     }
     miss(kLong);
-    EXPECT_EQ(station_.requests().claim_of(now_, kLongReply), Claim::late);
-    EXPECT_EQ(station_.requests().claim_of(now_, kLongReply), Claim::late);
-    EXPECT_TRUE(station_.requests().any());
+    EXPECT_EQ(judged(now_, kLongReply), Done::late);
+    EXPECT_EQ(judged(now_, kLongReply), Done::late);
+    EXPECT_TRUE(book_.any(kId));
 }
 
 TEST_F(StationTest, P4OneThatHasFallenSilentIsNotRetriedAndWaitedForAsLongAsItHasEverNeeded) {
@@ -261,7 +283,7 @@ TEST_F(StationTest, P4HalfOfTheLastAttemptsInVainMakeItFlakyAndLateRepliesDoNotM
     for (int i = 0; i < Station::kFlaky; ++i) {
         EXPECT_FALSE(station_.flaky());
         miss(kRead);
-        station_.on_unsolicited_frame(now_ + 100ms, kReply);
+        hear(now_ + 100ms, kReply);
     }
     EXPECT_TRUE(station_.flaky());
     EXPECT_LT(station_.patience(group_of(kId, kRead), std::nullopt, false, true), kTimeout / 2);
@@ -273,18 +295,18 @@ TEST_F(StationTest, P4HalfOfTheLastAttemptsInVainMakeItFlakyAndLateRepliesDoNotM
 
 TEST_F(StationTest, OnlyAnUnheardStationIsForgottenWhenNotWantedForAMinute) {
     Station unheard = station(false);
-    unheard.on_asked(now_, group_of(kId, kRead));
-    station_.on_asked(now_, group_of(kId, kRead));
-    EXPECT_FALSE(unheard.forgettable(now_ + timing::kForgetUnheard - 1ns));
-    EXPECT_TRUE(unheard.forgettable(now_ + timing::kForgetUnheard));
-    EXPECT_FALSE(station_.forgettable(now_ + 1h));
+    unheard.on_asked(book_, now_, group_of(kId, kRead));
+    station_.on_asked(book_, now_, group_of(kId, kRead));
+    EXPECT_FALSE(unheard.forgettable(book_, now_ + timing::kForgetUnheard - 1ns));
+    EXPECT_TRUE(unheard.forgettable(book_, now_ + timing::kForgetUnheard));
+    EXPECT_FALSE(station_.forgettable(book_, now_ + 1h));
     unheard.on_wanted(now_ + 30s);
-    EXPECT_FALSE(unheard.forgettable(now_ + timing::kForgetUnheard));
-    EXPECT_TRUE(unheard.forgettable(now_ + 30s + timing::kForgetUnheard));
-    unheard.requests().on_unanswered(now_, kRead, now_);
-    EXPECT_FALSE(unheard.forgettable(now_ + 1h)) << "a reply is outstanding";
-    unheard.on_unsolicited_frame(now_ + 1s, kReply);
-    EXPECT_FALSE(unheard.forgettable(now_ + 1h)) << "it was heard";
+    EXPECT_FALSE(unheard.forgettable(book_, now_ + timing::kForgetUnheard));
+    EXPECT_TRUE(unheard.forgettable(book_, now_ + 30s + timing::kForgetUnheard));
+    unheard.replies().on_unanswered(book_, now_, kRead, now_);
+    EXPECT_FALSE(unheard.forgettable(book_, now_ + 1h)) << "a reply is outstanding";
+    unheard.on_unsolicited_frame(book_, now_ + 1s, Done::late, kReply);
+    EXPECT_FALSE(unheard.forgettable(book_, now_ + 1h)) << "it was heard";
 }
 
 /// Reads go another way than writes inside some panels: one that is answered after a later write
@@ -293,35 +315,32 @@ TEST_F(StationTest, P1WhoAnswersOutOfOrderIsBelievedNoOrderAndDrains) {
     miss(kRead);
     now_ += 100ms;
     const auto write = test::answered(now_ - 30ms, now_, group_of(kId, kWrite), kWrite);
-    station_.on_reply(now_, write, 30ms, 25ms);
-    EXPECT_FALSE(station_.requests().any()) << "it serves in order, as far as is known";
-    const auto request = test::request_of(kOther);
-    EXPECT_TRUE(station_.requests().may_answer_closed(now_, kReply, request));
-    EXPECT_FALSE(station_.requests().may_answer_closed(now_, kReply, test::request_of(kRead)))
-        << "its own earlier attempt may answer it";
+    station_.on_reply(book_, now_, write, 30ms, 25ms);
+    EXPECT_FALSE(book_.any(kId)) << "it serves in order, as far as is known";
+    EXPECT_TRUE(may_have_passed(kReply, kOther));
+    EXPECT_FALSE(may_have_passed(kReply, kRead)) << "its own earlier attempt may answer it";
     now_ += 100ms;
-    EXPECT_EQ(station_.on_unsolicited_frame(now_, kReply, true).claim, Claim::late);
+    EXPECT_EQ(hear(now_, kReply, true).done, Done::disorder);
     EXPECT_FALSE(may_ask(now_, kOther)) << "answers are one behind";
     EXPECT_FALSE(may_ask(now_, kLong));
-    now_ = station_.requests().rested();
+    now_ = station_.replies().rested();
     EXPECT_TRUE(may_ask(now_, kOther));
     miss(kRead);
     answer(kWrite, kWrite);
-    EXPECT_TRUE(station_.requests().any()) << "a later answer proves nothing";
-    EXPECT_FALSE(station_.may_prove());
+    EXPECT_TRUE(book_.any(kId)) << "a later answer proves nothing";
+    EXPECT_FALSE(station_.may_prove(book_));
 }
 
 TEST_F(StationTest, P8ABroadcastIsAwaitedAsLongAsItsAnswerHasTaken) {
-    BroadcastReplies broadcasts;
-    broadcasts.on_sent(now_, kWrite);
-    const auto delay = broadcasts.delay_of(now_ + 1s, kWrite);
+    book_.on_broadcast(now_, kWrite);
+    const auto delay = book_.behind_broadcast(now_ + 1s, kWrite);
     ASSERT_EQ(delay, Duration(1s));
-    station_.requests().on_broadcast_answered(*delay, true);
+    station_.replies().on_broadcast_answered(*delay, true);
     EXPECT_GT(station_.broadcast_window(), *delay);
     const auto other = test::request_of("06 00 09 00 07"_hex);
-    EXPECT_EQ(broadcasts.over(other, 1s), TimePoint{});
-    EXPECT_EQ(broadcasts.over(other, 1s, true), now_ + 1s) << "any may have its exception";
-    EXPECT_EQ(broadcasts.delay_of(now_ + timing::kLatestBroadcastAnswer, kWrite), std::nullopt);
+    EXPECT_EQ(book_.broadcasts_over(other, 1s, false), TimePoint{});
+    EXPECT_EQ(book_.broadcasts_over(other, 1s, true), now_ + 1s) << "any may have its exception";
+    EXPECT_EQ(book_.behind_broadcast(now_ + timing::kLatestBroadcastAnswer, kWrite), std::nullopt);
 }
 
 /// One silent or damaged transaction, without a retry.

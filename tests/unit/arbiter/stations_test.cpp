@@ -36,7 +36,8 @@ class StationsTest : public testing::Test {
         now_ += 1s;
         const auto attempt = test::answered(now_ - 30ms, now_, test::group_of(id, kRead), kReply);
         stations_.on_reply(now_, 30ms);
-        if (stations_.of(id).on_reply(now_, attempt, 30ms, 25ms).back) stations_.on_recovery();
+        if (stations_.of(id).on_reply(stations_.book(), now_, attempt, 30ms, 25ms).back)
+            stations_.on_recovery();
     }
     /// It fails until it is offline; each attempt costs `cost`.
     void kill(std::uint8_t id, Duration cost) {

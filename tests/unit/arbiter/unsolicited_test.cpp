@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "panelgate/base/words.hpp"
+#include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
@@ -71,7 +72,7 @@ TEST_F(UnsolicitedFramesTest, AreClassifiedAndCounted) {
     EXPECT_EQ(heard(encode_adu(18, kRead)), "foreign request") << "another master's";
     EXPECT_EQ(counters().symptoms.requests, 1u);
     EXPECT_EQ(counters().foreign_frames, 1u);
-    stations.of(17).requests().on_unanswered(now, kRead, now - 500ms);
+    stations.of(17).replies().on_unanswered(stations.book(), now, kRead, now - 500ms);
     EXPECT_EQ(heard(kAnswer), "late") << "outstanding";
     EXPECT_EQ(counters().late_frames, 1u);
     EXPECT_EQ(counters().foreign_frames, 1u);
@@ -105,17 +106,19 @@ TEST_F(UnsolicitedFramesTest, AWrongReplyIsNeitherEchoNorRequestNorOutstanding) 
     EXPECT_FALSE(is_wrong_reply(encode_adu(17, kRead))) << "echo";
     EXPECT_FALSE(is_wrong_reply(encode_adu(17, "03 00 00 00 01"_hex))) << "a request";
     EXPECT_FALSE(is_wrong_reply(encode_adu(99, kReply))) << "nobody";
-    stations.of(17).requests().on_unanswered(now, kRead, now - 500ms);
+    stations.of(17).replies().on_unanswered(stations.book(), now, kRead, now - 500ms);
     EXPECT_FALSE(is_wrong_reply(kAnswer)) << "outstanding";
 }
 
 /// A panel that refuses everything with the same function's number: each refusal repeats another.
 TEST_F(UnsolicitedFramesTest, AnEqualRefusalInTheUsualTimeMayBeMeantForThisRequest) {
     const Bytes refusal = "84 02"_hex;
-    stations.of(17).requests().on_unanswered(now, "04 00 6B 00 01"_hex, now - 500ms);
+    stations.of(17).replies().on_unanswered(stations.book(), now, "04 00 6B 00 01"_hex,
+                                            now - 500ms);
     EXPECT_EQ(heard(encode_adu(17, refusal)), "late");
     now += 100ms;
-    ASSERT_EQ(stations.of(17).requests().claim_of(now, refusal), Claim::duplicate);
+    ASSERT_EQ(judge(stations.of(17).replies().facts(stations.book(), now, refusal)),
+              Done::duplicate);
     EXPECT_TRUE(is_wrong_reply(encode_adu(17, refusal)));
 }
 
@@ -123,7 +126,7 @@ TEST_F(UnsolicitedFramesTest, AnEqualRefusalInTheUsualTimeMayBeMeantForThisReque
 TEST_F(UnsolicitedFramesTest, AReplyToABroadcastIsOneForSeconds) {
     const Bytes write = "10 00 01 00 01 02 00 05"_hex;
     const Bytes reply = encode_adu(17, modbus::normal_write_reply(write));
-    stations.on_broadcast(now, write);
+    stations.book().on_broadcast(now, write);
     for (int i = 0; i < 10; ++i) unsolicited.on_sent(encode_adu(17, kRead));
     now += 900ms;
     EXPECT_FALSE(is_wrong_reply(reply));

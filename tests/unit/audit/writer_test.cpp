@@ -52,7 +52,7 @@ class AuditWriter : public testing::Test {
         std::string bodies;
         for (int i = from; i < to; ++i) bodies += body(i) + '\n';
         writer.take(bodies);
-        return writer.work(true);
+        return writer.work();
     }
     std::vector<std::string> files() const {
         std::vector<std::string> all;
@@ -104,9 +104,9 @@ TEST_F(AuditWriter, ARunThatEndedInOrderIsNotCalledOtherwise) {
     const auto first = make(settings());
     std::string bodies = body(1) + "\n\"time\":\"T\",\"kind\":\"end\"\n";
     first->take(bodies);
-    ASSERT_TRUE(first->work(true));
+    ASSERT_TRUE(first->work());
     const auto second = make(settings());
-    EXPECT_FALSE(second->work(true)) << "the first one still holds the file";
+    EXPECT_FALSE(second->work()) << "the first one still holds the file";
     EXPECT_EQ(second->why(), "another process writes to " + file);
 }
 
@@ -115,9 +115,9 @@ TEST_F(AuditWriter, AfterAnEndInOrderNothingIsMissing) {
         const auto first = make(settings());
         std::string bodies = body(1) + "\n\"time\":\"T\",\"kind\":\"end\"\n";
         first->take(bodies);
-        ASSERT_TRUE(first->work(true));
+        ASSERT_TRUE(first->work());
     }
-    ASSERT_TRUE(make(settings())->work(true));
+    ASSERT_TRUE(make(settings())->work());
     const Report report = verify({file});
     EXPECT_FALSE(report.fault);
     EXPECT_TRUE(report.remarks.empty());
@@ -127,7 +127,7 @@ TEST_F(AuditWriter, ATornLineIsCutOffAndQuoted) {
     ASSERT_TRUE(write(*make(settings()), 1, 3));
     const std::string torn = R"({"n":5,"time":"T","ki)";
     std::ofstream(file, std::ios::app) << torn;
-    ASSERT_TRUE(make(settings())->work(true));
+    ASSERT_TRUE(make(settings())->work());
     const auto lines = lines_of(file);
     ASSERT_EQ(lines.size(), 5U);
     EXPECT_NE(lines[4].find(R"("kind":"start","unclean":true,"torn_bytes":21,)"
@@ -139,7 +139,7 @@ TEST_F(AuditWriter, ATornLineIsCutOffAndQuoted) {
 
 TEST_F(AuditWriter, AFileThatIsOnlyATornLineBeginsAnew) {
     std::ofstream(file) << R"({"n":1)";
-    ASSERT_TRUE(make(settings())->work(true));
+    ASSERT_TRUE(make(settings())->work());
     EXPECT_EQ(lines_of(file).size(), 2U);
     EXPECT_FALSE(verify({file}).fault);
 }
@@ -166,7 +166,7 @@ TEST_F(AuditWriter, TheChainGoesOnOverItsFilesAndTheOldestGo) {
 TEST_F(AuditWriter, AMissingFileIsFollowedFromTheNewestOneBeforeIt) {
     ASSERT_TRUE(write(*make(settings()), 1, 3));
     fs::rename(file, rotated_name(file, 1));
-    ASSERT_TRUE(make(settings())->work(true));
+    ASSERT_TRUE(make(settings())->work());
     const auto lines = lines_of(file);
     ASSERT_EQ(lines.size(), 2U);
     EXPECT_EQ(lines[0].substr(0, 7), R"({"n":5,)");
@@ -218,17 +218,17 @@ class FullDisk {
 
 TEST_F(AuditWriter, AFullDiskLosesNothingThatWasTaken) {
     const auto writer = make(settings());
-    ASSERT_TRUE(writer->work(true));
+    ASSERT_TRUE(writer->work());
     const auto size = fs::file_size(file);
     {
         const FullDisk full(size + 50);  // in the middle of a line
         EXPECT_FALSE(write(*writer, 1, 50));
         EXPECT_EQ(writer->why(), "cannot write " + file + ": File too large");
         EXPECT_FALSE(writer->idle());
-        EXPECT_FALSE(writer->work(true));
+        EXPECT_FALSE(writer->work());
         EXPECT_EQ(writer->last().number, 2U);
     }
-    EXPECT_TRUE(writer->work(true));
+    EXPECT_TRUE(writer->work());
     const Report report = verify({file});
     EXPECT_FALSE(report.fault);
     EXPECT_EQ(report.records, 51U);
@@ -245,7 +245,7 @@ TEST_F(AuditWriter, WhatAFullDiskDidNotTakeIsWrittenToAnotherFile) {
     Settings other = settings();
     other.file += ".other";
     writer->apply(other);
-    ASSERT_TRUE(writer->work(true)) << writer->why();
+    ASSERT_TRUE(writer->work()) << writer->why();
     const Report report = verify({other.file});
     EXPECT_FALSE(report.fault);
     EXPECT_GE(report.records, 2U + 36U);  // one or two fitted
@@ -260,12 +260,12 @@ TEST_F(AuditWriter, SaysWhyAFileCannotBeOpened) {
     EXPECT_FALSE(write(*writer, 1, 2));
     EXPECT_EQ(writer->why(), "cannot open " + nowhere.file + ": No such file or directory");
     fs::create_directory(folder.path() / "no");
-    EXPECT_TRUE(writer->work(true));
+    EXPECT_TRUE(writer->work());
     EXPECT_EQ(lines_of(nowhere.file).size(), 3U);
     Settings device = settings();
     device.file = "/dev/null";
     const auto other = make(device);
-    EXPECT_FALSE(other->work(true));
+    EXPECT_FALSE(other->work());
     EXPECT_EQ(other->why(), "/dev/null is no regular file");
 }
 

@@ -19,8 +19,8 @@ namespace {
 using access::Act;
 
 const WhoRef kOperator =
-    make_who({.face = Face::http, .name = "http ops", .role = Role::operator_});
-const WhoRef kViewer = make_who({.face = Face::http, .name = "http eye", .role = Role::viewer});
+    make_who({.face = Face::http, .name = "http ops", .standing = Role::operator_});
+const WhoRef kViewer = make_who({.face = Face::http, .name = "http eye", .standing = Role::viewer});
 
 /// Viewers read nothing of 17; nobody writes register 1.
 class BusAccessTest : public BusCase {

@@ -196,7 +196,7 @@ TEST(ConfigLoad, ReadsByWhichNamesAndFromWhereAndWithWhichTokensHttpMayBeAsked) 
     EXPECT_EQ(config.http->anonymous, Role::none);
     ASSERT_EQ(config.http->tokens.size(), 1U);
     EXPECT_EQ(config.http->tokens[0].name, "ops");
-    EXPECT_EQ(config.http->tokens[0].role, Role::operator_);
+    EXPECT_EQ(config.http->tokens[0].standing, Role::operator_);
     EXPECT_EQ(config.http->tokens[0].hash, web::hash_of("s3cret"));
     EXPECT_EQ(config.log.level, rt::LogLevel::trace);
     EXPECT_EQ(config.log.format, rt::LogFormat::json);

@@ -46,7 +46,7 @@ access:
 
 /// The name of the rule that denies; "" if the request is allowed.
 std::string denied(const Config& config, std::uint8_t station, const Bytes& pdu) {
-    const WhoRef who = make_who({.face = Face::modbus_tcp, .role = Role::operator_});
+    const WhoRef who = make_who({.face = Face::modbus_tcp, .standing = Role::operator_});
     const auto verdict = config.lines[0].access.rules->judge(who, station, test::request_of(pdu));
     return verdict.allowed ? "" : std::string(verdict.rule_name());
 }

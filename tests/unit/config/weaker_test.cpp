@@ -181,6 +181,16 @@ TEST(Weaker, RolesOfAnonymousClientsAndOfTokens) {
         << "another secret";
 }
 
+TEST(Weaker, ARoleOfTheSameNameThatHasMoreRights) {
+    const Maker rights = [](const std::string& list) {
+        return http(", anonymous: maint, tokens: [{name: a, role: maint, file: /a}]") +
+               "access: {roles: [{name: maint, rights: [" + list + "]}]}\n";
+    };
+    EXPECT_EQ(told(rights, "read", "read, raw"),
+              "http: anonymous maint has more rights; http: token a: role maint has more rights; "
+              "access: role maint has more rights");
+}
+
 TEST(Weaker, AListenerThatReachesMore) {
     const Maker two = [](const std::string& keys) {
         return "lines: [{name: a, device: sim, stations: [{id: 1}]}, {name: b, device: sim, "

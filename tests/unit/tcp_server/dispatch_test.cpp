@@ -259,7 +259,7 @@ TEST(Caller, ReadsOnlyUnlessItsCertificateSaysMore) {
     const auto certified = [](std::optional<std::string> role) {
         Caller caller("10.0.0.7:1", make_who({.name = "modbus_tcp 10.0.0.7:1",
                                               .address = "10.0.0.7",
-                                              .role = Role::operator_}));
+                                              .standing = Role::operator_}));
         caller.certify("CN=panel", std::move(role));
         EXPECT_EQ(caller.who()->certificate, "CN=panel");
         return caller;
@@ -270,17 +270,17 @@ TEST(Caller, ReadsOnlyUnlessItsCertificateSaysMore) {
         EXPECT_FALSE(certified(role).reads_only()) << role;
     EXPECT_FALSE(certified(std::nullopt).reads_only());
     EXPECT_EQ(certified("cook").who()->certificate_role, "cook");
-    EXPECT_EQ(certified("cook").who()->role, Role::none);
-    EXPECT_EQ(certified(std::nullopt).who()->role, Role::operator_);
+    EXPECT_EQ(certified("cook").who()->standing.role, Role::none);
+    EXPECT_EQ(certified(std::nullopt).who()->standing.role, Role::operator_);
 }
 
 TEST(Caller, HasTheOwnRoleThatItsCertificateNames) {
     std::vector<OwnRole> roles{{"setter", {}}, {"keeper", {}}};
     roles[0].rights.add(Right::write);
     roles[1].rights.add(Right::reload);
-    Caller caller("10.0.0.7:1", make_who({.role = Role::operator_}));
+    Caller caller("10.0.0.7:1", make_who({.standing = Role::operator_}));
     caller.certify("CN=panel", "setter", roles);
-    EXPECT_EQ(caller.who()->role_name(), "setter");
+    EXPECT_EQ(caller.who()->standing.name(), "setter");
     EXPECT_FALSE(caller.reads_only());
     caller.certify("CN=panel", "keeper", roles);
     EXPECT_TRUE(caller.reads_only());

@@ -140,6 +140,7 @@ struct Route {
     std::vector<std::string_view> queries{};  ///< supported; any other is refused
     bool probe = false;  ///< answered for any host name and query, even when all else is barred
     Right right = Right::read;  ///< that an own role has to have; none is needed where `needed` is
+    std::optional<Right> or_right{};  ///< one that is enough for an own role, too
 };
 
 /// What a client changed or was refused: for an audit. Valid for the call only.

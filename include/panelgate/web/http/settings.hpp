@@ -16,14 +16,11 @@ namespace panelgate::web {
 
 struct Token {
     std::string name;
-    Role role = Role::viewer;
+    Standing standing = Role::viewer;
     std::string hash;  ///< hash_of() the token, whose file holds it or its hash
     std::string file{};
     std::size_t characters = 0;         ///< of the token; 0: its file holds the hash
     std::optional<WallTime> expires{};  ///< from then on it is not known any more
-    std::optional<OwnRole> own_role{};  ///< of the configuration; `role` is the least like it
-
-    Standing standing() const { return {role, own_role}; }
     friend bool operator==(const Token&, const Token&) = default;
 };
 
@@ -59,9 +56,9 @@ struct RateLimitSettings {
 
 struct Settings {
     std::string address = "127.0.0.1";
-    std::uint16_t port = 8080;  ///< 0: any free port
-    bool ipv6_only = false;     ///< with "::": another listener has this port on IPv4
-    Role anonymous = Role::viewer;
+    std::uint16_t port = 8080;          ///< 0: any free port
+    bool ipv6_only = false;             ///< with "::": another listener has this port on IPv4
+    Standing anonymous = Role::viewer;  ///< of clients that show nothing
     std::vector<Token> tokens;
     LoginSettings logins;
     RateLimitSettings rate_limit;
@@ -80,9 +77,6 @@ struct Settings {
     Duration half_close_grace = 2s;
     std::optional<tls::Settings> tls{};  ///< HTTPS; none: plain
 
-    std::optional<OwnRole> anonymous_own{};  ///< as Token::own_role
-
-    Standing anonymous_standing() const { return {anonymous, anonymous_own}; }
     std::string scheme() const { return tls ? "https://" : "http://"; }
     std::string name() const { return endpoint_text(address, port); }
     /// True if `other` differs only in what can change without reopening the listener.
