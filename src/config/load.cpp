@@ -251,7 +251,7 @@ void drop_extensions(yaml::Node& tree) {
 constexpr std::string_view kHttp = "did you mean 'http'? It serves REST, pages and metrics";
 
 /// Keys that users write at the left margin.
-constexpr std::array<yaml::Elsewhere, 17> kElsewhere{{{"rest", {}, {}, kHttp},
+constexpr std::array<yaml::Elsewhere, 21> kElsewhere{{{"rest", {}, {}, kHttp},
                                                       {"api", {}, {}, kHttp},
                                                       {"web", {}, {}, kHttp},
                                                       {"metrics", {}, {}, kHttp},
@@ -267,6 +267,10 @@ constexpr std::array<yaml::Elsewhere, 17> kElsewhere{{{"rest", {}, {}, kHttp},
                                                       {"device", {}, "a line, one of 'lines'"},
                                                       {"serial", {}, "a line, one of 'lines'"},
                                                       {"baud", {}, "a line's serial"},
+                                                      {"retries", {}, "a line or a station"},
+                                                      {"echo", {}, "a line, one of 'lines'"},
+                                                      {"rules", {}, "access"},
+                                                      {"roles", {}, "access"},
                                                       {"points", {}, "a station"}}};
 
 bool is_http(std::string_view key) {

@@ -188,6 +188,7 @@ std::vector<yaml::Elsewhere> keys_elsewhere() {
         {"parity", "serial", {}, {}, kParities},
         {"points", {}, "a station"},
         {"poll", {}, "a station"},
+        {"crc_order", {}, "a station"},
         {"profile", {}, "a station"},
         {"listen", {}, "modbus_tcp or http"},
         {"type", {}, {}, "remove it: 'device' says what the line is"},

@@ -163,7 +163,6 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineContext& wo
                           Station& station) {
     station.read_only = load_read_only(in).value_or(false);
     station.listens = work.line.listens;
-
     StationSettings settings = load_station_timing(loading, in, work, station);
     settings.id = station.id;
     settings.crc_order = station.profile->crc_order;
@@ -192,7 +191,7 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineContext& wo
 }
 
 /// Keys that users write beside `id`.
-constexpr std::array<yaml::Elsewhere, 9> kStationKeysElsewhere{
+constexpr std::array<yaml::Elsewhere, 10> kStationKeysElsewhere{
     {{"response_timeout", "timing", {}},
      {"frame_gap", "timing", {}},
      {"late_window", "timing", {}},
@@ -201,6 +200,7 @@ constexpr std::array<yaml::Elsewhere, 9> kStationKeysElsewhere{
      {"baud", {}, "a line's serial"},
      {"parity", {}, "a line's serial"},
      {"device", {}, "a line"},
+     {"echo", {}, "a line"},
      {"at", {}, "a point"}}};
 
 Station load_station(Loading& loading, const Node& node, const LineContext& work) {

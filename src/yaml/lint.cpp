@@ -75,15 +75,22 @@ constexpr auto kSlips = std::to_array<Slip>({
      "in place of this line"},
     {On::begin, Kind::plain, "-", R"(-([A-Za-z][\w-]*):?(?: .*)?)", 0,
      "a blank is missing after '-'; write '- $1:'"},
+    {On::begin, Kind::plain, "+", R"(\+ .*)", 0, "a '+' begins no key; remove it"},
     {On::token, Kind::plain, "?", R"(\?)", 0, "a '?' is no value; write what is meant"},
     {On::line, Kind::plain, "(", R"(\(([A-Za-z][\w-]*: [^)]*).*)", 0,
      "'(' begins no map; write {$1}"},
     {On::line, Kind::plain, ":", R"(([A-Za-z][\w-]*:)([{["'].*))", 2,
-     "a blank is missing after '$1'"},
+     "a blank is missing after '$1'; write '$1 $2'"},
+    {On::line, Kind::plain, "=", R"(([A-Za-z][\w-]*) *(=) *([{[].*))", 2,
+     "a key is followed by ':', not '='; write '$1: $3'"},
     {On::line, Kind::plain, ".:]l",
      R"(([\w./:[\]-]*[.:\]][\w.-]*|localhost): +([0-9/]+)(?:[,}\]].*)?)", 0, kAddress},
     {On::two_keys, Kind::plain, "", R"([^ ]+ +([\w./:[\]-]*[.:\]][\w.-]*|localhost): +([0-9/]+))",
      1, kAddress},
+    {On::two_keys, Kind::plain, "", R"(\S+: +(tcp): *(?://)?(\S+))", 1,
+     "an address begins with tcp:// and has no blank; write tcp://$2"},
+    {On::two_keys, Kind::plain, "", R"((\S+?): +([A-Za-z][\w-]*: [^{}]*\}))", 2,
+     "a '{' is missing; write '$1: {$2'"},
     {On::two_keys, Kind::plain, "", R"([^ ]+ +(- .*))", 1,
      "a list begins below its key; begin a new line before this '-'"},
     {On::two_keys, Kind::plain, "", R"((\S+?): +(?!\()(([A-Za-z][\w-]*):(?: .*)?))", 2, kTwoKeys},
@@ -97,8 +104,8 @@ constexpr auto kSlips = std::to_array<Slip>({
      "U+FF1A is no colon; write '$1: $3'"},
     {On::alone, Kind::plain, "", R"(([A-Za-z][\w-]*|<<):(?!//)(.+))", 2,
      "a blank is missing after '$1:'; write '$1: $2'"},
-    {On::alone, Kind::plain, "", R"(([A-Za-z][\w-]*|<<)\s*(=)\s*(.*))", 2,
-     "a key is followed by ':', not '='; write '$1: $3'"},
+    {On::alone, Kind::plain, "", R"(([A-Za-z][\w-]*|<<)\s*(:=|=>|[=;])\s*(.*))", 2,
+     "a key is followed by ':', not '$2'; write '$1: $3'"},
     {On::alone, Kind::plain, "", R"(([A-Za-z][\w-]*|<<)(?=[\s*]|$)(\s*):?\s*(.*))", 2,
      "a ':' is missing after '$1'; write '$1: $3'"},
     {On::line, Kind::alias, "", R"(\*(:[0-9]+)(?:[ ,}\]].*)?)", 0,
@@ -381,7 +388,10 @@ Findings find_causes(const Scanned& text) {
 }
 
 bool has_wrong_indent(const Scanned& text, const Token& first) {
-    return tab_before(text, first) != std::string_view::npos ||
+    const std::string_view word = text.text(first);
+    const bool has_sign =
+        first.kind == Kind::plain && (word.starts_with('+') || word.starts_with('-'));
+    return has_sign || tab_before(text, first) != std::string_view::npos ||
            is_wrong_blank(code_point(character_at(text.text(first), 0)));
 }
 

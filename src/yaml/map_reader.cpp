@@ -49,7 +49,12 @@ std::string wrong(std::string_view key, std::string_view wanted, const Node& nod
 std::string list_hint(const Node& node, std::string_view example) {
     if (node.kind == Node::Kind::map) return "; begin each item with '- '";
     if (std::string text = text_hint(node, '['); !text.empty() || !example.empty()) return text;
-    return "; write [" + std::string(clip(node.scalar, 40)) + "], or '- ' before each item";
+    std::string_view items = node.scalar;
+    if (items == "all" || items == "any") return "; leave it out for all";
+    constexpr std::string_view kBrackets = "[](){}<> ";
+    items.remove_prefix(std::min(items.find_first_not_of(kBrackets), items.size()));
+    items = items.substr(0, items.find_last_not_of(kBrackets) + 1);
+    return "; write [" + std::string(clip(items, 40)) + "], or '- ' before each item";
 }
 
 std::string two_values(const Node& node) {
@@ -236,7 +241,7 @@ std::optional<std::size_t> MapReader::choice_index(std::string_view key,
     }
     const std::string near = nearest(node->scalar, words);
     problem(key, wrong(key, join(words), *node) +
-                     (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                     (near.empty() ? comment_hint(*node) : "; did you mean '" + near + "'?") +
                      (hint ? hint(node->scalar) : ""));
     return std::nullopt;
 }
