@@ -352,8 +352,7 @@ std::variant<HttpDoor, NoHttpDoor> http_door(const GatewayOptions& options) {
         door.trust.emplace();
     }
     if (door.trust && http.empty() && config::is_loopback(door.endpoint.address)) {
-        // The gateway may still have a former certificate, of other names. On loopback a server of
-        // that CA is one of this machine.
+        // It may still have a former certificate, of other names.
         door.trust->any_name = true;
         door.is_local = true;
     }

@@ -191,6 +191,18 @@ std::optional<Finding> tried(const Scanned& text, std::size_t token, std::size_t
     return Finding{text.tokens[token].begin + static_cast<std::size_t>(cursor), told(slip, match)};
 }
 
+/// The rows of a kind of token, in their order.
+const std::vector<std::size_t>& rows_of(Kind kind) {
+    constexpr auto kKinds = static_cast<std::size_t>(Kind::document) + 1;
+    static const std::array<std::vector<std::size_t>, kKinds> kRows = [] {
+        std::array<std::vector<std::size_t>, kKinds> all;
+        for (std::size_t row = 0; row < kSlips.size(); ++row)
+            all.at(static_cast<std::size_t>(kSlips[row].kind)).push_back(row);
+        return all;
+    }();
+    return kRows.at(static_cast<std::size_t>(kind));
+}
+
 /// True for a key whose value is an item, or is followed by another ': '.
 bool has_two_keys(const Scanned& text, std::size_t key) {
     const bool begins = text.tokens[key].first || text.tokens[key - 1].kind == Kind::dash;
@@ -222,8 +234,8 @@ void find_slips(const Scanned& text, bool refused, Findings& findings) {
             if (on == On::two_keys) return twice;
             return tries_all && on != On::alone && (on != On::alias || !is_known);
         };
-        for (std::size_t row = 0; row < kSlips.size(); ++row) {
-            if (kSlips[row].kind != token.kind || !may_be_on(kSlips[row].on)) continue;
+        for (const std::size_t row : rows_of(token.kind)) {
+            if (!may_be_on(kSlips[row].on)) continue;
             if (auto finding = tried(text, i, row)) {
                 findings.push_back(std::move(*finding));
                 break;
@@ -235,8 +247,8 @@ void find_slips(const Scanned& text, bool refused, Findings& findings) {
 }  // namespace
 
 std::optional<Finding> missing_colon(const Scanned& text, std::size_t token) {
-    for (std::size_t row = 0; row < kSlips.size(); ++row) {
-        if (kSlips[row].on != On::alone || text.tokens[token].kind != Kind::plain) continue;
+    for (const std::size_t row : rows_of(text.tokens[token].kind)) {
+        if (kSlips[row].on != On::alone) continue;
         if (auto finding = tried(text, token, row)) return finding;
     }
     return std::nullopt;

@@ -282,6 +282,32 @@ const Node* MapReader::sequence(std::string_view key, std::string_view example) 
     return nullptr;
 }
 
+std::vector<const Node*> MapReader::items(std::string_view key, std::string_view example,
+                                          std::string_view any) {
+    std::vector<const Node*> all;
+    const Node* list = sequence(key);
+    schema(key).fewest = 1;
+    refuse_empty(key, "list at least one, or leave it out for " + std::string(any));
+    if (list == nullptr) return all;
+    if (list->items.empty())
+        problem(key,
+                std::string(key) + " must list at least one; leave it out for " + std::string(any));
+    for (const Node& item : list->items) {
+        if (item.kind == Node::Kind::scalar) {
+            all.push_back(&item);
+        } else {
+            problems_->add(item.mark, std::string(key) + " is a list of words, such as " +
+                                          std::string(example));
+        }
+    }
+    return all;
+}
+
+void MapReader::refuse_empty(std::string_view key, std::string_view instead) {
+    schema(key).may_be_null = false;
+    not_empty_.emplace_back(key, instead);
+}
+
 Mark MapReader::mark(std::string_view key) const {
     const Node* value = node_->find(key);
     return value == nullptr ? node_->mark : value->mark;
