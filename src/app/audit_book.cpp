@@ -385,7 +385,7 @@ void AuditBook::deed(const web::Deed& deed) {
     if (!trail_) return;
     const bool discovers = deed.path.ends_with("/discover");
     const bool simulates = deed.path.find("/simulator/") != deed.path.npos;
-    if (deed.status == 401) {
+    if (deed.status == 401 && deed.shown_token) {
         if (is_repeat(deed.who, "login", 1, [&] { return member("outcome", "log-in failed"); }))
             return;
         begin(Kind::login);
@@ -406,7 +406,8 @@ void AuditBook::deed(const web::Deed& deed) {
 
 /// What was refused before it came to a bus. A bus tells of what it refuses itself.
 void AuditBook::refusal(const web::Deed& deed) {
-    const bool is_refusal = deed.status == 403 || deed.status == 409 || deed.status == 422;
+    const bool is_refusal =
+        deed.status == 401 || deed.status == 403 || deed.status == 409 || deed.status == 422;
     if (!is_refusal) return;
     std::string& what = what_;
     what = deed.method;
