@@ -176,10 +176,9 @@ asio::awaitable<bool> HttpSession::secure() {
         turn_.expires_at(asio::steady_timer::time_point::max());
         co_await turn_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
     }
-    if (!secure) co_return false;
-    probes_only_ = take_place_();
-    take_certificate();
-    co_return true;
+    if (secure) probes_only_ = take_place_();
+    if (secure) take_certificate();
+    co_return secure;
 }
 
 void HttpSession::take_certificate() {
