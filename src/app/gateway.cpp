@@ -80,7 +80,7 @@ Gateway::Gateway(boost::asio::any_io_executor executor,
       reloads_(reloads),
       events_(new_epoch()),
       servers_(executor_, clock_),
-      northbound_(executor_, clock_) {
+      northbound_(executor_, clock_, audit_.topic_refusals()) {
     Lines lines = lines_of(*config);
     for (std::size_t i = 0; i < lines.size(); ++i)
         known_.lines.emplace(std::pair(config->lines[i].name, lines[i]->listens()), lines[i]);

@@ -27,13 +27,23 @@ mqtt::Subjects subjects_of(const config::Config& config);
 /// True if a session at the broker can go on: its settings and what it publishes are the same.
 bool is_same_session(const config::Config& before, const config::Config& now);
 
+/// A write of a topic that was refused before it came to a line. Valid for the call only.
+struct TopicRefusal {
+    WhoRef who;
+    std::string_view topic;
+    const web::Problem& why;
+    const Station* station = nullptr;  ///< null: no such topic, or one that is malformed
+    const points::Point* point = nullptr;
+};
+using TopicRefusals = std::function<void(const TopicRefusal&)>;
+
 /// A plant's session at an MQTT broker: publishes its points and the states of its stations and
 /// lines, and carries out writes of points. The clock outlives it. One thread.
 class BrokerSession {
   public:
     /// `snapshot` must have `mqtt:`.
     BrokerSession(boost::asio::any_io_executor executor, rt::Clock& clock,
-                  std::shared_ptr<const Snapshot> snapshot);
+                  std::shared_ptr<const Snapshot> snapshot, TopicRefusals refused);
 
     /// True if this session can serve the snapshot unchanged: show() is enough.
     bool fits(const Snapshot& snapshot) const;
@@ -85,7 +95,10 @@ class BrokerSession {
     void on_command(const mqtt::Command& command);
     void on_rebirth();
     void write(const mqtt::WriteCommand& command);
-    void refuse(const std::string& topic, const std::string& id, const web::Problem& why);
+    /// Tells the client, and the log.
+    void answer_refused(const std::string& topic, const std::string& id, const web::Problem& why);
+    void refuse(const std::string& topic, const std::string& id, const web::Problem& why,
+                const Place& place);
     void finish(const Order& order, const bus::Answer& answer);
 
     rt::Clock& clock_;
@@ -101,6 +114,7 @@ class BrokerSession {
     bool rebirth_waits_ = false;
     std::int64_t certificate_expiry_ = 0;
     mqtt::Counters counters_;         ///< of writes, and of earlier sessions
+    TopicRefusals refused_;           ///< null: nobody wants to know
     WhoRef who_;                      ///< who writes: whoever may publish at the broker
     std::shared_ptr<Writes> writes_;  ///< null once another session has taken them over
     mqtt::Client client_;
@@ -109,7 +123,8 @@ class BrokerSession {
 /// The plant's MQTT service, across all reloads. The clock outlives it. One thread.
 class Northbound {
   public:
-    Northbound(boost::asio::any_io_executor executor, rt::Clock& clock);
+    /// `refused` is told of writes that are refused before they come to a line.
+    Northbound(boost::asio::any_io_executor executor, rt::Clock& clock, TopicRefusals refused = {});
 
     /// Serves this snapshot from now on; without `mqtt:` nothing. If broker, points and stations
     /// are the same, the connection stays; else it is made anew, and queued messages are kept.
@@ -135,6 +150,7 @@ class Northbound {
 
     boost::asio::any_io_executor executor_;
     rt::Clock& clock_;
+    TopicRefusals refused_;
     std::unique_ptr<BrokerSession> session_;        ///< null without a broker
     std::unique_ptr<mqtt::GracefulClose> closing_;  ///< of the previous or the last session
     bool running_ = false;

@@ -1,4 +1,5 @@
 """Values at a real broker, and writes by way of it: mosquitto, listened to by paho."""
+import json
 import pathlib
 import shutil
 import signal
@@ -84,9 +85,11 @@ class Mqtt(unittest.TestCase):
             listener.wait_for(ramp, lambda body: body["quality"] == "good", after=told)
 
     def test_writes_and_refused_writes(self):
-        text = None
+        box = tempfile.TemporaryDirectory()
+        self.addCleanup(box.cleanup)
+        audit = pathlib.Path(box.name) / "audit.jsonl"
         with Broker() as broker, Listener(broker) as listener:
-            text = plant(broker, PRESS, LOCKED, more=", write: points")
+            text = plant(broker, PRESS, LOCKED, more=", write: points") + f"audit: {{file: {audit}}}\n"
             with harness.configured(text) as program:
                 program.log.wait_for("mqtt connected")
                 broker.log.wait_for(r"gateway 0 plant/hall/\+/\+/set")
@@ -108,6 +111,12 @@ class Mqtt(unittest.TestCase):
                 metrics = program.get("/metrics")[1]
                 self.assertIn('panelgate_mqtt_writes_total{outcome="ok"} 2\n', metrics)
                 self.assertIn('panelgate_mqtt_writes_total{outcome="refused"} 7\n', metrics)
+            kept = [json.loads(line) for line in audit.read_text().splitlines()]
+            refused = [one for one in kept if one.get("outcome") == "refused" and one["kind"] != "repeats"]
+            refused_again = sum(one["count"] for one in kept if one["kind"] == "repeats")
+            self.assertEqual(len(refused) + refused_again, 7, kept)
+            self.assertTrue(all(one["face"] == "mqtt" for one in refused))
+            self.assertIn(("press", "UW100"), [(one.get("station"), one.get("at")) for one in refused])
             listener.publish(f"{TOPIC}/press/level/set", b"33", retain=True)
             with harness.configured(text) as program:
                 said = listener.wait_for(f"{TOPIC}/press/level/set/result",
