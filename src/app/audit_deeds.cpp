@@ -43,7 +43,7 @@ void AuditBook::deed(const web::Deed& deed) {
     const bool is_told = std::exchange(refused_, nullptr) == deed.who && deed.who != nullptr;
     const bool discovers = deed.path.ends_with("/discover");
     const bool simulates = deed.path.find("/simulator/") != deed.path.npos;
-    if (deed.status == 401) {
+    if (deed.status == 401 && deed.shown_token) {
         if (is_repeat(deed.who, "login", 1, [&] { return member("outcome", "log-in failed"); }))
             return;
         begin(Kind::login);
@@ -72,8 +72,9 @@ std::string AuditBook::place_of(const web::Deed& deed) const {
 /// What was refused before it came to a bus. A bus tells of what it refuses itself, and the
 /// reloader of reloads.
 void AuditBook::refusal(const web::Deed& deed) {
-    const bool is_refusal = deed.status == 403 || deed.status == 409 || deed.status == 422;
-    const bool is_reload = deed.path.ends_with("/reload") && deed.status != 403;
+    const bool lacks_right = deed.status == 401 || deed.status == 403;
+    const bool is_refusal = lacks_right || deed.status == 409 || deed.status == 422;
+    const bool is_reload = deed.path.ends_with("/reload") && !lacks_right;
     if (!is_refusal || is_reload) return;
     const std::string rule = text_in(deed.answer, "rule");
     Refused refused{deed.who, place_of(deed), std::string(deed.method), std::string(deed.path)};

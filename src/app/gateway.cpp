@@ -254,14 +254,15 @@ void Gateway::watch_tokens() {
 void Gateway::watch_certificates() {
     const config::Config& config = *snapshot_->config;
     const bool any =
-        (config.http && config.http->tls) ||
+        (config.http && config.http->tls) || (config.mqtt && config.mqtt->tls) ||
         std::ranges::any_of(config.modbus_tcp, [](const auto& one) { return one.tls.has_value(); });
     if (any && !certificates_)
         certificates_ = std::make_unique<CertificateWatch>(
-            executor_, clock_,
-            [this](const CertificateWatch::Served& served,
-                   std::shared_ptr<const tls::Context> context) {
-                servers_.renew(served.listener, served.settings, std::move(context));
+            executor_, clock_, [this](const CertificateWatch::Served& served) {
+                if (served.server.empty())
+                    servers_.renew(served.listener, served.settings, served.settings.made);
+                else
+                    northbound_.renew(served.settings.material);
             });
     if (certificates_) certificates_->follow(config);
 }

@@ -9,6 +9,7 @@
 #include "panelgate/base/words.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/tls/replacement.hpp"
 #include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::app {
@@ -143,6 +144,7 @@ bool BrokerSession::fits(const Snapshot& snapshot) const {
 void BrokerSession::show(std::shared_ptr<const Snapshot> snapshot) {
     snapshot_ = std::move(snapshot);
     numbers_.clear();
+    renew(snapshot_->config->mqtt->files);
     const BrokerSight sight(*snapshot_->config);
     const auto lines = std::ranges::count_if(
         snapshot_->config->lines, [&](const config::Line& line) { return sight.line(line); });
@@ -161,6 +163,12 @@ void BrokerSession::show(std::shared_ptr<const Snapshot> snapshot) {
             places_.push_back({station, point});
         }
     }
+}
+
+void BrokerSession::renew(const tls::Material& files) {
+    settings_.files = mqtt::Files{files};
+    certificate_expiry_ = tls::summary_of(files.certificate).end;
+    client_.renew(files);
 }
 
 void BrokerSession::take_over(BrokerSession& before) {
@@ -359,6 +367,8 @@ mqtt::Counters BrokerSession::counters() const {
     all.writes_ok = counters_.writes_ok;
     all.writes_refused = counters_.writes_refused;
     all.writes_failed = counters_.writes_failed;
+    all.broker = settings_.broker();
+    all.certificate_expiry = certificate_expiry_;
     return all;
 }
 
@@ -375,6 +385,10 @@ void Northbound::show(const std::shared_ptr<const Snapshot>& snapshot) {
     leave();
     session_ = std::move(next);
     if (session_ && running_) session_->start();
+}
+
+void Northbound::renew(const tls::Material& files) {
+    if (session_) session_->renew(files);
 }
 
 void Northbound::start() {

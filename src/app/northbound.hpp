@@ -49,6 +49,8 @@ class BrokerSession {
     bool fits(const Snapshot& snapshot) const;
     /// Uses this snapshot from now on; fits(*snapshot) must be true.
     void show(std::shared_ptr<const Snapshot> snapshot);
+    /// Files for the next connection to the broker.
+    void renew(const tls::Material& files);
     /// Before start(): takes over what another session, which is stopped next, has not published
     /// yet. At the same broker this session answers its outstanding writes, too.
     void take_over(BrokerSession& before);
@@ -110,6 +112,7 @@ class BrokerSession {
     std::unique_ptr<rt::Alarm> rebirth_alarm_;  ///< of the pending rebirth
     TimePoint next_rebirth_{};                  ///< earliest time of the next rebirth
     bool rebirth_waits_ = false;
+    std::int64_t certificate_expiry_ = 0;
     mqtt::Counters counters_;         ///< of writes, and of earlier sessions
     TopicRefusals refused_;           ///< null: nobody wants to know
     WhoRef who_;                      ///< who writes: whoever may publish at the broker
@@ -131,6 +134,9 @@ class Northbound {
     void stop();
     /// True if the broker has got the last message, or it is not waited for any more.
     bool left() const { return !closing_ || closing_->done(); }
+
+    /// Files for the next connection to the broker; none is closed.
+    void renew(const tls::Material& files);
 
     /// Reports an event of a line of the snapshot.
     void on_bus_event(const std::string& line, const bus::BusEvent& event);

@@ -250,6 +250,42 @@ class Configuration(unittest.TestCase):
                     self.connects(broker, f", tls: {{ca: {here}/right.pem, certificate: {here}/{name}.pem, "
                                   f"key: {here}/{name}.key}}", said)
 
+    def test_its_new_certificate_is_for_the_next_connection_and_a_bad_one_is_kept_back(self):
+        with tempfile.TemporaryDirectory() as folder:
+            here = pathlib.Path(folder)
+            for name in ("right", "wrong"):
+                self.certify(here, name)
+            mutual = (f"certfile {here}/right.pem\nkeyfile {here}/right.key\ncafile {here}/right.pem\n"
+                      "require_certificate true\nallow_anonymous true\n")
+            for end in ("pem", "key"):
+                shutil.copy(here / f"wrong.{end}", here / f"own.{end}")
+            with Broker(mutual) as broker:
+                text = plant(broker, more=f", tls: {{ca: {here}/right.pem, certificate: {here}/own.pem, "
+                             f"key: {here}/own.key}}").replace(f"mqtt://127.0.0.1:{broker.port}",
+                                                               f"mqtts://localhost:{broker.port}")
+                with harness.configured(text) as program:
+                    program.log.wait_for("mqtt not connected .*TLS: the broker ends it: ")
+                    shutil.copy(here / "right.key", here / "own.key")
+                    program.log.wait_for("certificate not renewed listener=.mqtt mqtts://localhost:.*"
+                                         "does not belong to the certificate")
+                    shutil.copy(here / "right.pem", here / "own.pem")
+                    program.log.wait_for("certificate renewed listener=.mqtt mqtts://localhost:.* "
+                                         "files=.certificate, key. subject=.CN=localhost.")
+                    program.log.wait_for("mqtt connected broker=mqtts://localhost")
+                    self.assertRegex(program.get("/metrics")[1],
+                                     r'panelgate_certificate_expiry_timestamp_seconds\{listener="mqtts://localhost:')
+
+    def test_the_log_says_what_is_wrong_with_the_brokers_certificate(self):
+        with tempfile.TemporaryDirectory() as folder:
+            here = pathlib.Path(folder)
+            for name in ("right", "wrong"):
+                self.certify(here, name)
+            (here / "none.pem").write_text("nothing")
+            with Broker(f"certfile {here}/right.pem\nkeyfile {here}/right.key\nallow_anonymous true\n") as broker:
+                for ca, why in (("wrong", "its certificate CN=localhost is not signed by the CA of `ca`"),
+                                ("none", "none.pem holds no certificate")):
+                    self.connects(broker, f", tls: {{ca: {here}/{ca}.pem}}", f"mqtt not connected .*{why}")
+
     def connects(self, broker, more, said):
         text = plant(broker, more=more).replace(f"mqtt://127.0.0.1:{broker.port}",
                                                 f"mqtts://localhost:{broker.port}")
