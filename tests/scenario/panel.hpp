@@ -60,6 +60,7 @@ class Panel {
     Voice voice_;
     std::uint64_t served_ = 0;
     std::array<std::uint16_t, kMemoryCells + 2> cells_{};
+    std::set<std::uint16_t> coils_;  ///< that are on
     std::deque<Request> waiting_;
     bool busy_ = false;
     TimePoint dark_until_{};
