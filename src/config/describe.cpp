@@ -48,6 +48,7 @@ serial_masters:
   - {name: plc, device: /dev/ttyUSB1, serial: {baud: 19200}, rs485: {mode: off}, lines: [floor1],
      units: {101: floor1/31}}
 http: {listen: "127.0.0.1:8080", hosts: [gateway.plant.example], allow: [127.0.0.0/8],
+       cors: ["https://scada.plant.example"],
        tokens: [{name: ops, role: operator, file: /run/secrets/ops}],
        tls: {certificate: /etc/panelgate/tls/gateway.crt, key: /etc/panelgate/tls/gateway.key,
              ca: /etc/panelgate/tls/ca.crt, client: optional, crl: /etc/panelgate/tls/crl.pem,

@@ -116,12 +116,12 @@ std::string listen_hint(std::string_view typed) {
     return yaml::parse_integer(port) ? "; a port is a number from 0 to 65535" : "";
 }
 
-std::string network_hint(std::string_view typed) {
+std::string network_hint(std::string_view typed, std::string_view key) {
     std::string text(typed);
     if (text.find(' ') != text.npos && is_several(text)) return missing_commas(text);
     std::erase(text, ' ');
     if (text == "*" || text == "all" || text == "any")
-        return "; to let everybody in, leave allow out";
+        return "; to let everybody in, leave " + std::string(key) + " out";
     if (text == "localhost") return write("127.0.0.1");
     if (text.starts_with('[') && text.ends_with(']')) text = text.substr(1, text.size() - 2);
     if (parse_cidr(text)) return write(text);

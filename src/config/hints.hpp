@@ -12,8 +12,8 @@ namespace panelgate::config {
 
 /// For `listen`.
 std::string listen_hint(std::string_view typed);
-/// For an item of `allow`.
-std::string network_hint(std::string_view typed);
+/// For an item of `allow` or another list of networks, `key`.
+std::string network_hint(std::string_view typed, std::string_view key);
 /// For an item of a list whose words have no blanks: "; a ',' is missing: write [a, b]".
 std::string missing_commas(std::string_view typed);
 

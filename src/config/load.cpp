@@ -213,22 +213,6 @@ using yaml::MapReader;
 
 constexpr std::string_view kNameLetters = "abcdefghijklmnopqrstuvwxyz0123456789-";
 
-void load_log(Loading& loading, MapReader& root) {
-    const yaml::Node* node = root.map("log", "{level: info}");
-    if (node == nullptr) return;
-    MapReader in(*node, loading.problems, "log");
-    log_keys().read(in, loading.config.log);
-    in.finish();
-}
-
-void load_realtime(Loading& loading, MapReader& root) {
-    const yaml::Node* node = root.map("realtime", "{priority: 20, lock_memory: true}");
-    if (node == nullptr) return;
-    MapReader in(*node, loading.problems, "realtime");
-    realtime_keys().read(in, loading.config.realtime);
-    in.finish();
-}
-
 /// The shipped profiles; those of profiles_dir are added or replace them.
 std::shared_ptr<const profile::Catalogue> load_profiles(Loading& loading, MapReader& root) {
     auto catalogue = std::make_shared<profile::Catalogue>(profile::Catalogue::shipped());
@@ -251,7 +235,7 @@ void drop_extensions(yaml::Node& tree) {
 constexpr std::string_view kHttp = "did you mean 'http'? It serves REST, pages and metrics";
 
 /// Keys that users write at the left margin.
-constexpr std::array<yaml::Elsewhere, 17> kElsewhere{{{"rest", {}, {}, kHttp},
+constexpr std::array<yaml::Elsewhere, 21> kElsewhere{{{"rest", {}, {}, kHttp},
                                                       {"api", {}, {}, kHttp},
                                                       {"web", {}, {}, kHttp},
                                                       {"metrics", {}, {}, kHttp},
@@ -267,6 +251,10 @@ constexpr std::array<yaml::Elsewhere, 17> kElsewhere{{{"rest", {}, {}, kHttp},
                                                       {"device", {}, "a line, one of 'lines'"},
                                                       {"serial", {}, "a line, one of 'lines'"},
                                                       {"baud", {}, "a line's serial"},
+                                                      {"retries", {}, "a line or a station"},
+                                                      {"echo", {}, "a line, one of 'lines'"},
+                                                      {"rules", {}, "access"},
+                                                      {"roles", {}, "access"},
                                                       {"points", {}, "a station"}}};
 
 bool is_http(std::string_view key) {
@@ -310,8 +298,10 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     load_http(loading, root);
     load_mqtt(loading, root);
     load_rules(loading, root);
-    load_log(loading, root);
-    load_realtime(loading, root);
+    load_map(root, "log", "{level: info}",
+             [&](MapReader& in) { log_keys().read(in, loading.config.log); });
+    load_map(root, "realtime", "{priority: 20, lock_memory: true}",
+             [&](MapReader& in) { realtime_keys().read(in, loading.config.realtime); });
     load_audit(loading, root);
     load_relays(loading, root);
     const bool mistyped = root.is_mistyped("modbus_tcp") || root.is_mistyped("http") ||
@@ -408,12 +398,6 @@ std::optional<bool> load_read_only(MapReader& in) {
     const auto chosen = in.choice_index("access", kAccess);
     if (!chosen) return std::nullopt;
     return *chosen == 1;
-}
-
-void refuse_empty(MapReader& in, std::string_view key, std::string_view instead) {
-    in.schema(key).may_be_null = false;
-    if (!in.has(key) || in.child(key) != nullptr || in.is_mistyped(key)) return;
-    in.problem(key, std::string(key) + " has no value; " + std::string(instead));
 }
 
 std::optional<Config> load(std::string_view text, const Files& files, yaml::Problems& problems,

@@ -3,6 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
+#include <charconv>
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -37,27 +41,61 @@ std::string without_brackets(const std::string& text) {
 }  // namespace
 
 void load_hosts(Loading& loading, yaml::MapReader& in, web::Settings& settings) {
-    const yaml::Node* list = in.sequence("hosts");
     in.looks_like("hosts", "^\\[?[A-Za-z0-9._:-]+\\]?$", true);
-    in.schema("hosts").fewest = 1;
-    if (list == nullptr) return;
-    for (const yaml::Node& item : list->items) {
-        const std::string host = without_brackets(item.scalar);
+    for (const yaml::Node* item : in.items("hosts", "[gw.plant.example]", "the machine's names")) {
+        const std::string host = without_brackets(item->scalar);
         if (is_host(host)) {
             settings.hosts.push_back(host);
         } else {
             loading.problems.add(
-                item.mark,
+                item->mark,
                 "hosts lists names such as gateway.plant.example, without http:// "
                 "and without a port, not '" +
-                    item.scalar + '\'' +
-                    (line::is_broken_address(item.scalar) ? "; its numbers are no IP address"
-                                                          : missing_commas(item.scalar)));
+                    item->scalar + '\'' +
+                    (line::is_broken_address(item->scalar) ? "; its numbers are no IP address"
+                                                           : missing_commas(item->scalar)));
         }
     }
-    if (list->items.empty())
-        in.problem("hosts",
-                   "hosts must name at least one host; leave it out for the machine's names");
+}
+
+namespace {
+
+/// The scheme, host and port of an URL as browsers send them (RFC 6454, 6.2): in lower case,
+/// without the scheme's own port. Nothing if it has none, or more.
+std::optional<std::string> origin_of(std::string text) {
+    std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
+    const bool secure = text.starts_with("https://");
+    if (!secure && !text.starts_with("http://")) return std::nullopt;
+    const std::size_t host = text.find("//") + 2;
+    const auto colon = text.find(':', std::max(host, text.find(']', host) + 1));
+    if (!is_host(without_brackets(text.substr(host, colon - host)))) return std::nullopt;
+    if (colon == text.npos) return text;
+    std::uint16_t port = 0;
+    const char* const end = text.data() + text.size();
+    const auto [stop, wrong] = std::from_chars(text.data() + colon + 1, end, port);
+    if (wrong != std::errc{} || stop != end || port == 0) return std::nullopt;
+    if (port == (secure ? 443 : 80)) text.erase(colon);
+    return text;
+}
+
+}  // namespace
+
+void load_cors(Loading& loading, yaml::MapReader& in, std::vector<std::string>& origins) {
+    const yaml::Node* list = in.sequence("cors");
+    in.looks_like("cors", "^[Hh][Tt][Tt][Pp][Ss]?://\\[?[A-Za-z0-9._:-]+\\]?(:[0-9]{1,5})?$", true);
+    if (list == nullptr) return;
+    for (const yaml::Node& item : list->items) {
+        if (auto origin = origin_of(item.scalar)) {
+            origins.push_back(std::move(*origin));
+            continue;
+        }
+        const auto path = item.scalar.find('/', item.scalar.find("//") + 2);
+        const auto bare = origin_of(item.scalar.substr(0, path));
+        loading.problems.add(item.mark,
+                             "cors lists origins such as https://scada.plant.example, with the "
+                             "scheme, without a path, not '" +
+                                 item.scalar + '\'' + (bare ? "; write " + *bare : ""));
+    }
 }
 
 namespace {
@@ -170,6 +208,7 @@ web::Token load_token(Loading& loading, const Node& node) {
 void load_tokens(Loading& loading, MapReader& in, std::vector<web::Token>& tokens) {
     const Node* list =
         in.sequence("tokens", "[{name: ops, role: operator, file: /run/secrets/ops}]");
+    in.refuse_empty("tokens", "give at least one token, or leave it out");
     if (list == nullptr) return;
     for (const Node& node : list->items) {
         web::Token token = load_token(loading, node);

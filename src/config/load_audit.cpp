@@ -74,15 +74,12 @@ std::string size_text(std::size_t bytes) {
 }
 
 void load_audit(Loading& loading, MapReader& root) {
-    const yaml::Node* node = root.map("audit", "{file: /var/log/panelgate/audit.jsonl}");
-    if (node == nullptr) return;
-    MapReader in(*node, loading.problems, "audit");
-    audit::Settings settings;
-    load_file(in, settings);
-    load_rotation(in, settings);
-    audit_keys().read(in, settings);
-    in.finish();
-    loading.config.audit = settings;
+    load_map(root, "audit", "{file: /var/log/panelgate/audit.jsonl}", [&](MapReader& in) {
+        audit::Settings& settings = loading.config.audit.emplace();
+        load_file(in, settings);
+        load_rotation(in, settings);
+        audit_keys().read(in, settings);
+    });
 }
 
 }  // namespace panelgate::config

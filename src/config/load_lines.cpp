@@ -20,33 +20,23 @@ namespace {
 using yaml::MapReader;
 using yaml::Node;
 
-void load_queue(Loading& loading, MapReader& line, arbiter::QueueSettings& queue) {
-    const Node* node = line.map("queue", "{limit: 256}");
-    if (node == nullptr) return;
-    MapReader in(*node, loading.problems, "queue");
+void load_queue(MapReader& in, arbiter::QueueSettings& queue) {
     const Given given = queue_keys().read(in, queue);
-    if (given.has("per_client") && queue.per_client > queue.limit) {
+    if (given.has("per_client") && queue.per_client > queue.limit)
         in.problem("per_client", "per_client " + std::to_string(queue.per_client) +
                                      " is above the limit, " + std::to_string(queue.limit) +
                                      "; make it smaller, or the limit larger");
-    }
     queue.per_client = std::min(queue.per_client, queue.limit);
-    in.finish();
 }
 
-void load_offline(Loading& loading, MapReader& line, arbiter::OfflineSettings& offline) {
-    const Node* node = line.map("offline", "{after: 3}");
-    if (node == nullptr) return;
-    MapReader in(*node, loading.problems, "offline");
+void load_offline(MapReader& in, arbiter::OfflineSettings& offline) {
     const Given given = offline_keys().read(in, offline);
-    if (given.has("probe_max") && offline.probe_max < offline.probe_min) {
+    if (given.has("probe_max") && offline.probe_max < offline.probe_min)
         in.problem("probe_max", "probe_max " + yaml::format_duration(offline.probe_max) +
                                     " is below probe_min, " +
                                     yaml::format_duration(offline.probe_min) +
                                     "; make it longer, or probe_min shorter");
-    }
     offline.probe_max = std::max(offline.probe_max, offline.probe_min);
-    in.finish();
 }
 
 void check_rs485_delay(MapReader& in, std::string_view key, Duration delay) {
@@ -55,11 +45,8 @@ void check_rs485_delay(MapReader& in, std::string_view key, Duration delay) {
                         yaml::format_duration(delay));
 }
 
-void load_rs485(Loading& loading, MapReader& in_line, const Line& line, line::Rs485& rs485) {
+void load_rs485(MapReader& in, const Line& line, line::Rs485& rs485) {
     using Mode = line::Rs485::Mode;
-    const Node* node = in_line.map("rs485", "{mode: off}");
-    if (node == nullptr) return;
-    MapReader in(*node, loading.problems, "rs485");
     rs485_keys().read(in, rs485);
     if (rs485.mode == Mode::kernel) {
         check_rs485_delay(in, "delay_before_send", rs485.delay_before_send);
@@ -83,7 +70,6 @@ void load_rs485(Loading& loading, MapReader& in_line, const Line& line, line::Rs
         in.problem("mode", "only a serial device has an rs485 mode: '" + line.device.device +
                                "' switches by itself");
     }
-    in.finish();
 }
 
 /// Refuses /dev/ttyUSB0:9600 and the like; other paths may contain colons.
@@ -175,6 +161,7 @@ void load_mode(MapReader& in, Line& line) {
     }
 }
 
+constexpr std::string_view kRs485Example = "{mode: off}";
 constexpr std::string_view kLineExample = "{name: floor1, device: /dev/ttyUSB0}";
 constexpr std::string_view kLineListExample = "[{name: floor1, device: /dev/ttyUSB0}]";
 
@@ -188,6 +175,7 @@ std::vector<yaml::Elsewhere> keys_elsewhere() {
         {"parity", "serial", {}, {}, kParities},
         {"points", {}, "a station"},
         {"poll", {}, "a station"},
+        {"crc_order", {}, "a station"},
         {"profile", {}, "a station"},
         {"listen", {}, "modbus_tcp or http"},
         {"type", {}, {}, "remove it: 'device' says what the line is"},
@@ -233,17 +221,18 @@ Line load_line(Loading& loading, const Node& node) {
     if (line.listens && line.device.serial.mode == SerialMode::ascii)
         in.problem("mode", "mode listen understands RTU only, not ASCII");
     line.arbiter.serial = line.device.serial;
-    load_rs485(loading, in, line, line.device.rs485);
+    load_map(in, "rs485", kRs485Example,
+             [&](MapReader& rs485) { load_rs485(rs485, line, line.device.rs485); });
     line.arbiter.echo = EchoMode::automatic;  // an arbiter of its own expects none
     line_keys().read(in, line);
-    load_queue(loading, in, line.arbiter.queue);
-    load_offline(loading, in, line.arbiter.offline);
-    if (const Node* faults = in.map("simulate", "{echo: true}")) {
-        MapReader simulate(*faults, loading.problems, "simulate");
+    load_map(in, "queue", "{limit: 256}",
+             [&](MapReader& queue) { load_queue(queue, line.arbiter.queue); });
+    load_map(in, "offline", "{after: 3}",
+             [&](MapReader& offline) { load_offline(offline, line.arbiter.offline); });
+    load_map(in, "simulate", "{echo: true}", [&](MapReader& simulate) {
         line.simulated_echo = simulate.boolean("echo").value_or(false);
         simulate.about("echo", "false", "The adapter hears what it sends.", "");
-        simulate.finish();
-    }
+    });
     load_stations(loading, in, {line, serial_known, {}});
     in.finish();
     if (line.listens) warn_of_unused_keys(loading, in, line);
@@ -268,7 +257,8 @@ bool load_port(Loading& loading, MapReader& in, line::Settings& port, SerialMode
     }
     port.serial.mode = mode;
     const bool serial_known = load_serial(loading, in, port.serial, nullptr);
-    load_rs485(loading, in, line, port.rs485);
+    load_map(in, "rs485", kRs485Example,
+             [&](MapReader& rs485) { load_rs485(rs485, line, port.rs485); });
     return serial_known;
 }
 

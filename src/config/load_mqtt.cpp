@@ -144,7 +144,7 @@ void load_files(Loading& loading, MapReader& in, mqtt::Settings& settings) {
 /// A map as that of listeners; the same keys may stand beside it instead, as they did first.
 void load_tls(Loading& loading, MapReader& in, mqtt::Settings& settings) {
     const yaml::Node* node = in.map("tls", kTlsExample);
-    refuse_empty(in, "tls", "give ca, certificate and key, or leave it out");
+    in.refuse_empty("tls", "give ca, certificate and key, or leave it out");
     if (node != nullptr) {
         MapReader keys(*node, loading.problems, "tls", kTlsExample);
         mqtt_tls_keys().read(keys, settings);

@@ -34,34 +34,13 @@ using yaml::Node;
 
 constexpr std::string_view kRuleExample =
     "{name: no-writes, deny: [write], from: [192.168.10.0/24]}";
+constexpr std::string_view kAny = "any";
 constexpr Words<Act, 4> kActs{
     {{"read", Act::read}, {"write", Act::write}, {"broadcast", Act::broadcast}, {"raw", Act::raw}}};
 constexpr Words<Face, 4> kFaces{{{"modbus_tcp", Face::modbus_tcp},
                                  {"http", Face::http},
                                  {"mqtt", Face::mqtt},
                                  {"serial_master", Face::serial_master}}};
-
-/// The scalars of a list; an empty list is a problem, as it would mean nobody, or everybody.
-std::vector<const Node*> scalars(MapReader& in, std::string_view key, std::string_view example) {
-    const Node* list = in.sequence(key, example);
-    in.schema(key).fewest = 1;
-    std::vector<const Node*> all;
-    if (list == nullptr) {
-        refuse_empty(in, key, "leave it out for any, or list at least one");
-        return all;
-    }
-    if (list->items.empty())
-        in.problem(key, std::string(key) + " must list at least one; leave it out for any");
-    for (const Node& item : list->items) {
-        if (item.kind == Node::Kind::scalar) {
-            all.push_back(&item);
-        } else {
-            in.problems().add(item.mark, std::string(key) + " is a list of words, such as " +
-                                             std::string(example));
-        }
-    }
-    return all;
-}
 
 /// Reports a word that is not known.
 void unknown(Loading& loading, const Node& item, std::string_view what,
@@ -81,7 +60,7 @@ std::vector<T> words(Loading& loading, MapReader& in, std::string_view key,
         pattern += (pattern.empty() ? "^(" : "|") + std::string(name);
     }
     std::vector<T> all;
-    for (const Node* item : scalars(in, key, example)) {
+    for (const Node* item : in.items(key, example, kAny)) {
         const auto found = std::ranges::find(known, item->scalar, &Words<T, N>::value_type::first);
         if (found != known.end()) {
             all.push_back(found->second);
@@ -107,23 +86,9 @@ void load_acts(Loading& loading, MapReader& in, Rule& rule) {
                           : "a rule needs allow or deny, such as deny: [write]");
 }
 
-void load_from(Loading& loading, MapReader& in, Rule& rule) {
-    in.looks_like("from", network_pattern());
-    for (const Node* item : scalars(in, "from", "[192.168.10.0/24]")) {
-        const auto cidr = parse_cidr(item->scalar);
-        if (cidr) {
-            rule.from.push_back(*cidr);
-        } else {
-            loading.problems.add(item->mark, "from lists networks such as 192.168.10.0/24, not " +
-                                                 yaml::quote(item->scalar) +
-                                                 network_hint(item->scalar));
-        }
-    }
-}
-
 /// A role of a certificate may be any word.
 void load_roles(Loading& loading, MapReader& in, Rule& rule) {
-    for (const Node* item : scalars(in, "roles", "[viewer, operator]")) {
+    for (const Node* item : in.items("roles", "[viewer, operator]", kAny)) {
         rule.roles.push_back(item->scalar);
         if (!is_role(loading.config, item->scalar))
             loading.warn(item->mark,
@@ -138,7 +103,7 @@ void load_token_names(Loading& loading, MapReader& in, Rule& rule) {
     if (loading.config.http) {
         for (const web::Token& token : loading.config.http->tokens) known.push_back(token.name);
     }
-    for (const Node* item : scalars(in, "tokens", "[ops]")) {
+    for (const Node* item : in.items("tokens", "[ops]", kAny)) {
         rule.tokens.push_back(item->scalar);
         if (std::ranges::find(known, item->scalar) == known.end())
             unknown(loading, *item, "token", known);
@@ -157,7 +122,7 @@ std::vector<std::string> listener_names(const Config& config) {
 void load_listeners(Loading& loading, MapReader& in, Rule& rule) {
     const std::vector<std::string> names = listener_names(loading.config);
     const std::vector<std::string_view> known(names.begin(), names.end());
-    for (const Node* item : scalars(in, "listeners", "[\"0.0.0.0:502\"]")) {
+    for (const Node* item : in.items("listeners", "[\"0.0.0.0:502\"]", kAny)) {
         rule.listeners.push_back(item->scalar);
         if (std::ranges::find(known, item->scalar) == known.end())
             unknown(loading, *item, "listener", known);
@@ -180,7 +145,7 @@ std::optional<access::Place> place_of(const Config& config, const std::string& t
 }
 
 void load_stations(Loading& loading, MapReader& in, Rule& rule) {
-    for (const Node* item : scalars(in, "stations", "[press]")) {
+    for (const Node* item : in.items("stations", "[press]", kAny)) {
         if (const auto place = place_of(loading.config, item->scalar)) {
             rule.stations.push_back(*place);
         } else if (!loading.names_missing) {
@@ -194,7 +159,7 @@ void load_stations(Loading& loading, MapReader& in, Rule& rule) {
 void load_functions(Loading& loading, MapReader& in, Rule& rule) {
     constexpr std::int64_t kLast = 127;
     in.schema("functions").holds_integers = true;
-    for (const Node* item : scalars(in, "functions", "[16, 23]")) {
+    for (const Node* item : in.items("functions", "[16, 23]", kAny)) {
         const auto code = yaml::parse_integer(item->scalar);
         if (code && *code >= 1 && *code <= kLast) {
             rule.functions.push_back(static_cast<std::uint8_t>(*code));
@@ -224,7 +189,7 @@ void load_rule(Loading& loading, const Node& node) {
     rule.column = node.mark.column;
     load_name_of(loading, in, rule);
     load_acts(loading, in, rule);
-    load_from(loading, in, rule);
+    load_networks(loading, in, "from", rule.from);
     load_roles(loading, in, rule);
     load_token_names(loading, in, rule);
     rule.faces = words(loading, in, "faces", "[modbus_tcp]", kFaces);
@@ -327,7 +292,8 @@ void warn_of_rules(Loading& loading) {
 
 void load_rules(Loading& loading, MapReader& root) {
     const Node* node = root.map("access", "{default: allow, rules: [{name: a, deny: [write]}]}");
-    if (node == nullptr) return refuse_empty(root, "access", "leave it out for no rules");
+    root.refuse_empty("access", "leave it out for no rules");
+    if (node == nullptr) return;
     MapReader in(*node, loading.problems, "access");
     rules_keys().read(in, loading.config.access);
     in.sequence("roles", "[{name: setter, rights: [read, write]}]");  // load_own_roles() reads them

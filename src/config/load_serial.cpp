@@ -212,7 +212,6 @@ Settings load_master(Loading& loading, const Node& node) {
     settings.access.broadcast = BroadcastMode::silent;
     master_keys().read(in, settings);
     settings.response_timeout = in.duration("response_timeout", 1ms, 10min);
-    refuse_empty_access(in);
     in.finish();
     if (!loading.problems.empty()) return settings;
     if (serial_known) warn_of_timeout(loading, in, settings);

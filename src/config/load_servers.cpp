@@ -76,16 +76,12 @@ std::string endpoint_pattern(bool port_may_lack) {
            yaml::integer_pattern(0, 65535) + (port_may_lack ? ")?$" : ")$");
 }
 
-}  // namespace
-
 const std::string& network_pattern() {
     static const std::string kPattern = "^([0-9.]+(/" + yaml::integer_pattern(0, 32) +
                                         ")?|[0-9A-Fa-f.]*:[0-9A-Fa-f:.]*(/" +
                                         yaml::integer_pattern(0, 128) + ")?)$";
     return kPattern;
 }
-
-namespace {
 
 void refuse_listen(MapReader& in, std::string_view typed) {
     in.problem("listen", "listen must be ADDR:PORT such as 127.0.0.1:502 or [::1]:502, not " +
@@ -144,31 +140,20 @@ void warn_of_refusals(Loading& loading, yaml::Mark mark, const Line& line) {
 }
 
 void load_listener_lines(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
-    const Node* list = in.sequence("lines");
     in.looks_like("lines", name_pattern(), true);
-    in.schema("lines").fewest = 1;
-    if (list == nullptr) {
-        for (const Line& line : loading.config.lines) {
-            if (!line.listens) settings.lines.push_back(line.name);
-        }
-        return;
-    }
-    for (const Node& item : list->items) {
-        if (item.kind != Node::Kind::scalar) {
-            loading.problems.add(item.mark, "lines lists the names of lines, such as [floor1]");
-            continue;
-        }
-        const Line* line = find_line(loading, item.mark, item.scalar);
+    for (const Node* item : in.items("lines", "[floor1]", "all")) {
+        const Line* line = find_line(loading, item->mark, item->scalar);
         if (line == nullptr) continue;
-        if (line->listens) warn_of_refusals(loading, item.mark, *line);
-        if (std::ranges::find(settings.lines, item.scalar) != settings.lines.end()) {
-            loading.problems.add(item.mark, "line '" + item.scalar + "' is listed twice");
+        if (line->listens) warn_of_refusals(loading, item->mark, *line);
+        if (std::ranges::find(settings.lines, item->scalar) != settings.lines.end()) {
+            loading.problems.add(item->mark, "line '" + item->scalar + "' is listed twice");
         } else {
-            settings.lines.push_back(item.scalar);
+            settings.lines.push_back(item->scalar);
         }
     }
-    if (list->items.empty())
-        in.problem("lines", "lines must name at least one line; leave it out for all");
+    if (in.child("lines") != nullptr) return;
+    for (const Line& line : loading.config.lines)
+        if (!line.listens) settings.lines.push_back(line.name);
 }
 
 /// Finds a station of `line` by id or name; 0 is a broadcast to it.
@@ -232,6 +217,7 @@ void load_units(Loading& loading, MapReader& in, tcp_server::Settings& settings)
     const Node* map = in.map("units", "{101: floor1/31}");
     in.schema("units").keys = '^' + yaml::integer_pattern(0, 255) + '$';
     in.looks_like("units", "^[^/]+/.");
+    in.refuse_empty("units", "write such as {101: floor1/31}, or leave it out");
     if (map == nullptr) return;
     for (const yaml::Entry& entry : map->entries) {
         const auto unit = yaml::parse_integer(entry.key);
@@ -312,32 +298,6 @@ void load_diagnostics(Loading& loading, MapReader& in, tcp_server::Settings& set
     }
 }
 
-void load_allow(Loading& loading, MapReader& in, std::vector<Network>& allow) {
-    const Node* list = in.sequence("allow");
-    in.looks_like("allow", network_pattern());
-    in.schema("allow").fewest = 1;
-    if (list == nullptr) return;
-    for (const Node& item : list->items) {
-        if (const auto cidr = parse_cidr(item.scalar)) {
-            allow.push_back(*cidr);
-            const std::string network = network_of(*cidr);
-            if (!network.empty())
-                loading.warn(item.mark, item.scalar + " is all of " + network +
-                                            "; write that, or " + cidr->address +
-                                            (is_ipv6(cidr->address) ? "/128" : "/32") +
-                                            " for one machine");
-        } else {
-            loading.problems.add(item.mark, "allow lists networks such as 192.168.1.0/24, not " +
-                                                yaml::quote(item.scalar) +
-                                                network_hint(item.scalar));
-        }
-    }
-    if (list->items.empty())
-        in.problem("allow", "allow must name at least one network; leave it out for all");
-}
-
-constexpr std::string_view kNoNetwork = "name at least one network, or leave it out for all";
-
 /// Keys that users write as for the serial lines of other programs.
 constexpr std::array<yaml::Elsewhere, 5> kServerKeysElsewhere{
     {{"type", {}, {}, "remove it: serial lines are listed in 'lines'"},
@@ -354,16 +314,34 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     load_access(loading, in, settings);
     load_framing(in, settings);
     load_diagnostics(loading, in, settings);
-    load_allow(loading, in, settings.allow);
+    load_networks(loading, in, "allow", settings.allow);
     load_modbus_security(loading, in, settings);
     if (without_port && !settings.tls) refuse_listen(in, *without_port);
-    refuse_empty_access(in);
-    refuse_empty(in, "allow", kNoNetwork);
     in.finish();
     return settings;
 }
 
 }  // namespace
+
+void load_networks(Loading& loading, MapReader& in, std::string_view key,
+                   std::vector<Network>& networks) {
+    in.looks_like(key, network_pattern());
+    for (const Node* item : in.items(key, "[192.168.1.0/24]", "all")) {
+        const auto cidr = parse_cidr(item->scalar);
+        if (!cidr) {
+            loading.problems.add(item->mark,
+                                 std::string(key) + " lists networks such as 192.168.1.0/24, not " +
+                                     yaml::quote(item->scalar) + network_hint(item->scalar, key));
+            continue;
+        }
+        networks.push_back(*cidr);
+        const std::string network = network_of(*cidr);
+        if (!network.empty())
+            loading.warn(item->mark, item->scalar + " is all of " + network + "; write that, or " +
+                                         cidr->address + (is_ipv6(cidr->address) ? "/128" : "/32") +
+                                         " for one machine");
+    }
+}
 
 void load_access(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
     load_listener_lines(loading, in, settings);
@@ -371,11 +349,6 @@ void load_access(Loading& loading, MapReader& in, tcp_server::Settings& settings
     check_overlap(loading, in, settings);
     settings.read_only = load_read_only(in).value_or(false);
     access_keys().read(in, settings);
-}
-
-void refuse_empty_access(MapReader& in) {
-    refuse_empty(in, "lines", "name at least one line, or leave it out for all");
-    refuse_empty(in, "units", "write such as {101: floor1/31}, or leave it out");
 }
 
 void load_modbus_tcp(Loading& loading, MapReader& root) {
@@ -401,12 +374,10 @@ void load_http(Loading& loading, MapReader& root) {
         settings.anonymous = std::move(*standing);
     http_keys().read(in, settings);
     load_hosts(loading, in, settings);
-    load_allow(loading, in, settings.allow);
+    load_cors(loading, in, settings.cors);
+    load_networks(loading, in, "allow", settings.allow);
     load_tokens(loading, in, settings.tokens);
     settings.tls = load_tls(loading, in);
-    refuse_empty(in, "hosts", "name at least one host, or leave it out for the machine's names");
-    refuse_empty(in, "allow", kNoNetwork);
-    refuse_empty(in, "tokens", "give at least one token, or leave it out");
     in.finish();
     if (settings.port != 0)
         loading.firsts.once(in, "listen", "listener " + settings.name(),

@@ -117,15 +117,6 @@ std::string load_station_name(Loading& loading, MapReader& in, const Line& line,
     return *name;
 }
 
-/// Reads `simulate` of a station: the faults of its simulated panel.
-void load_faults(Loading& loading, MapReader& station, sim::Misbehaviour& faults) {
-    const Node* node = station.map("simulate", "{dead: true}");
-    if (node == nullptr) return;
-    MapReader in(*node, loading.problems, "simulate");
-    fault_keys().read(in, faults);
-    in.finish();
-}
-
 /// Returns the items that every read of these functions may have: the panel's limit within the
 /// standard's.
 std::uint16_t read_limit(const PanelProfile& profile, std::initializer_list<std::uint8_t> functions,
@@ -163,7 +154,6 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineContext& wo
                           Station& station) {
     station.read_only = load_read_only(in).value_or(false);
     station.listens = work.line.listens;
-
     StationSettings settings = load_station_timing(loading, in, work, station);
     settings.id = station.id;
     settings.crc_order = station.profile->crc_order;
@@ -184,7 +174,8 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineContext& wo
         read_limit(*station.profile, {kReadHoldingRegisters, kReadInputRegisters}, 125);
     settings.max_bits = read_limit(*station.profile, {kReadCoils, kReadDiscreteInputs}, 2000);
     settings.vouched = station.profile->name != "generic";  // generic only repeats the standard
-    load_faults(loading, in, station.faults);
+    load_map(in, "simulate", "{dead: true}",
+             [&](MapReader& faults) { fault_keys().read(faults, station.faults); });
     load_points(loading, in, station);
     in.finish();
     if (station.listens) warn_of_unused_keys(loading, in, settings, station);
@@ -192,7 +183,7 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineContext& wo
 }
 
 /// Keys that users write beside `id`.
-constexpr std::array<yaml::Elsewhere, 9> kStationKeysElsewhere{
+constexpr std::array<yaml::Elsewhere, 10> kStationKeysElsewhere{
     {{"response_timeout", "timing", {}},
      {"frame_gap", "timing", {}},
      {"late_window", "timing", {}},
@@ -201,6 +192,7 @@ constexpr std::array<yaml::Elsewhere, 9> kStationKeysElsewhere{
      {"baud", {}, "a line's serial"},
      {"parity", {}, "a line's serial"},
      {"device", {}, "a line"},
+     {"echo", {}, "a line"},
      {"at", {}, "a point"}}};
 
 Station load_station(Loading& loading, const Node& node, const LineContext& work) {

@@ -72,7 +72,7 @@ void make_context(MapReader& in, tls::Settings& settings) try {
 
 std::optional<tls::Settings> load_tls(Loading& loading, MapReader& in) {
     const yaml::Node* node = in.map("tls", kTlsExample);
-    refuse_empty(in, "tls", "give at least certificate and key, or leave it out");
+    in.refuse_empty("tls", "give at least certificate and key, or leave it out");
     if (node == nullptr) return std::nullopt;
     MapReader keys(*node, loading.problems, "tls", kTlsExample);
     tls::Settings settings;

@@ -56,6 +56,17 @@ struct Loading {
     }
 };
 
+/// Reads the map `key`, if it is there, by `load`; its other keys are unknown.
+template <class Load>
+void load_map(yaml::MapReader& in, std::string_view key, std::string_view example,
+              const Load& load) {
+    const yaml::Node* node = in.map(key, example);
+    if (node == nullptr) return;
+    yaml::MapReader inside(*node, in.problems(), std::string(key));
+    load(inside);
+    inside.finish();
+}
+
 /// Line and station names: [a-z0-9-]+.
 bool is_name(std::string_view text);
 /// Returns a regular expression for texts of these letters; a '-' must be the last of them.
@@ -71,10 +82,6 @@ std::optional<bool> load_read_only(yaml::MapReader& in);
 /// Returns "; did you mean 'x'?" if one of `known` is near, else "; known NOUN are a, b, c".
 std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
                          std::string_view noun);
-
-/// Reports a key without a value, or with all of it commented out, as it means neither "all" nor
-/// "none"; the message ends with `instead`. Call it after all keys have been read.
-void refuse_empty(yaml::MapReader& in, std::string_view key, std::string_view instead);
 
 /// Reports missing lines, unless a key is probably a mistyped `lines`: then call refuse_no_lines()
 /// if finish() accepted that key.

@@ -104,13 +104,27 @@ Typed typed_range(const std::string& text) {
     return {trimmed(text.substr(0, dash)), trimmed(text.substr(dash + 1))};
 }
 
+/// GDT100..GDT199, with other signs than the '-' of the keyboard.
+std::string other_range(const profile::PanelProfile& profile, const std::string& text) {
+    for (const std::string_view sign : {"\u2013", "\u2014", "...", "..", " to ", "~"}) {
+        const std::size_t at = text.find(sign);
+        if (at == text.npos) continue;
+        const auto [first, last] =
+            typed_range(text.substr(0, at) + '-' + text.substr(at + sign.size()));
+        if (profile::parse_notation(profile, first) && profile::parse_notation(profile, last))
+            return "a range has a '-' of the keyboard; write " + first + '-' + last;
+    }
+    return "";
+}
+
 /// Returns the items at a station; `why`: what is wrong with them there.
 std::optional<Span> named_items(const profile::PanelProfile& profile, const Typed& typed,
                                 std::string& why) {
     const auto first = profile::parse_notation(profile, typed.first);
     const auto last = profile::parse_notation(profile, typed.last);
     if (!first || !last) {
-        why = (first ? last : first).error().message;
+        why = other_range(profile, typed.first);
+        if (why.empty()) why = (first ? last : first).error().message;
         return std::nullopt;
     }
     if (first->area != last->area || first->address > last->address) {

@@ -51,8 +51,7 @@ const Keys<tcp_server::Settings>& listener_keys() {
         {{"join", Retransmissions::join}, {"pass", Retransmissions::pass}}};
     static const auto kKeys =
         Keys<Settings>()
-            .other("listen", "ADDR:PORT or [ADDR]:PORT; port 0: a free one.",
-                   [](const Settings& settings) { return settings.name(); })
+            .other("listen", "ADDR:PORT or [ADDR]:PORT; port 0: a free one.", &Settings::name)
             .initially("127.0.0.1:502")
             .change_needs(kListensAnew)
             .other("framing", "Framing of its clients' requests, over TCP.",
@@ -114,8 +113,7 @@ const Keys<serial_server::Settings>& master_keys() {
         {{"exception", OnFailure::exception}, {"silence", OnFailure::silence}}};
     static const auto kKeys =
         Keys<Settings>()
-            .other("name", "Unique: a-z, 0-9 and '-'.",
-                   [](const Settings& settings) { return settings.name; })
+            .other("name", "Unique: a-z, 0-9 and '-'.", &Settings::name)
             .other("device", "Serial port that the master is connected to.")
             .change_needs(kOpensPort)
             .other("serial", "Character format.")
@@ -153,22 +151,23 @@ const Keys<web::Settings>& http_keys() {
     using web::Settings;
     static const auto kKeys =
         Keys<Settings>()
-            .other("listen", "ADDR:PORT or [ADDR]:PORT.",
-                   [](const Settings& settings) { return settings.name(); })
+            .other("listen", "ADDR:PORT or [ADDR]:PORT.", &Settings::name)
             .initially("127.0.0.1:8080")
             .change_needs(kListensAnew)
             .other("anonymous",
                    "Role without a token: none, viewer (reads), operator (reads and writes), "
                    "engineer (also raw, broadcast, discover, simulator), admin (also reload), or "
                    "one of access.roles.",
-                   [](const Settings& settings) {
-                       return std::string(settings.anonymous.name());
-                   })
+                   [](const Settings& settings) { return std::string(settings.anonymous.name()); })
             .initially("viewer")
             .other("hosts",
                    "Its names in URLs, besides its addresses and localhost; another name "
                    "is answered 421. Without it the machine's name.",
                    [](const Settings& settings) { return names_text(settings.hosts); })
+            .other("cors",
+                   "Origins of other sites whose pages may read, such as "
+                   "https://scada.plant.example.",
+                   [](const Settings& settings) { return names_text(settings.cors); })
             .other("allow",
                    "Networks whose clients may connect, such as 192.168.1.0/24. Without it any.",
                    [](const Settings& settings) { return networks_text(settings.allow); })
@@ -194,26 +193,21 @@ const Keys<tls::Settings>& tls_keys() {
     static constexpr Words<Version, 2> kVersions{
         {{"TLSv1.2", Version::tls12}, {"TLSv1.3", Version::tls13}}};
     static constexpr Words<bool, 1> kRoles{{{"certificate", true}}};
-    const auto text = [](std::string Settings::* member) {
-        return [member](const Settings& settings) { return settings.*member; };
-    };
     static const auto kKeys =
         Keys<Settings>()
             .other("certificate",
                    "PEM file of the gateway's certificate, then of those between it and its CA.",
-                   text(&Settings::certificate))
+                   &Settings::certificate)
             .change_needs(kTlsRenewed)
-            .other("key", "PEM file of that certificate's key, without a password.",
-                   text(&Settings::key))
+            .other("key", "PEM file of that certificate's key, without a password.", &Settings::key)
             .change_needs(kTlsRenewed)
             .other("ca", "PEM file of the CA that signs the certificates of clients.",
-                   text(&Settings::ca))
+                   &Settings::ca)
             .change_needs(kTlsCloses)
             .word("client", &Settings::client, kClients,
                   "Whether clients show a certificate: none, optional, required.")
             .change_needs(kTlsCloses)
-            .other("crl", "PEM file of the certificates that the CA has revoked.",
-                   text(&Settings::crl))
+            .other("crl", "PEM file of the certificates that the CA has revoked.", &Settings::crl)
             .change_needs(kTlsCloses)
             .word("role_from", &Settings::role_from_certificate, kRoles,
                   "certificate: the role in a client's certificate decides what it may; without "
@@ -229,8 +223,7 @@ const Keys<tls::Settings>& tls_keys() {
 const Keys<web::Token>& token_keys() {
     static const auto kKeys =
         Keys<web::Token>()
-            .other("name", "Name that is in the log; unique.",
-                   [](const web::Token& token) { return token.name; })
+            .other("name", "Name that is in the log; unique.", &web::Token::name)
             .other("role",
                    "viewer reads, operator writes, engineer also raw, broadcast, discover and "
                    "simulator, admin also reload; or one of access.roles.",
@@ -238,7 +231,7 @@ const Keys<web::Token>& token_keys() {
             .other("file",
                    "File that holds the token, or its hash as `panelgate token new` prints it, and "
                    "nothing else.",
-                   [](const web::Token& token) { return token.file; })
+                   &web::Token::file)
             .other("expires",
                    "Last day of the token, such as 2027-12-31, or an instant, "
                    "2027-12-31T18:00:00Z; in UTC. Without it none.",
@@ -271,29 +264,25 @@ const Keys<mqtt::Settings>& mqtt_keys() {
     static constexpr Words<mqtt::Format, 2> kFormats{
         {{"json", mqtt::Format::json}, {"sparkplug", mqtt::Format::sparkplug}}};
     static constexpr Words<bool, 2> kWrites{{{"none", false}, {"points", true}}};
-    const auto text = [](std::string Settings::* member) {
-        return [member](const Settings& settings) { return settings.*member; };
-    };
     static const auto kKeys =
         Keys<Settings>()
             .other("broker", "Address: mqtt://HOST:1883, or mqtts://HOST:8883 with TLS.",
-                   [](const Settings& settings) { return settings.broker(); })
+                   &Settings::broker)
             .word("format", &Settings::format, kFormats,
                   "json, or sparkplug (Sparkplug B), which has group and node in place of "
                   "the topic.")
             .other("topic", "Beginning of the topics TOPIC/STATION/POINT, of format json.",
-                   text(&Settings::topic))
+                   &Settings::topic)
             .initially("panelgate")
-            .other("group", "Group id. Without it the topic, with '-' for '/'.",
-                   text(&Settings::group))
-            .other("node", "Edge node id. Without it the machine's name.", text(&Settings::node))
+            .other("group", "Group id. Without it the topic, with '-' for '/'.", &Settings::group)
+            .other("node", "Edge node id. Without it the machine's name.", &Settings::node)
             .integer("qos", &Settings::qos, 0, 1,
                      "Quality of service; 0: what is on its way may be lost.")
             .other("client_id", "Client id. Without it panelgate- and the machine's name.",
-                   text(&Settings::client_id))
-            .other("username", "User at the broker. Without it none.", text(&Settings::username))
+                   &Settings::client_id)
+            .other("username", "User at the broker. Without it none.", &Settings::username)
             .other("password_file", "File that holds the password of `username`.",
-                   text(&Settings::password_file))
+                   &Settings::password_file)
             .duration("keep_alive", &Settings::keep_alive, 5s, 1h,
                       "Keep-alive interval, in whole seconds.")
             .integer("store", &Settings::store, 100, 1'000'000,
@@ -301,10 +290,10 @@ const Keys<mqtt::Settings>& mqtt_keys() {
             .word("write", &Settings::write, kWrites,
                   "points: who may publish TOPIC/+/+/set, or DCMD, writes points.")
             .other("tls", "TLS at the broker, with mqtts://. Without it the system's CAs count.")
-            .other("ca", "The same as in `tls`, from earlier versions.", text(&Settings::ca))
+            .other("ca", "The same as in `tls`, from earlier versions.", &Settings::ca)
             .other("certificate", "The same as in `tls`, from earlier versions.",
-                   text(&Settings::certificate))
-            .other("key", "The same as in `tls`, from earlier versions.", text(&Settings::key));
+                   &Settings::certificate)
+            .other("key", "The same as in `tls`, from earlier versions.", &Settings::key);
     return kKeys;
 }
 
@@ -329,7 +318,7 @@ const Keys<audit::Settings>& audit_keys() {
         Keys<Settings>()
             .other("file",
                    "File that is written; full ones beside it have a number behind the name.",
-                   [](const Settings& settings) { return settings.file; })
+                   &Settings::file)
             .other("rotate", "Size of a file, such as 50MiB; then the next one begins.",
                    [](const Settings& settings) { return size_text(settings.rotate); })
             .initially("50MiB")
@@ -378,7 +367,7 @@ const Keys<OwnRole>& own_role_keys() {
     static const auto kKeys =
         Keys<OwnRole>()
             .other("name", "Name of the role, for tokens, anonymous, certificates and rules.",
-                   [](const OwnRole& role) { return role.name; })
+                   &OwnRole::name)
             .other("rights",
                    "What it may do: read, write, broadcast, raw, discover, simulator, reload. "
                    "A broadcast is also a write, and raw also a read or a write.",
@@ -396,7 +385,7 @@ const Keys<access::Rule>& rule_keys() {
     static const auto kKeys =
         Keys<Rule>()
             .other("name", "Name of the rule, for refusals, metrics and the audit; unique.",
-                   [](const Rule& rule) { return rule.name; })
+                   &Rule::name)
             .other("allow",
                    "What the rule allows: read, write, broadcast (also a write), raw (also a read "
                    "or a write).",
@@ -427,7 +416,7 @@ const Keys<access::Rule>& rule_keys() {
                    "Items: FIRST-LAST in the panel's notation, such as UW100-UW199, "
                    "TABLE/FIRST-LAST, or a map. Functions without items are among them only where "
                    "`functions` names them.",
-                   [](const Rule& rule) { return rule.range; });
+                   &Rule::range);
     return kKeys;
 }
 

@@ -24,7 +24,7 @@ const Keys<Config>& root_keys() {
             .other("profiles_dir",
                    "Folder of further panel profiles, relative to this file; its *.yaml add to "
                    "the shipped ones or replace them.",
-                   [](const Config& config) { return config.profiles_dir; })
+                   &Config::profiles_dir)
             .other("templates",
                    "Keys that many stations share, by the template's name: all of a "
                    "station's but id and name.")
@@ -79,7 +79,7 @@ const Keys<Line>& line_keys() {
     static constexpr Words<bool, 2> kUnlisted{{{"pass", false}, {"refuse", true}}};
     static const auto kKeys =
         Keys<Line>()
-            .other("name", "Unique: a-z, 0-9 and '-'.", [](const Line& line) { return line.name; })
+            .other("name", "Unique: a-z, 0-9 and '-'.", &Line::name)
             .change_needs(kOpensPort)
             .other("device",
                    "Serial device, tcp://HOST:PORT (RTU over TCP), or sim (simulated panels).")
@@ -120,8 +120,8 @@ const Keys<Line>& line_keys() {
 }
 
 const Keys<line::Settings>& port_keys() {
-    static const auto kKeys = Keys<line::Settings>().other(
-        "device", "A serial device.", [](const line::Settings& port) { return port.device; });
+    static const auto kKeys =
+        Keys<line::Settings>().other("device", "A serial device.", &line::Settings::device);
     return kKeys;
 }
 
@@ -323,8 +323,7 @@ const Keys<points::Poll>& poll_keys() {
     constexpr std::int64_t kLargest = 2040;  // the largest read of any panel: GT, ARCT1F501E 1.3.1
     static const auto kKeys =
         Keys<Poll>()
-            .other("read", "First register or bit, in the panel's notation.",
-                   [](const Poll& poll) { return poll.read; })
+            .other("read", "First register or bit, in the panel's notation.", &Poll::read)
             .integer("count", &Poll::count, 1, kLargest, "Number of registers or bits.")
             .duration("every", &Poll::every, 1ms, points::kSlowest, "Interval between two reads.");
     return kKeys;
@@ -339,10 +338,9 @@ const Keys<points::Point>& point_keys() {
     const auto text = [](const auto& number) { return number ? number->text() : ""; };
     static const auto kKeys =
         Keys<Point>()
-            .other("name", "Name of a-z, 0-9, '-' and '_', unique in its station.",
-                   [](const Point& point) { return point.name; })
+            .other("name", "Name of a-z, 0-9, '-' and '_', unique in its station.", &Point::name)
             .other("at", "Register or bit in the panel's notation, such as UW100 or 400001.",
-                   [](const Point& point) { return point.at; })
+                   &Point::at)
             .other("bit", "One bit of a register; the type is bool then.",
                    [](const Point& point) {
                        return point.bit ? std::to_string(*point.bit) : std::string();
@@ -359,8 +357,7 @@ const Keys<points::Point>& point_keys() {
             .other("offset", "Of numbers: value = raw * scale + offset.",
                    [](const Point& point) { return number_text(point.offset); })
             .initially("0")
-            .other("unit", "Unit, as people write it.",
-                   [](const Point& point) { return point.unit; })
+            .other("unit", "Unit, as people write it.", &Point::unit)
             .other("min", "Of numbers: smallest value that may be written.",
                    [=](const Point& point) { return text(point.min); })
             .other("max", "Of numbers: largest value that may be written.",

@@ -265,6 +265,13 @@ void compare_hosts(Lines& all, const web::Settings& running, const web::Settings
     }
 }
 
+void compare_cors(Lines& all, const web::Settings& running, const web::Settings& next) {
+    for (const std::string& origin : next.cors) {
+        if (std::ranges::find(running.cors, origin) == running.cors.end())
+            all.push_back("http: cors has " + origin);
+    }
+}
+
 void compare_http(Lines& all, const Config& running, const Config& next) {
     if (!next.http) return;
     const std::string endpoint = "http " + next.http->name();
@@ -276,6 +283,7 @@ void compare_http(Lines& all, const Config& running, const Config& next) {
     compare_tls(all, endpoint, running.http->tls, next.http->tls);
     compare_allow(all, endpoint, running.http->allow, next.http->allow);
     compare_hosts(all, *running.http, *next.http);
+    compare_cors(all, *running.http, *next.http);
     const Standing& was = running.http->anonymous;
     const Standing& anonymous = next.http->anonymous;
     if (anonymous.exceeds(was)) all.push_back("http: anonymous " + change_of(was, anonymous));

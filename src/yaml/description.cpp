@@ -229,6 +229,9 @@ bool MapReader::refuse(std::string_view key, const std::string& why) {
 }
 
 void MapReader::finish() {
+    for (const auto& [key, instead] : not_empty_)
+        if (has(key) && child(key) == nullptr && !is_mistyped(key))
+            problem(key, std::string(key) + " has no value; " + instead);
     std::size_t told = 0;
     for (std::size_t i = 0; i < node_->entries.size(); ++i) {
         const Entry& entry = node_->entries[i];

@@ -186,12 +186,29 @@ class Builder final : public YAML::EventHandler {
         }
         Open& level = stack_.back();
         if (level.node.kind == Node::Kind::sequence) {
-            if (!is_comma(node)) level.node.items.push_back(std::move(node));
+            if (is_comma(node)) return;
+            if (node.kind == Node::Kind::null) node.mark = dash_before(node.mark);
+            level.node.items.push_back(std::move(node));
         } else if (!level.has_key) {
             put_key(level, node);
         } else {
             put_value(level, std::move(node));
         }
+    }
+    /// The parser marks an empty item at the next token, maybe lines below.
+    Mark dash_before(Mark next) const {
+        const std::string_view line = source_.line(next.line);
+        const std::size_t column = static_cast<std::size_t>(next.column) - 1;
+        const std::string_view here = line.substr(std::min(column, line.size()));
+        for (const std::string_view typed : {"~", "null", "Null", "NULL", "]", ","})
+            if (here.starts_with(typed)) return next;
+        for (int number = next.line; number > 0; --number) {
+            const std::string_view text = source_.line(number);
+            const std::size_t at = text.find_first_not_of(' ');
+            if (at != text.npos && text[at] == '-' && (number < next.line || at < column))
+                return {number, static_cast<int>(at) + 1};
+        }
+        return next;
     }
     /// Reports and skips an empty value between two commas of [a,, b] and {a: 1,, b: 2}.
     bool is_comma(const Node& node) {

@@ -193,6 +193,16 @@ std::string origin_hint(const Node& node, std::string_view told) {
     return "; it is the value of ${" + node.variable + "}: change the variable, or its default";
 }
 
+std::string comment_hint(const Node& node) {
+    const std::string_view text = node.scalar;
+    const std::size_t sign = std::min(text.find('#'), text.find("//"));
+    if (node.quoted || sign == text.npos || sign == 0) return "";
+    const std::string_view value = text.substr(0, text.find_last_not_of(' ', sign - 1) + 1);
+    const std::string_view comment = trim(text.substr(text.find_first_not_of("#/", sign)));
+    return write(std::string(value) + " # " + std::string(comment)) +
+           ": a comment begins with a blank and '#'";
+}
+
 std::string text_hint(const Node& node, char opening) {
     if (node.kind != Node::Kind::scalar || !node.scalar.starts_with(opening)) return "";
     // Unquoted, it can only come from a variable.

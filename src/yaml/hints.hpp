@@ -21,6 +21,8 @@ std::string number_hint(std::string_view text, bool whole);
 std::string boolean_hint(const Node& node);
 /// For an environment variable in another program's notation.
 std::string variable_hint(std::string_view text);
+/// For `auto// on` and `auto# on`.
+std::string comment_hint(const Node& node);
 /// For a list (`[`) or a map (`{`) that is a text, in quotes or from a variable.
 std::string text_hint(const Node& node, char opening);
 /// For `http: off`, if the map's example has no "off".

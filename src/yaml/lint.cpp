@@ -75,15 +75,22 @@ constexpr auto kSlips = std::to_array<Slip>({
      "in place of this line"},
     {On::begin, Kind::plain, "-", R"(-([A-Za-z][\w-]*):?(?: .*)?)", 0,
      "a blank is missing after '-'; write '- $1:'"},
+    {On::begin, Kind::plain, "+", R"(\+ .*)", 0, "a '+' begins no key; remove it"},
     {On::token, Kind::plain, "?", R"(\?)", 0, "a '?' is no value; write what is meant"},
     {On::line, Kind::plain, "(", R"(\(([A-Za-z][\w-]*: [^)]*).*)", 0,
      "'(' begins no map; write {$1}"},
     {On::line, Kind::plain, ":", R"(([A-Za-z][\w-]*:)([{["'].*))", 2,
-     "a blank is missing after '$1'"},
+     "a blank is missing after '$1'; write '$1 $2'"},
+    {On::line, Kind::plain, "=", R"(([A-Za-z][\w-]*) *(=) *([{[].*))", 2,
+     "a key is followed by ':', not '='; write '$1: $3'"},
     {On::line, Kind::plain, ".:]l",
      R"(([\w./:[\]-]*[.:\]][\w.-]*|localhost): +([0-9/]+)(?:[,}\]].*)?)", 0, kAddress},
     {On::two_keys, Kind::plain, "", R"([^ ]+ +([\w./:[\]-]*[.:\]][\w.-]*|localhost): +([0-9/]+))",
      1, kAddress},
+    {On::two_keys, Kind::plain, "", R"(\S+: +(tcp): *(?://)?(\S+))", 1,
+     "an address begins with tcp:// and has no blank; write tcp://$2"},
+    {On::two_keys, Kind::plain, "", R"((\S+?): +([A-Za-z][\w-]*: [^{}]*\}))", 2,
+     "a '{' is missing; write '$1: {$2'"},
     {On::two_keys, Kind::plain, "", R"([^ ]+ +(- .*))", 1,
      "a list begins below its key; begin a new line before this '-'"},
     {On::two_keys, Kind::plain, "", R"((\S+?): +(?!\()(([A-Za-z][\w-]*):(?: .*)?))", 2, kTwoKeys},
@@ -97,8 +104,8 @@ constexpr auto kSlips = std::to_array<Slip>({
      "U+FF1A is no colon; write '$1: $3'"},
     {On::alone, Kind::plain, "", R"(([A-Za-z][\w-]*|<<):(?!//)(.+))", 2,
      "a blank is missing after '$1:'; write '$1: $2'"},
-    {On::alone, Kind::plain, "", R"(([A-Za-z][\w-]*|<<)\s*(=)\s*(.*))", 2,
-     "a key is followed by ':', not '='; write '$1: $3'"},
+    {On::alone, Kind::plain, "", R"(([A-Za-z][\w-]*|<<)\s*(:=|=>|[=;])\s*(.*))", 2,
+     "a key is followed by ':', not '$2'; write '$1: $3'"},
     {On::alone, Kind::plain, "", R"(([A-Za-z][\w-]*|<<)(?=[\s*]|$)(\s*):?\s*(.*))", 2,
      "a ':' is missing after '$1'; write '$1: $3'"},
     {On::line, Kind::alias, "", R"(\*(:[0-9]+)(?:[ ,}\]].*)?)", 0,
@@ -184,6 +191,18 @@ std::optional<Finding> tried(const Scanned& text, std::size_t token, std::size_t
     return Finding{text.tokens[token].begin + static_cast<std::size_t>(cursor), told(slip, match)};
 }
 
+/// The rows of a kind of token, in their order.
+const std::vector<std::size_t>& rows_of(Kind kind) {
+    constexpr auto kKinds = static_cast<std::size_t>(Kind::document) + 1;
+    static const std::array<std::vector<std::size_t>, kKinds> kRows = [] {
+        std::array<std::vector<std::size_t>, kKinds> all;
+        for (std::size_t row = 0; row < kSlips.size(); ++row)
+            all.at(static_cast<std::size_t>(kSlips[row].kind)).push_back(row);
+        return all;
+    }();
+    return kRows.at(static_cast<std::size_t>(kind));
+}
+
 /// True for a key whose value is an item, or is followed by another ': '.
 bool has_two_keys(const Scanned& text, std::size_t key) {
     const bool begins = text.tokens[key].first || text.tokens[key - 1].kind == Kind::dash;
@@ -215,8 +234,8 @@ void find_slips(const Scanned& text, bool refused, Findings& findings) {
             if (on == On::two_keys) return twice;
             return tries_all && on != On::alone && (on != On::alias || !is_known);
         };
-        for (std::size_t row = 0; row < kSlips.size(); ++row) {
-            if (kSlips[row].kind != token.kind || !may_be_on(kSlips[row].on)) continue;
+        for (const std::size_t row : rows_of(token.kind)) {
+            if (!may_be_on(kSlips[row].on)) continue;
             if (auto finding = tried(text, i, row)) {
                 findings.push_back(std::move(*finding));
                 break;
@@ -228,8 +247,8 @@ void find_slips(const Scanned& text, bool refused, Findings& findings) {
 }  // namespace
 
 std::optional<Finding> missing_colon(const Scanned& text, std::size_t token) {
-    for (std::size_t row = 0; row < kSlips.size(); ++row) {
-        if (kSlips[row].on != On::alone || text.tokens[token].kind != Kind::plain) continue;
+    for (const std::size_t row : rows_of(text.tokens[token].kind)) {
+        if (kSlips[row].on != On::alone) continue;
         if (auto finding = tried(text, token, row)) return finding;
     }
     return std::nullopt;
@@ -381,7 +400,10 @@ Findings find_causes(const Scanned& text) {
 }
 
 bool has_wrong_indent(const Scanned& text, const Token& first) {
-    return tab_before(text, first) != std::string_view::npos ||
+    const std::string_view word = text.text(first);
+    const bool has_sign =
+        first.kind == Kind::plain && (word.starts_with('+') || word.starts_with('-'));
+    return has_sign || tab_before(text, first) != std::string_view::npos ||
            is_wrong_blank(code_point(character_at(text.text(first), 0)));
 }
 

@@ -49,7 +49,12 @@ std::string wrong(std::string_view key, std::string_view wanted, const Node& nod
 std::string list_hint(const Node& node, std::string_view example) {
     if (node.kind == Node::Kind::map) return "; begin each item with '- '";
     if (std::string text = text_hint(node, '['); !text.empty() || !example.empty()) return text;
-    return "; write [" + std::string(clip(node.scalar, 40)) + "], or '- ' before each item";
+    std::string_view items = node.scalar;
+    if (items == "all" || items == "any") return "; leave it out for all";
+    constexpr std::string_view kBrackets = "[](){}<> ";
+    items.remove_prefix(std::min(items.find_first_not_of(kBrackets), items.size()));
+    items = items.substr(0, items.find_last_not_of(kBrackets) + 1);
+    return "; write [" + std::string(clip(items, 40)) + "], or '- ' before each item";
 }
 
 std::string two_values(const Node& node) {
@@ -236,7 +241,7 @@ std::optional<std::size_t> MapReader::choice_index(std::string_view key,
     }
     const std::string near = nearest(node->scalar, words);
     problem(key, wrong(key, join(words), *node) +
-                     (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                     (near.empty() ? comment_hint(*node) : "; did you mean '" + near + "'?") +
                      (hint ? hint(node->scalar) : ""));
     return std::nullopt;
 }
@@ -275,6 +280,32 @@ const Node* MapReader::sequence(std::string_view key, std::string_view example) 
     if (node == nullptr || node->kind == Node::Kind::sequence) return below(key, node);
     problem(key, wrong(key, "a list" + such_as(example), *node) + list_hint(*node, example));
     return nullptr;
+}
+
+std::vector<const Node*> MapReader::items(std::string_view key, std::string_view example,
+                                          std::string_view any) {
+    std::vector<const Node*> all;
+    const Node* list = sequence(key);
+    schema(key).fewest = 1;
+    refuse_empty(key, "list at least one, or leave it out for " + std::string(any));
+    if (list == nullptr) return all;
+    if (list->items.empty())
+        problem(key,
+                std::string(key) + " must list at least one; leave it out for " + std::string(any));
+    for (const Node& item : list->items) {
+        if (item.kind == Node::Kind::scalar) {
+            all.push_back(&item);
+        } else {
+            problems_->add(item.mark, std::string(key) + " is a list of words, such as " +
+                                          std::string(example));
+        }
+    }
+    return all;
+}
+
+void MapReader::refuse_empty(std::string_view key, std::string_view instead) {
+    schema(key).may_be_null = false;
+    not_empty_.emplace_back(key, instead);
 }
 
 Mark MapReader::mark(std::string_view key) const {

@@ -8,7 +8,7 @@ import unittest
 import xml.etree.ElementTree
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-from measures import figures, plot, report  # noqa: E402
+from measures import cost, figures, plot, report  # noqa: E402
 from measures.figures import Bar, Row  # noqa: E402
 
 # Two transactions of 10 ms; the second request leaves 100 us late, and a third finds no silence.
@@ -71,6 +71,30 @@ class Figures(unittest.TestCase):
         self.assertFalse(figures.holds(BARS[0], 0.899))
         self.assertTrue(figures.holds(BARS[1], 5))
         self.assertFalse(figures.holds(BARS[1], math.nan))
+
+
+class Cost(unittest.TestCase):
+    def test_an_interval_holds_the_median_and_is_the_same_for_the_same_values(self):
+        values = [i / 100 for i in range(-50, 51)]
+        low, high = cost.interval(values)
+        self.assertTrue(-0.2 < low < 0 < high < 0.2, (low, high))
+        self.assertEqual(cost.interval(values), (low, high))
+
+    def test_a_line_that_waits_for_its_master_is_less_used(self):
+        gap = figures.standard_gap(cost.BAUD)
+        def frames(late):
+            times = [(i * (0.01 + gap + late), i * (0.01 + gap + late) + 0.01) for i in range(11)]
+            return [frame for start, end in times for frame in
+                    (figures.Frame(start, start + 0.004, "REQ"), figures.Frame(start + 0.005, end, "RSP"))]
+        self.assertAlmostEqual(cost.utilisation(frames(0)), 1)
+        self.assertAlmostEqual(cost.utilisation(frames(0.01 + gap)), 0.5)
+
+    def test_pairs_are_judged_by_their_medians(self):
+        pairs = [{cost.BARE: (100, 0.9), cost.LADEN: (102, 0.899)}] * 60
+        (_, share, _, _), (_, lost, _, _) = cost.judged(pairs)
+        self.assertAlmostEqual(share, 0.02)
+        self.assertAlmostEqual(lost, 0.001)
+        self.assertTrue(cost.is_narrow(pairs))
 
 
 class Report(unittest.TestCase):

@@ -247,6 +247,52 @@ class GivenNames(Doors):
             self.assertEqual(self.status("GET", "/api/v1/lines", host=host), status, host)
 
 
+class OtherSites(Doors):
+    """Pages of other sites that may read (the CORS protocol of the Fetch standard)."""
+    SITE = "https://scada.plant.example"
+    CONFIG = gateway(line(), http=ADMIN + ', cors: ["https://SCADA.plant.example:443", "http://[fd00::1]:8080"]')
+
+    def shared(self, answer):
+        return answer.headers.get("access-control-allow-origin")
+
+    def test_a_listed_site_may_read_and_is_told_so_before(self):
+        for site in (self.SITE, "http://[fd00::1]:8080"):
+            answer = self.ask("GET", PRESS + "UW0", f"Origin: {site}", "Sec-Fetch-Site: cross-site",
+                              "Sec-Fetch-Mode: cors", "Sec-Fetch-Dest: empty")
+            self.assertEqual((answer.status, self.shared(answer)), (200, site))
+            self.assertIn("Origin", answer.headers["vary"])
+        before = self.ask("OPTIONS", PRESS + "UW0", f"Origin: {self.SITE}",
+                          "Access-Control-Request-Method: GET",
+                          "Access-Control-Request-Headers: authorization")
+        self.assertEqual((before.status, self.shared(before)), (204, self.SITE))
+        self.assertEqual(before.headers["access-control-allow-methods"], "GET, HEAD")
+        self.assertIn("Authorization", before.headers["access-control-allow-headers"])
+
+    def test_its_page_sees_what_is_refused_and_events(self):
+        wrong = self.ask("GET", "/api/v1/lines", f"Origin: {self.SITE}", "Authorization: Bearer no")
+        self.assertEqual((wrong.status, self.shared(wrong)), (401, self.SITE))
+        with Connection(self.port) as stream:
+            stream.send("GET", "/api/v1/events?types=station", f"Origin: {self.SITE}")
+            self.assertEqual(self.shared(stream.receive()), self.SITE)
+
+    def test_it_writes_nothing_and_others_do_not_even_read(self):
+        write = self.ask("PUT", PRESS + "UW100", f"Origin: {self.SITE}",
+                         "Content-Type: application/json", body={"values": [1]})
+        self.assertEqual(write.status, 403)
+        self.assertIn("may only read", write.json()["detail"])
+        for site in ("http://scada.plant.example", "https://scada.plant.example:8443", "null",
+                     "https://scada.plant.example.evil", "https://evil.example", "*"):
+            for method in ("GET", "OPTIONS"):
+                answer = self.ask(method, PRESS + "UW0", f"Origin: {site}")
+                self.assertIsNone(self.shared(answer), site)
+            self.assertEqual(self.status("GET", PRESS + "UW0", f"Origin: {site}"), 403, site)
+
+    def test_without_an_origin_nothing_is_added(self):
+        self.assertIsNone(self.shared(self.ask("GET", "/api/v1/lines")))
+        self.assertEqual(self.status("GET", PRESS + "UW0", "Sec-Fetch-Site: cross-site",
+                                     "Sec-Fetch-Mode: no-cors", "Sec-Fetch-Dest: image"), 403)
+
+
 class Allowed(unittest.TestCase):
     def test_who_is_not_in_the_list_is_closed_without_a_byte(self):
         with harness.configured(gateway(line(), http=ADMIN + ", allow: [127.0.0.2/31]")) as program:

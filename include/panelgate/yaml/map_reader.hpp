@@ -84,6 +84,13 @@ class MapReader {
     /// Like child(), but another kind is a problem, shown with an example such as "{mode: off}".
     const Node* map(std::string_view key, std::string_view example = {});
     const Node* sequence(std::string_view key, std::string_view example = {});
+    /// The scalars of a list that has one at least, as an empty one could mean all or none; `any`
+    /// says what leaving it out means.
+    std::vector<const Node*> items(std::string_view key, std::string_view example,
+                                   std::string_view any);
+    /// Lets finish() report a key without a value, or with all of it commented out, as it means
+    /// neither "all" nor "none"; the message ends with `instead`.
+    void refuse_empty(std::string_view key, std::string_view instead);
 
     // Checks that the caller makes itself, recorded for a Description. Call them where the value is
     // checked; all calls for one key add up.
@@ -151,6 +158,7 @@ class MapReader {
     std::vector<std::string_view> refused_;
     std::vector<std::string> excused_;  ///< required, absent, and probably mistyped
     std::vector<std::string> parents_;  ///< known keys with a map or a list
+    std::vector<std::pair<std::string_view, std::string>> not_empty_;
     std::span<const Elsewhere> elsewhere_;
     int order_ = 0;  ///< of about()
 };

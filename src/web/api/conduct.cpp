@@ -207,16 +207,6 @@ bool is_packable(const HttpResponse& response, std::size_t from) {
     return response.body.size() >= from;
 }
 
-/// Appends to an existing Vary header.
-void add_vary(HttpResponse& response, const std::string& name) {
-    for (auto& [header, value] : response.headers) {
-        if (header != "Vary") continue;
-        if (value.find(name) == std::string::npos) value += ", " + name;
-        return;
-    }
-    response.headers.emplace_back("Vary", name);
-}
-
 void set_tag(HttpResponse& response, const std::string& if_none_match) {
     if (add_etag(response, if_none_match, tag_of(response.body))) response.body.clear();
 }

@@ -9,6 +9,8 @@
 #include <string>
 #include <string_view>
 
+#include "cors.hpp"
+
 namespace panelgate::web {
 
 namespace {
@@ -136,21 +138,29 @@ bool is_ours(std::string_view origin, const HttpRequest& request, const HostName
 }  // namespace
 
 std::optional<Problem> check_origin(const HttpRequest& request, const HostNames& names,
-                                    const boost::asio::ip::address& local) {
+                                    const boost::asio::ip::address& local,
+                                    const std::vector<std::string>& readers) {
     if (!request.host.empty() && !names.knows(request.host, local)) {
         return problem(421, "this gateway is not called '" + request.host +
                                 "'; if it shall be, name it in http: hosts");
     }
+    const bool may_read = !listed_origin(request, readers).empty();
+    if (may_read && is_reading(request)) return std::nullopt;
     if (header(request, "sec-fetch-site") == "cross-site" && !follows_link(request)) {
         return problem(403, "a page of another site may not ask this gateway", "foreign-page");
     }
     // Browsers send Origin with a change, or a read of the answer by script, even where they send
     // no Fetch Metadata (plain HTTP). A read uses the line too.
-    if (request.method != "OPTIONS" && request.headers.contains("origin") &&
-        !is_ours(header(request, "origin"), request, names, local))
+    const bool is_foreign = request.method != "OPTIONS" && request.headers.contains("origin") &&
+                            !is_ours(header(request, "origin"), request, names, local);
+    if (is_foreign && may_read)
+        return problem(403, "a page of another site may only read (GET) what this gateway has",
+                       "foreign-page");
+    if (is_foreign)
         return problem(403,
                        "a page of another site may not ask this gateway; if it is one of yours, "
-                       "name its host in http: hosts",
+                       "name its host in http: hosts, and if it shall read, its origin in "
+                       "http: cors",
                        "foreign-page");
     return std::nullopt;
 }

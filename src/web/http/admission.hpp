@@ -56,9 +56,11 @@ class HostNames {
 
 /// Checks a request for anything not public. 421 if it is for another host (`request.host`;
 /// HTTP/1.0 may have none). 403 if the browser reports a page of another site, unless the user
-/// follows a link to one of our pages; and for a foreign Origin, except with OPTIONS.
+/// follows a link to one of our pages; and for a foreign Origin, except with OPTIONS. Pages of the
+/// origins in `readers` (lower case) may read.
 std::optional<Problem> check_origin(const HttpRequest& request, const HostNames& names,
-                                    const boost::asio::ip::address& local);
+                                    const boost::asio::ip::address& local,
+                                    const std::vector<std::string>& readers);
 
 /// Slows down token guessing, per address. The reply to a wrong token is delayed, a right one's is
 /// not; since that difference already shows, an address that guesses has its requests checked one

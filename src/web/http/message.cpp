@@ -29,6 +29,15 @@ void Caller::certify(std::string subject, std::string word, std::optional<Standi
     who_ = make_who(std::move(who));
 }
 
+void add_vary(HttpResponse& response, const std::string& name) {
+    for (auto& [header, value] : response.headers) {
+        if (header != "Vary") continue;
+        if (value.find(name) == std::string::npos) value += ", " + name;
+        return;
+    }
+    response.headers.emplace_back("Vary", name);
+}
+
 void log_client(const Caller& caller, std::string_view event,
                 std::initializer_list<std::pair<std::string_view, std::string>> fields) {
     std::vector<rt::LogField> all{{"client", caller.name()}};

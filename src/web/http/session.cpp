@@ -15,12 +15,14 @@
 #include <boost/beast/http/write.hpp>
 #include <boost/system/error_code.hpp>
 #include <exception>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "admission.hpp"
+#include "cors.hpp"
 #include "panelgate/base/network.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tls/roles.hpp"
@@ -118,9 +120,11 @@ Problem no_place() {
     return passing_problem(503, "all places of this server are taken; only probes are answered", 1);
 }
 
-HttpResponse too_many_streams() {
-    return to_response(
+HttpResponse too_many_streams(decltype(HttpResponse::headers) headers) {
+    HttpResponse response = to_response(
         passing_problem(503, "this address streams events on as many connections as it may", 5));
+    std::ranges::move(headers, std::back_inserter(response.headers));
+    return response;
 }
 
 }  // namespace
@@ -209,9 +213,9 @@ asio::awaitable<bool> HttpSession::serve_one() {
     co_await std::move(waiting);
     bool more = false;
     if (response.events && !head && !shared_->places.stream(caller_->id()))
-        response = too_many_streams();
+        response = too_many_streams(std::move(response.headers));
     if (!caller_->has_left() && response.events && !head) {
-        asio::awaitable<void> sending = send_events(std::move(response.events));
+        asio::awaitable<void> sending = send_events(std::move(response));
         co_await std::move(sending);
     } else if (!caller_->has_left()) {
         const bool stays = keep_alive && !stopping_ && !shared_->places.is_throttled(caller_->id());
@@ -237,8 +241,11 @@ asio::awaitable<HttpResponse> HttpSession::answer(BeastRequest message) {
     HttpRequest request =
         to_request(std::move(message), std::move(*target), host ? *host : std::string());
     request.caller = caller_;
+    const std::string reader = listed_origin(request, shared_->site->settings.cors);
+    const bool preflight = request.method == "OPTIONS";
     asio::awaitable<HttpResponse> handling = handle(std::move(request), std::move(barred));
     HttpResponse response = co_await std::move(handling);
+    if (!reader.empty()) share_with(reader, preflight, response);
     co_return response;
 }
 
@@ -332,7 +339,7 @@ asio::awaitable<HttpResponse> HttpSession::handle(HttpRequest request,
     const std::shared_ptr<const Site> site = shared_->site;  // until this request ends
     const std::string path = request.path.empty() ? "/" : request.path.front();
     std::string what;
-    if (!barred) barred = check_origin(request, shared_->hosts, local_);
+    if (!barred) barred = check_origin(request, shared_->hosts, local_, site->settings.cors);
     if (probes_only_) barred = no_place();
     try {
         asio::awaitable<HttpResponse> handling =
@@ -390,18 +397,20 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
     co_return !error && keep_alive;
 }
 
-std::string HttpSession::head_of_events() const {
+std::string HttpSession::head_of_events(const HttpResponse& response) const {
+    std::string more;
+    for (const auto& [name, value] : response.headers) more += name + ": " + value + "\r\n";
     return "HTTP/1.1 200 OK\r\nServer: " + shared_->site->product +
            "\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n"
            "X-Content-Type-Options: nosniff\r\n" +
            (handshakes_ ? "Strict-Transport-Security: " + std::string(kStrictTransport) + "\r\n"
                         : "") +
-           "Connection: close\r\n\r\n: panelgate\n\n";
+           more + "Connection: close\r\n\r\n: panelgate\n\n";
 }
 
 /// Streams events until the client leaves or the server stops. A comment every 15 s keeps
 /// middleboxes from dropping the connection and detects a lost client.
-asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listener> listener) {
+asio::awaitable<void> HttpSession::send_events(HttpResponse response) {
     constexpr Duration kHeartbeat = 15s;
     ++shared_->counters.requests[200];
     sending_ = true;
@@ -409,13 +418,14 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
     ErrorCode ignored;
     stream_.socket().set_option(asio::socket_base::send_buffer_size(kEventSendBuffer), ignored);
     asio::steady_timer wake_timer(stream_.get_executor());
+    const std::shared_ptr<EventHub::Listener> listener = std::move(response.events);
     listener->wake = [&wake_timer] { wake_timer.cancel(); };
     departure_.ask_by([&] {
         asked = true;
         wake_timer.cancel();
     });
     listener_ = listener;
-    std::string text = head_of_events();
+    std::string text = head_of_events(response);
     ErrorCode error;
     while (!error) {
         stream_.expires_after(time_to_read_);

@@ -89,14 +89,14 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     boost::asio::awaitable<bool> secure();
     boost::asio::awaitable<ErrorCode> receive();
     bool speaks_tls() const;
-    std::string head_of_events() const;
+    std::string head_of_events(const HttpResponse& response) const;
     boost::asio::awaitable<ErrorCode> receive_body();
     boost::asio::awaitable<bool> serve_one();
     boost::asio::awaitable<HttpResponse> answer(BeastRequest message);
     boost::asio::awaitable<HttpResponse> handle(HttpRequest request, std::optional<Problem> barred);
     boost::asio::awaitable<bool> refuse(ErrorCode why);
     boost::asio::awaitable<bool> send(HttpResponse response, bool head, bool keep_alive);
-    boost::asio::awaitable<void> send_events(std::shared_ptr<EventHub::Listener> listener);
+    boost::asio::awaitable<void> send_events(HttpResponse response);
     boost::asio::awaitable<void> wait_for_rate_limit(const HttpResponse* response);
     boost::asio::awaitable<void> drain();
     void set_busy(bool busy);

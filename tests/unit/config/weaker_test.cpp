@@ -161,6 +161,12 @@ TEST(Weaker, AllowThatLetsMoreIn) {
     EXPECT_EQ(told(http, one, ""), "http 127.0.0.1:8080: allow lets all addresses in");
 }
 
+TEST(Weaker, PagesOfMoreSitesThatMayRead) {
+    EXPECT_EQ(told(http, ", cors: ['http://a.example']",
+                   ", cors: ['http://a.example', 'http://b.example:81']"),
+              "http: cors has http://b.example:81");
+}
+
 TEST(Weaker, HostsThatAreMore) {
     EXPECT_EQ(told(http, ", hosts: [a.example]", ", hosts: [a.example, b.example]"),
               "http: hosts has b.example");

@@ -88,9 +88,9 @@ constexpr Row kTraps[] = {
 /// Why a parser fails.
 constexpr Row kCauses[] = {
     {"a:\n  \u2022 b: 1\n    c: 2\n", "2:3 "},
-    // a misplaced dash: the first line that does not agree with it
+    // a misplaced dash: the line that does not agree with the others, the last if there is one
     {"a:\n   - b: 1\n    c: 2\n", "3:5 "},
-    {"a:\n - b: 1\n    c: 2\n    d: 3\n", "3:5 "},
+    {"a:\n - b: 1\n    c: 2\n    d: 3\n", "2:2 "},
     {"a:\n  -  b: 1\n    c: 2\nd: 3\n", "3:5 "},
     {"a:\n  - b: 1\n   c: 2\n    d: 3\n", "3:4 "},  // the others agree with it
     {"a:\n  - b: 1\n   c: 2\n  - b: 2\n", "3:4 "},

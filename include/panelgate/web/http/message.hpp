@@ -129,6 +129,9 @@ struct HttpResponse {
     std::shared_ptr<EventHub::Listener> events;
 };
 
+/// Says that the reply depends on this request header (RFC 9110 12.5.5).
+void add_vary(HttpResponse& response, const std::string& name);
+
 using Handling = boost::asio::awaitable<HttpResponse>;
 
 /// A path with its method, required role and handler.

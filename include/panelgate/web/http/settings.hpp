@@ -64,6 +64,7 @@ struct Settings {
     RateLimitSettings rate_limit;
     std::vector<std::string> hosts;  ///< its host names; empty: the machine's
     std::vector<Network> allow;      ///< empty: all
+    std::vector<std::string> cors;   ///< origins of other sites whose pages may read, lower case
     std::size_t max_connections = 256;
     std::size_t max_connections_per_address = 32;  ///< excluding event streams
     std::size_t max_streams_per_address = 48;      ///< event streams

@@ -195,7 +195,7 @@ class Origin : public ::testing::Test {
         Settings settings;
         settings.hosts = {"gateway"};
         const auto local = make_address("192.168.1.7");
-        const auto refused = check_origin(request, HostNames(settings, {}), local);
+        const auto refused = check_origin(request, HostNames(settings, {}), local, readers);
         return refused ? refused->status : 0;
     }
     void browse(const char* site, const char* mode, const char* dest) {
@@ -204,7 +204,25 @@ class Origin : public ::testing::Test {
         request.headers["sec-fetch-dest"] = dest;
     }
     HttpRequest request;
+    std::vector<std::string> readers;  ///< http: cors
 };
+
+TEST_F(Origin, OfAListedSiteReadsAndChangesNothing) {
+    readers = {"https://scada.example"};
+    browse("cross-site", "cors", "empty");
+    request.headers["origin"] = "https://SCADA.example";
+    for (const char* method : {"GET", "HEAD", "OPTIONS"}) {
+        request.method = method;
+        EXPECT_EQ(refusal(), 0u) << method;
+    }
+    for (const char* method : {"PUT", "POST", "DELETE"}) {
+        request.method = method;
+        EXPECT_EQ(refusal(), 403u) << method;
+    }
+    request.method = "GET";
+    request.host = "evil.example";
+    EXPECT_EQ(refusal(), 421u) << "a rebound name is not ours";
+}
 
 TEST_F(Origin, IsRefusedUnderAForeignName) {
     for (const char* ours : {"gateway", "192.168.1.7", ""}) {
