@@ -1,10 +1,9 @@
 #include "audit_book.hpp"
 
+#include <arpa/inet.h>
 #include <algorithm>
+#include <array>
 #include <boost/asio/post.hpp>
-#include <boost/json/object.hpp>
-#include <boost/json/parse.hpp>
-#include <boost/json/value.hpp>
 #include <span>
 #include <utility>
 
@@ -20,6 +19,7 @@ namespace {
 
 using audit::Composer;
 using audit::Kind;
+using audit::member;
 
 /// Who it is, as members of a record.
 std::string who_members(const Who& who) {
@@ -85,12 +85,26 @@ std::size_t values_at(std::uint8_t function) {
     }
 }
 
+/// An IPv6 network of 64 bits is one client: its addresses cost nothing (docs/operate/audit.md).
+std::string_view network_of(std::string_view address, std::string& room) {
+    std::array<std::uint8_t, 16> bytes{};
+    room = address.substr(0, address.find('%'));
+    if (::inet_pton(AF_INET6, room.c_str(), bytes.data()) != 1) return address;
+    room.assign(bytes.begin(), bytes.begin() + 8);
+    room += "/64";
+    return room;
+}
+
 /// What one client may have of one kind of refusal is counted under this and what it is.
 void make_client_key(std::string& key, const WhoRef& who) {
     key.clear();
     if (who) {
         // A serial master and the gateway's own have no address, but a name without a port.
-        key += who->address.empty() && who->user.empty() ? who->name : who->address;
+        std::string room;
+        key += label(who->face);
+        key += '\t';
+        key += who->address.empty() && who->user.empty() ? std::string_view(who->name)
+                                                         : network_of(who->address, room);
         key += '\t';
         key += who->token;
         key += '\t';
@@ -112,20 +126,19 @@ std::string client_members(const WhoRef& who) {
     return std::string(members.body().substr(begin));
 }
 
-std::string member(std::string_view key, std::string_view value) {
-    std::string text = ",\"" + std::string(key) + "\":";
-    audit::append_json(text, value);
-    return text;
+void log_anchor(const audit::Position& at, const std::string& chain) {
+    rt::log(rt::LogLevel::info, "audit anchor",
+            {{"number", std::to_string(at.number)},
+             {"hash", std::string(text_of(at.hash))},
+             {"chain", chain}});
 }
 
-/// The sentence of a problem (RFC 9457); "" of another body.
-std::string detail_of(std::string_view body) {
-    boost::system::error_code wrong;
-    const boost::json::value value = boost::json::parse(body, wrong);
-    const auto* object = wrong ? nullptr : value.if_object();
-    const auto* detail = object != nullptr ? object->if_contains("detail") : nullptr;
-    const auto* text = detail != nullptr ? detail->if_string() : nullptr;
-    return text != nullptr ? std::string(*text) : std::string();
+/// What the disk has not taken is gone: the log is the only place that can say so.
+void tell_of_end(const audit::Trail::End& end, const std::string& file) {
+    if (end.unwritten > 0)
+        rt::log(rt::LogLevel::error, "audit records lost",
+                {{"count", std::to_string(end.unwritten)}, {"file", file}});
+    if (end.last.number > 0) log_anchor(end.last, end.chain);
 }
 
 }  // namespace
@@ -143,7 +156,9 @@ void AuditBook::apply(const std::optional<audit::Settings>& settings) {
         record();
         std::shared_ptr<audit::Trail> last = std::move(trail_);
         if (!closing_) closing_.emplace(executor_);
-        closing_->run([last] { last->close(); }, [] {});  // the disk may be slow
+        const auto end = std::make_shared<audit::Trail::End>();
+        closing_->run([last, end] { *end = last->close(); },  // the disk may be slow
+                      [end, file = file_] { tell_of_end(*end, file); });
         return;
     }
     if (trail_ && file_ != settings->file) {
@@ -176,9 +191,7 @@ void AuditBook::tell(const audit::Notice& notice) {
             return rt::log(rt::LogLevel::info, "audit recovered",
                            {{"file", file_}, {"lost", std::to_string(counters().lost)}});
         case Notice::anchor:
-            return rt::log(rt::LogLevel::info, "audit anchor",
-                           {{"number", std::to_string(notice.at.number)},
-                            {"hash", std::string(text_of(notice.at.hash))}});
+            return log_anchor(notice.at, notice.text);
         case Notice::remark:
             return rt::log(rt::LogLevel::warn, "audit file",
                            {{"file", file_}, {"why", notice.text}});
@@ -195,8 +208,7 @@ void AuditBook::close() {
     record_repeats(true);
     begin(Kind::end);
     record();
-    const audit::Position last = trail_->close();
-    if (last.number > 0) tell({audit::Notice::Kind::anchor, {}, last});
+    tell_of_end(trail_->close(), file_);
     trail_.reset();
 }
 
@@ -249,6 +261,7 @@ void AuditBook::write(const std::string& line, const bus::WriteEnd& end) {
     if (!trail_) return;
     Known* known = find(line, end.station);
     const bool is_vain = !end.transmitted && end.outcome != Outcome::ok;
+    if (end.outcome == Outcome::refused) refused_ = end.who;
     if (is_vain && is_vain_repeat(line, end, known)) return;
     add_write(line, end, known);
     record();
@@ -284,6 +297,9 @@ void AuditBook::add_values(ByteView pdu, const modbus::Span& items) {
     const std::size_t each = modbus::is_bit_table(items.table) ? 0 : 2;
     if (pdu[0] == modbus::kMaskWriteRegister && pdu.size() == 7) {
         composer_.number("and_mask", register_at(pdu, 3)).number("or_mask", register_at(pdu, 5));
+    } else if (pdu[0] == modbus::kWriteSingleCoil && pdu.size() == 5 &&
+               (pdu[4] != 0 || (pdu[3] != 0 && pdu[3] != 0xFF))) {
+        composer_.hex("pdu", pdu);  // neither on nor off: what it means is the panel's
     } else if (at == 0 || pdu.size() < at + std::max<std::size_t>(each * items.count, 1)) {
         composer_.hex("pdu", pdu);
     } else {
@@ -357,7 +373,7 @@ bool AuditBook::is_repeat(const WhoRef& who, std::string_view what, unsigned in_
 }
 
 void AuditBook::wait_for_repeats() {
-    constexpr Duration kLook = 10s;
+    constexpr Duration kLook = 1s;
     waits_ = !repeats_.empty();
     if (!waits_) return;
     alarm_->arm(clock_.now() + kLook, [this] {
@@ -373,92 +389,6 @@ void AuditBook::record_repeats(bool all) {
         composer_.time("first", counted.first).time("last", counted.last);
         trail_->add(std::string(composer_.body()) + counted.members);
     }
-}
-
-std::function<void(const web::Deed&)> AuditBook::deeds() {
-    return [this, life = std::weak_ptr(alive_)](const web::Deed& what) {
-        if (!life.expired()) deed(what);
-    };
-}
-
-void AuditBook::deed(const web::Deed& deed) {
-    if (!trail_) return;
-    const bool discovers = deed.path.ends_with("/discover");
-    const bool simulates = deed.path.find("/simulator/") != deed.path.npos;
-    if (deed.status == 401) {
-        if (is_repeat(deed.who, "login", 1, [&] { return member("outcome", "log-in failed"); }))
-            return;
-        begin(Kind::login);
-        add_who(deed.who);
-        composer_.text("outcome", "failed").text("path", deed.path);
-        composer_.text("why", detail_of(deed.answer));
-    } else if (deed.status >= 400) {
-        return refusal(deed);
-    } else if (discovers || simulates) {
-        begin(discovers ? Kind::discovery : Kind::simulator);
-        add_who(deed.who);
-        composer_.text("method", deed.method).text("path", deed.path).text("body", deed.body);
-    } else {
-        return;  // the bus tells of writes, the reloader of reloads
-    }
-    record();
-}
-
-/// What was refused before it came to a bus. A bus tells of what it refuses itself.
-void AuditBook::refusal(const web::Deed& deed) {
-    const bool is_refusal = deed.status == 403 || deed.status == 409 || deed.status == 422;
-    if (!is_refusal) return;
-    std::string& what = what_;
-    what = deed.method;
-    what += '\t';
-    what += std::to_string(deed.status);
-    what += '\t';
-    what += deed.path;
-    if (is_repeat(deed.who, what, 1, [&] {
-            return member("method", deed.method) + member("path", deed.path) +
-                   member("outcome", "refused");
-        }))
-        return;
-    begin(Kind::refusal);
-    add_who(deed.who);
-    composer_.text("method", deed.method).text("path", deed.path).text("body", deed.body);
-    composer_.number("status", deed.status).text("why", detail_of(deed.answer));
-    record();
-}
-
-void AuditBook::reload(const web::ReloadVerdict& verdict) {
-    if (!trail_) return;
-    begin(Kind::reload).text("cause", verdict.cause).flag("rollback", verdict.rollback);
-    composer_.text("outcome", label(verdict.outcome)).text("why", verdict.why);
-    const std::span<const std::string> changes(verdict.changes);
-    composer_.texts("changes", changes.first(std::min(changes.size(), kChanges)));
-    if (changes.size() > kChanges) composer_.number("more_changes", changes.size() - kChanges);
-    if (!verdict.faults.empty()) composer_.number("faults", verdict.faults.size());
-    record();
-}
-
-void AuditBook::tokens(const std::vector<web::Token>& before, const std::vector<web::Token>& now) {
-    if (!trail_) return;
-    const auto tell_of = [this](const web::Token& token, std::string_view event) {
-        begin(Kind::token).text("token", token.name).text("role", token.standing.name());
-        composer_.text("event", event);
-        if (token.expires) composer_.text("expires", web::expiry_text(*token.expires));
-        record();
-    };
-    for (const web::Token& token : now) {
-        const auto old = std::ranges::find(before, token.name, &web::Token::name);
-        if (old == before.end()) {
-            tell_of(token, "added");
-        } else if (*old != token) {
-            const bool other = old->hash != token.hash;
-            tell_of(token, old->standing != token.standing ? "role changed"
-                           : other                         ? "replaced"
-                                                           : "changed");
-        }
-    }
-    for (const web::Token& token : before)
-        if (std::ranges::find(now, token.name, &web::Token::name) == now.end())
-            tell_of(token, "removed");
 }
 
 audit::Counters AuditBook::counters() const {

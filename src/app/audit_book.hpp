@@ -31,6 +31,7 @@
 namespace panelgate::app {
 
 struct Snapshot;
+struct TopicRefusal;
 
 /// Keeps the audit: what is recorded of each thing that happens, and in which words. Without
 /// `audit:` it records nothing. One thread.
@@ -65,6 +66,8 @@ class AuditBook {
     std::function<void(const web::Deed&)> deeds();
     /// What a client of REST changed, or was refused; writes are the buses'.
     void deed(const web::Deed& deed);
+    /// A client of what MQTT refuses before it comes to a bus; it may outlive this.
+    std::function<void(const TopicRefusal&)> topic_refusals();
     /// A reload or a rollback, and what it changed.
     void reload(const web::ReloadVerdict& verdict);
     /// Tokens that came, went, changed or expired.
@@ -78,6 +81,18 @@ class AuditBook {
 
     struct Known;
 
+    /// What a face refused before it came to a bus.
+    struct Refused {
+        WhoRef who;
+        std::string place;  ///< members of a record
+        std::string method;
+        std::string path;
+        std::string_view body{};
+        std::string rule{};  ///< a member of a record, or empty
+        unsigned status = 0;
+        std::string why{};
+    };
+
     Composer& begin(audit::Kind kind) { return composer_.begin(rt::wall_now(), kind); }
     void add_who(const WhoRef& who);
     void add_write(const std::string& line, const bus::WriteEnd& end, Known* known);
@@ -88,6 +103,8 @@ class AuditBook {
                    const std::function<std::string()>& more);
     bool is_vain_repeat(const std::string& line, const bus::WriteEnd& end, Known* known);
     void refusal(const web::Deed& deed);
+    void record_refusal(const Refused& refused);
+    std::string place_of(const web::Deed& deed) const;
     void record() { trail_->add(composer_.body()); }
     void record_repeats(bool all);
     void wait_for_repeats();
@@ -121,6 +138,7 @@ class AuditBook {
     std::map<std::string, std::map<std::uint8_t, Known>, std::less<>> known_;
     std::unordered_map<WhoRef, std::string> clients_;  ///< what records tell of them
     std::vector<std::uint16_t> values_;
+    WhoRef refused_;  ///< the client of the write that a bus has just refused
     std::string key_;
     std::string what_;
 };

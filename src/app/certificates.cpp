@@ -9,6 +9,7 @@
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/tls/client_context.hpp"
 #include "panelgate/tls/judge.hpp"
 #include "panelgate/tls/replacement.hpp"
 
@@ -28,6 +29,8 @@ std::vector<ServedCertificate> served_by(const config::Config& config) {
     for_each_tls(config, [&](const std::string& listener, const tls::Settings& settings) {
         all.push_back({listener, settings});
     });
+    if (config.mqtt && config.mqtt->tls)
+        all.push_back({"mqtt " + config.mqtt->broker(), config.mqtt->client(), config.mqtt->host});
     return all;
 }
 
@@ -56,31 +59,43 @@ std::string read_again(const tls::Settings& settings, tls::Material& files) {
 
 /// What comes into use of new files.
 struct Taken {
-    tls::Settings settings;  ///< `made` is null where no context can be made at all
-    std::string why;         ///< it is not all of them; "" if it is
+    tls::Settings settings;
+    std::string why;  ///< it is not all of them; "" if it is
     rt::LogLevel level = rt::LogLevel::error;
+    bool usable = false;  ///< a context can be made of the settings
 };
+
+/// `next` has the files to judge beside those of `used`.
+Taken judged(const ServedCertificate& used, tls::Settings next, tls::Arrival arrival,
+             std::int64_t now) {
+    next.made = nullptr;
+    Taken taken{std::move(next), "", rt::LogLevel::warn, true};
+    try {
+        if (used.server.empty()) {
+            taken.settings.made = std::make_shared<const tls::Context>(taken.settings);
+            taken.why = tls::why_kept(used.settings, taken.settings, arrival, now);
+        } else {
+            const tls::ClientContext usable(taken.settings, used.server);
+            taken.why = tls::why_client_kept(used.settings, taken.settings, now);
+        }
+    } catch (const tls::Unusable& why) {
+        return Taken{std::move(taken.settings), why.what()};
+    }
+    return taken;
+}
 
 /// Each kind of file stands for itself: a list of revoked certificates must not wait until a bad
 /// pair is mended. `fresh` has the new files.
-Taken take(const tls::Settings& used, const tls::Settings& fresh, tls::Arrival arrival,
+Taken take(const ServedCertificate& used, const tls::Settings& fresh, tls::Arrival arrival,
            std::int64_t now) {
-    Taken taken{fresh, ""};
-    taken.settings.material = used.material;
-    taken.settings.made = nullptr;
     const auto attempt = [&](const tls::Material& files) {
         tls::Settings next = fresh;
         next.material = files;
-        try {
-            next.made = std::make_shared<const tls::Context>(next);
-        } catch (const tls::Unusable& why) {
-            return Taken{std::move(next), why.what()};
-        }
-        const std::string why = tls::why_kept(used, next, arrival, now);
-        return Taken{std::move(next), why, rt::LogLevel::warn};
+        return judged(used, std::move(next), arrival, now);
     };
     Taken whole = attempt(fresh.material);
     if (whole.why.empty()) return whole;
+    Taken taken = attempt(used.settings.material);
     using File = std::string tls::Material::*;
     const std::array<std::vector<File>, 4> parts{
         {{&tls::Material::ca, &tls::Material::crl},
@@ -91,10 +106,8 @@ Taken take(const tls::Settings& used, const tls::Settings& fresh, tls::Arrival a
         tls::Material files = taken.settings.material;
         for (const File file : part) files.*file = fresh.material.*file;
         if (files == taken.settings.material) continue;
-        if (Taken some = attempt(files); some.why.empty())
-            taken.settings = std::move(some.settings);
+        if (Taken some = attempt(files); some.why.empty()) taken = std::move(some);
     }
-    if (!taken.settings.made) taken.settings = attempt(used.material).settings;
     taken.why = whole.why;
     taken.level = whole.level;
     return taken;
@@ -104,13 +117,14 @@ Taken take(const tls::Settings& used, const tls::Settings& fresh, tls::Arrival a
 void log_renewed(const std::string& listener, const tls::Material& before,
                  const tls::Material& now) {
     const tls::Summary own = tls::summary_of(now.certificate);
-    const std::vector<rt::LogField> fields{{"listener", listener},
-                                           {"files", tls::changed_files(before, now)},
-                                           {"subject", own.subject},
-                                           {"issuer", own.issuer},
-                                           {"serial", own.serial},
-                                           {"valid_from", tls::date_text(own.begin)},
-                                           {"expires", tls::date_text(own.end)}};
+    std::vector<rt::LogField> fields{{"listener", listener},
+                                     {"files", tls::changed_files(before, now)}};
+    if (own.end != 0)
+        fields.insert(fields.end(), {{"subject", own.subject},
+                                     {"issuer", own.issuer},
+                                     {"serial", own.serial},
+                                     {"valid_from", tls::date_text(own.begin)},
+                                     {"expires", tls::date_text(own.end)}});
     const std::size_t what = std::hash<std::string>()(now.certificate + now.key + now.ca + now.crl);
     rt::log_each("certificate renewed", listener, std::to_string(what), fields);
 }
@@ -122,23 +136,30 @@ std::vector<ServedCertificate> keep_good_certificates(config::Config& next,
                                                       std::int64_t now, bool rollback,
                                                       std::vector<std::string>& warnings) {
     std::vector<ServedCertificate> kept;
-    for_each_tls(next, [&](const std::string& listener, tls::Settings& fresh) {
+    const auto keep = [&](const std::string& listener, tls::Settings& fresh) {
         const auto used = std::ranges::find(in_use, listener, &ServedCertificate::listener);
         if (used == in_use.end() || used->settings.material == fresh.material) return;
         if (rollback) {
             tls::Settings stays = fresh;
             stays.material = used->settings.material;
-            fresh = take(used->settings, stays, tls::Arrival::asked_for, now).settings;
+            Taken former = judged(*used, std::move(stays), tls::Arrival::asked_for, now);
+            if (former.usable) fresh = std::move(former.settings);
             return;
         }
-        Taken taken = take(used->settings, fresh, tls::Arrival::asked_for, now);
+        Taken taken = take(*used, fresh, tls::Arrival::asked_for, now);
         // Other keys may want what the former files do not have: then the new ones are in use.
-        if (taken.why.empty() || !taken.settings.made) return;
+        if (taken.why.empty() || !taken.usable) return;
         warnings.push_back(listener + ": certificate not renewed: " + taken.why +
                            "; the former one stays in use");
         kept.push_back({listener, fresh});
         fresh = std::move(taken.settings);
-    });
+    };
+    for_each_tls(next, keep);
+    if (next.mqtt && next.mqtt->tls) {
+        tls::Settings client = next.mqtt->client();
+        keep("mqtt " + next.mqtt->broker(), client);
+        next.mqtt->files = mqtt::Files{client.material};
+    }
     return kept;
 }
 
@@ -155,6 +176,10 @@ std::vector<std::string> certificate_doubts(const config::Config& config, std::i
     if (config.http && config.http->tls)
         add("http " + config.http->name(), *config.http->tls,
             names_of(config.http->address, config.http->hosts));
+    if (config.mqtt && config.mqtt->tls)
+        for (const std::string& doubt :
+             tls::client_doubts(config.mqtt->client(), config.mqtt->host, now))
+            all.push_back("mqtt: " + doubt);
     return all;
 }
 
@@ -187,11 +212,13 @@ struct CertificateWatch::Look {
         }
     }
     void make(std::size_t at, tls::Material files) {
-        const tls::Settings& used = served[at].settings;
-        tls::Settings next = used;
+        const Served& used = served[at];
+        tls::Settings next = used.settings;
         next.material = files;
         Taken taken = take(used, next, tls::Arrival::noticed, now);
-        std::vector<std::string> doubts = tls::doubts(taken.settings, {}, now);
+        std::vector<std::string> doubts =
+            used.server.empty() ? tls::doubts(taken.settings, {}, now)
+                                : tls::client_doubts(taken.settings, used.server, now);
         fresh.push_back({at, std::move(files), std::move(taken), std::move(doubts)});
     }
 };
@@ -270,11 +297,11 @@ void CertificateWatch::judge(Look& look) {
 void CertificateWatch::take_over(const Fresh& fresh) {
     Served& served = served_[fresh.at];
     const tls::Settings& next = fresh.taken.settings;
-    if (next.made && next.material != served.settings.material) {
+    if (fresh.taken.usable && next.material != served.settings.material) {
         const tls::Material before = served.settings.material;
         served.settings = next;
         ++renewals_[served.listener].replaced;
-        renew_(served, next.made);
+        renew_(served);
         log_renewed(served.listener, before, next.material);
         for (const std::string& doubt : fresh.doubts)
             rt::log(rt::LogLevel::warn, "certificate",

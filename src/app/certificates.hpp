@@ -23,10 +23,12 @@ namespace panelgate::app {
 /// `now`: seconds since 1970.
 std::vector<std::string> certificate_doubts(const config::Config& config, std::int64_t now);
 
-/// A listener and its `tls`; the name is as in the log: "http 127.0.0.1:8443".
+/// A listener and its `tls`; the name is as in the log: "http 127.0.0.1:8443". Or the gateway as
+/// the client of a broker: "mqtt mqtts://broker:8883".
 struct ServedCertificate {
     std::string listener;
     tls::Settings settings;
+    std::string server{};  ///< the broker's name; "": it is a listener
 };
 
 /// Before a configuration takes the place of the running one: where new files must not replace
@@ -45,7 +47,7 @@ class CertificateWatch {
   public:
     static constexpr Duration kEvery = 1s;
     using Served = ServedCertificate;
-    using Renew = std::function<void(const Served&, std::shared_ptr<const tls::Context>)>;
+    using Renew = std::function<void(const Served&)>;
 
     CertificateWatch(boost::asio::any_io_executor executor, rt::Clock& clock, Renew renew);
 

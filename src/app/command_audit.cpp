@@ -64,6 +64,7 @@ std::optional<Files> files_of(const AuditOptions& options, ExitCode& code) {
 
 std::optional<audit::Anchors> anchors_of(const Files& logs, ExitCode& code) {
     audit::Anchors anchors;
+    anchors.is_read = !logs.empty();
     for (const std::string& log : logs) {
         const auto take = [&](std::string_view line, bool) {
             audit::collect_anchor(line, anchors);
@@ -82,6 +83,7 @@ void print_good(const audit::Report& report, std::size_t files, bool has_log) {
               << " (" << report.first << " to " << report.last.number << ") in " << files
               << (files == 1 ? " file" : " files") << '\n'
               << "last hash " << panelgate::text_of(report.last.hash) << '\n';
+    if (!report.chain.empty()) std::cout << "chain " << report.chain << '\n';
     if (has_log) {
         std::cout << report.anchored << " of them named by the log\n";
     } else {
@@ -118,7 +120,7 @@ ExitCode audit_verify(const AuditOptions& options) {
     if (!anchors) return code;
     const auto files = files_of(options, code);
     if (!files) return code;
-    audit::Verifier verifier(*anchors);
+    audit::Verifier verifier(*anchors, options.files.empty());
     for (const std::string& file : *files) {
         verifier.begin_file(file);
         bool wanted = true;

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "access_doubts.hpp"
 #include "capacity.hpp"
 #include "certificates.hpp"
 #include "commands.hpp"
@@ -21,6 +22,7 @@
 #include "panelgate/base/text.hpp"
 #include "panelgate/config/mbusd_conf.hpp"
 #include "panelgate/config/real_files.hpp"
+#include "panelgate/rt/clock.hpp"
 #include "panelgate/web/http/json_text.hpp"
 #include "rights_text.hpp"
 
@@ -165,6 +167,8 @@ ExitCode check(const std::string& file, const CheckOptions& options) {
             std::ranges::copy(moved_units(*compared.loaded.config, *loaded.config),
                               std::back_inserter(judged.warnings));
         std::ranges::copy(open_doors(*loaded.config), std::back_inserter(judged.warnings));
+        std::ranges::copy(access_doubts(*loaded.config, rt::wall_now()),
+                          std::back_inserter(judged.warnings));
         std::ranges::copy(certificate_doubts(*loaded.config, seconds_since_1970()),
                           std::back_inserter(judged.warnings));
         print_warnings(*loaded.config);

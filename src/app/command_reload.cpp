@@ -83,6 +83,10 @@ ExitCode print_verdict(const json::object& verdict) {
 /// or none. The verdict is then asked for; it is known once the file has been read.
 ExitCode reload_by_signal(const ReloadOptions& options, const HttpDoor& door,
                           const std::string& why, const std::string& remedy) {
+    ExitCode code = kFine;
+    const auto gateway =
+        GatewayClient::make({options.file, options.http, options.token_file, options.ca}, code);
+    if (!gateway) return code;
     const auto process = process_at(door.endpoint);
     if (options.rollback || !process || ::kill(*process, SIGHUP) != 0) {
         std::cerr << "panelgate: not reloaded: " << why << "\n  (" << remedy
@@ -92,19 +96,16 @@ ExitCode reload_by_signal(const ReloadOptions& options, const HttpDoor& door,
         return kNotReady;
     }
     std::cerr << "panelgate: " << why << ": asked by SIGHUP, process " << *process << '\n';
-    ExitCode code = kFine;
-    const auto gateway =
-        GatewayClient::make({options.file, options.http, options.token_file, options.ca}, code);
-    if (!gateway) return code;
     for (const Duration pause : kPauses) {
         std::this_thread::sleep_for(pause);
         const GatewayAnswer answer = gateway->get("/api/v1/reload");
         if (answer.is_ok() && answer.json.contains("outcome")) return print_verdict(answer.json);
     }
-    std::cerr << "panelgate: it cannot be asked what came of it: its log says whether it has "
+    std::cerr << "panelgate: it was told to, and cannot be asked what came of it (a listener that "
+                 "wants a client's certificate answers no command): its log says whether it has "
                  "reloaded; a token that systemd hands out (LoadCredential) is taken at a restart, "
                  "and a certificate that must not replace a good one is not taken\n";
-    return kNotReady;
+    return kUnknown;
 }
 
 std::string reload_request(const ReloadOptions& options, const HttpDoor& door,

@@ -101,6 +101,9 @@ ExitCode token_new(const TokenOptions& options) {
     if (!is_name(options.name))
         return wrong_usage("a name has letters, digits, '-', '_' and '.', not '" + options.name +
                            '\'');
+    if (!is_name(options.role))
+        return wrong_usage("a role is viewer, operator, engineer, admin or one of your own, not '" +
+                           options.role + '\'');
     std::string expires;
     if (!options.expires.empty()) {
         const auto day = last_day(options.expires);
@@ -109,6 +112,9 @@ ExitCode token_new(const TokenOptions& options) {
                 "--expires is a span such as 90d, 12w, 6months or 2y, or a day such "
                 "as 2027-12-31, not '" +
                 options.expires + '\'');
+        const auto ends = web::parse_expiry(*day);
+        if (ends && *ends <= rt::wall_now())
+            return wrong_usage("--expires " + options.expires + " is over already");
         expires = *day;
     }
     const auto token = random_token();

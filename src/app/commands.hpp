@@ -17,6 +17,7 @@ enum ExitCode : int {
     kNoInput = 66,
     kUnavailable = 69,
     kInternal = 70,
+    kUnknown = 75,  ///< reload: told to, and cannot be asked what came of it
     kBadConfig = 78,
 };
 

@@ -8,12 +8,14 @@
 #include <utility>
 #include <vector>
 
+#include "explain_door.hpp"
 #include "panelgate/access/line_rules.hpp"
 #include "panelgate/base/text.hpp"
 #include "panelgate/base/who.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/profile/judge.hpp"
 #include "panelgate/profile/notation.hpp"
+#include "panelgate/rt/clock.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 #include "rights_text.hpp"
 
@@ -61,10 +63,14 @@ void set(AskedRight& asked, const config::Config& config, const std::string& key
          const std::string& value) {
     if (key == "from") {
         asked.who.address = value;
+        if (!is_address(value)) asked.wrong = "'" + value + "' is no address such as 10.0.0.7";
     } else if (key == "token") {
         asked.who.token = value;
     } else if (key == "listener") {
         asked.who.listener = value;
+        if (!face_by(config, value))
+            asked.wrong =
+                "there is no listener '" + value + "'; there are " + listener_names(config);
     } else if (key == "role") {
         set_role(asked, config, value);
     } else if (key == "face") {
@@ -123,6 +129,21 @@ void find_place(const config::Config& config, const std::string& text, AskedRigh
     if (asked.items.end() > modbus::kTableItems) asked.wrong = "these items end beyond 65535";
 }
 
+/// A listener has a face, and raw requests come by one of them only. False: that contradicts.
+bool complete_face(const config::Config& config, AskedRight& asked) {
+    const auto by_listener = face_by(config, asked.who.listener);
+    const bool raw = asked.act == Act::raw;
+    if (by_listener && !asked.has_face) asked.who.face = *by_listener;
+    if (raw && !by_listener && !asked.has_face) asked.who.face = Face::http;
+    const bool udp = asked.who.face == Face::udp && by_listener == Face::modbus_tcp;
+    if (by_listener && asked.who.face != *by_listener && !udp)
+        asked.wrong = "the listener " + asked.who.listener + " is of the face " +
+                      std::string(label(*by_listener));
+    if (!asked.who.token.empty() && asked.who.face != Face::http)
+        asked.wrong = "only clients of http have tokens";
+    return asked.wrong.empty();
+}
+
 /// A token's role, and what a door gives to those who show nothing.
 void complete(const config::Config& config, AskedRight& asked) {
     if (!asked.who.token.empty() && config.http) {
@@ -135,6 +156,7 @@ void complete(const config::Config& config, AskedRight& asked) {
     }
     if (asked.has_role && !asked.has_face && asked.who.certificate_role.empty())
         asked.who.face = Face::http;
+    if (!complete_face(config, asked)) return;
     if (asked.has_role) return;
     const bool anonymous = asked.who.face == Face::http && config.http;
     asked.who.standing = anonymous ? config.http->anonymous : Standing(Role::operator_);
@@ -156,8 +178,10 @@ AskedRight parse(const config::Config& config, const std::string& text) {
             is_act = true;
             const bool is_second = asked.act == Act::raw && (act == Act::read || act == Act::write);
             if (is_second) asked.raw_reads = act == Act::read;
+            if (!is_second && asked.act) asked.wrong = "it says more than one thing that is done";
             if (!is_second) asked.act = act;
         }
+        if (!is_act && !place.empty()) asked.wrong = "it names more than one place";
         if (!is_act) place = word;
     }
     if (asked.wrong.empty() && !asked.act) asked.wrong = "it does not say what is done";
@@ -191,9 +215,24 @@ std::optional<modbus::Request> request_of(const AskedRight& asked) {
     return std::move(*request);
 }
 
+/// A broadcast reaches all stations of its line.
+std::string unreachable(const config::Line& line) {
+    for (const config::Station& station : line.stations) {
+        if (station.read_only)
+            return "a broadcast reaches station '" + station.name + "', which is read_only";
+    }
+    return "";
+}
+
 /// What decides before any rule; "" if nothing does.
-std::string decided_before(const AskedRight& asked) {
+std::string decided_before(const config::Config& config, const AskedRight& asked) {
     const bool writes = asked.act != Act::read && !asked.raw_reads.value_or(false);
+    const AtDoor request{asked.who, asked.act.value_or(Act::read), writes, *asked.line,
+                         *asked.station};
+    if (std::string why = refused_at_door(config, request, rt::wall_now()); !why.empty())
+        return why;
+    if (asked.act == Act::broadcast)
+        if (std::string why = unreachable(*asked.line); !why.empty()) return why;
     if (asked.station->listens) return "line '" + asked.line->name + "' is only listened to";
     if (writes && asked.station->read_only)
         return "station '" + asked.station->name + "' is read_only";
@@ -221,7 +260,7 @@ Explanation explain(const config::Config& config, const std::string& file,
                     const AskedRight& asked) {
     const auto request = request_of(asked);
     if (!request) return {false, "", "no request does that to so many items of this table"};
-    if (const std::string why = decided_before(asked); !why.empty())
+    if (const std::string why = decided_before(config, asked); !why.empty())
         return {false, "denied: " + why, ""};
     std::optional<modbus::Request> sent;
     if (asked.station->translate && !asked.station->guard)

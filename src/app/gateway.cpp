@@ -80,7 +80,7 @@ Gateway::Gateway(boost::asio::any_io_executor executor,
       reloads_(reloads),
       events_(new_epoch()),
       servers_(executor_, clock_),
-      northbound_(executor_, clock_) {
+      northbound_(executor_, clock_, audit_.topic_refusals()) {
     Lines lines = lines_of(*config);
     for (std::size_t i = 0; i < lines.size(); ++i)
         known_.lines.emplace(std::pair(config->lines[i].name, lines[i]->listens()), lines[i]);
@@ -222,14 +222,15 @@ void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedTex
 void Gateway::watch_certificates() {
     const config::Config& config = *snapshot_->config;
     const bool any =
-        (config.http && config.http->tls) ||
+        (config.http && config.http->tls) || (config.mqtt && config.mqtt->tls) ||
         std::ranges::any_of(config.modbus_tcp, [](const auto& one) { return one.tls.has_value(); });
     if (any && !certificates_)
         certificates_ = std::make_unique<CertificateWatch>(
-            executor_, clock_,
-            [this](const CertificateWatch::Served& served,
-                   std::shared_ptr<const tls::Context> context) {
-                servers_.renew(served.listener, served.settings, std::move(context));
+            executor_, clock_, [this](const CertificateWatch::Served& served) {
+                if (served.server.empty())
+                    servers_.renew(served.listener, served.settings, served.settings.made);
+                else
+                    northbound_.renew(served.settings.material);
             });
     if (certificates_) certificates_->follow(config);
 }

@@ -86,6 +86,7 @@ struct NoHttpDoor {
 struct HttpDoor {
     config::Endpoint endpoint;        ///< with an address that can be connected to, or a name
     std::optional<tls::Trust> trust;  ///< nothing: it is asked by plain HTTP
+    bool is_local = false;            ///< the file says so: on loopback
 
     std::string url() const;  ///< "https://127.0.0.1:8443"
 };
@@ -117,7 +118,9 @@ std::string first_line(std::string_view text);
 HttpReply ask(const HttpDoor& door, const std::string& request, Duration patience, std::size_t most,
               const std::function<bool(const HttpReply&)>& enough);
 
-/// Requests /readyz and waits for at most `patience`. Empty if the answer is 200; else the answer
+/// Requests /readyz and waits for at most `patience`. A local gateway is believed whatever its
+/// certificate: where a new one is kept back, it is ready with the former one, and the question
+/// holds no secret. Empty if the answer is 200; else the answer
 /// or the error in one printable line.
 std::string ask_whether_ready(const HttpDoor& door, Duration patience);
 

@@ -132,10 +132,22 @@ Heading heading_of(const config::Station& station, const arbiter::StationSetting
     return {text + translations_of(station), " id name profile access crc_order "};
 }
 
+/// Whom `allow` and `tls` let in.
+std::string guests_of(const std::vector<Network>& allow, const std::optional<tls::Settings>& tls) {
+    const bool shown = tls && tls->client == tls::ClientCertificate::required;
+    return text_of(allow) + (shown ? " with a certificate" : "");
+}
+
+std::string rights_of(const tcp_server::Settings& listener) {
+    const bool by_role = listener.tls && listener.tls->role_from_certificate;
+    if (listener.read_only || !by_role) return rights(listener.read_only);
+    return "read, and write where the role in the client's certificate may";
+}
+
 Heading heading_of(const tcp_server::Settings& listener) {
     std::string text = "modbus_tcp " + listener.name() + ':';
     for (const std::string& line : listener.lines) text += ' ' + line;
-    return {text + ", " + rights(listener.read_only) + ", for " + text_of(listener.allow),
+    return {text + ", " + rights_of(listener) + ", for " + guests_of(listener.allow, listener.tls),
             " listen lines access allow broadcast diagnostics_unit units "};
 }
 
@@ -153,8 +165,8 @@ Heading heading_of(const serial_server::Settings& master) {
 }
 
 Heading heading_of(const web::Settings& http) {
-    std::string text = "http " + http.name() + ": without a token " +
-                       text_of(http.anonymous) + ", for " + text_of(http.allow);
+    std::string text = "http " + http.name() + ": without a token " + text_of(http.anonymous) +
+                       ", for " + guests_of(http.allow, http.tls);
     if (!http.hosts.empty()) text += ", as";
     for (const std::string& host : http.hosts) text += ' ' + host;
     return {std::move(text), " listen anonymous allow hosts "};

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <string>
@@ -138,6 +139,17 @@ std::vector<std::size_t*> maxima(config::Config& config) {
     return found;
 }
 
+/// At the same time, of all listeners: they have no place yet.
+std::size_t handshakes(const config::Config& config) {
+    std::size_t most = 0;
+    const auto add = [&](const std::optional<tls::Settings>& tls) {
+        if (tls) most += tls->max_handshakes;
+    };
+    for (const tcp_server::Settings& settings : config.modbus_tcp) add(settings.tls);
+    if (config.http) add(config.http->tls);
+    return most;
+}
+
 std::string words(const config::Config& config, const std::vector<std::size_t>& granted) {
     std::string text;
     std::size_t at = 0;
@@ -155,7 +167,8 @@ std::string words(const config::Config& config, const std::vector<std::size_t>& 
 std::string fit_connections(config::Config& config, std::size_t limit) {
     const std::size_t wanted =
         kOwnDescriptors +
-        kDescriptorsPerLine * (config.lines.size() + config.serial_masters.size());
+        kDescriptorsPerLine * (config.lines.size() + config.serial_masters.size()) +
+        handshakes(config);
     // Of few descriptors clients get a quarter: the gateway seldom needs all of its reserve.
     const std::size_t reserve = std::min(wanted, limit - limit / 4);
     std::vector<std::size_t> asked;

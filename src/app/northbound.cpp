@@ -9,6 +9,7 @@
 #include "panelgate/base/words.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/tls/replacement.hpp"
 #include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::app {
@@ -117,12 +118,13 @@ struct BrokerSession::Order {
 };
 
 BrokerSession::BrokerSession(boost::asio::any_io_executor executor, rt::Clock& clock,
-                             std::shared_ptr<const Snapshot> snapshot)
+                             std::shared_ptr<const Snapshot> snapshot, TopicRefusals refused)
     : clock_(clock),
       settings_(completed(*snapshot->config->mqtt)),
       publisher_(settings_, subjects_of(*snapshot->config)),
       alarm_(clock.make_alarm()),
       rebirth_alarm_(clock.make_alarm()),
+      refused_(std::move(refused)),
       who_(client_of(settings_)),
       writes_(std::make_shared<Writes>(Writes{this, bus::next_client_id()})),
       client_(std::move(executor), clock, settings_, publisher_,
@@ -139,6 +141,7 @@ bool BrokerSession::fits(const Snapshot& snapshot) const {
 void BrokerSession::show(std::shared_ptr<const Snapshot> snapshot) {
     snapshot_ = std::move(snapshot);
     numbers_.clear();
+    renew(snapshot_->config->mqtt->files);
     places_.assign(snapshot_->plant.lines().size(), {});
     const BrokerSight sight(*snapshot_->config);
     for (const Station* station : by_name(snapshot_->plant.stations())) {
@@ -155,6 +158,12 @@ void BrokerSession::show(std::shared_ptr<const Snapshot> snapshot) {
             places_.push_back({station, point});
         }
     }
+}
+
+void BrokerSession::renew(const tls::Material& files) {
+    settings_.files = mqtt::Files{files};
+    certificate_expiry_ = tls::summary_of(files.certificate).end;
+    client_.renew(files);
 }
 
 void BrokerSession::take_over(BrokerSession& before) {
@@ -267,7 +276,7 @@ void BrokerSession::on_command(const mqtt::Command& command) {
         if (std::exchange(rebirth_waits_, true)) return;
         rebirth_alarm_->arm(std::max(clock_.now(), next_rebirth_), [this] { on_rebirth(); });
     } else if (const auto* bad = std::get_if<mqtt::BadCommand>(&command)) {
-        refuse(bad->topic, bad->id, web::problem(400, bad->why));
+        refuse(bad->topic, bad->id, web::problem(400, bad->why), {});
     } else {
         write(std::get<mqtt::WriteCommand>(command));
     }
@@ -280,8 +289,17 @@ void BrokerSession::on_rebirth() {
     client_.wake();
 }
 
-void BrokerSession::refuse(const std::string& topic, const std::string& id,
-                           const web::Problem& why) {
+void BrokerSession::refuse(const std::string& topic, const std::string& id, const web::Problem& why,
+                           const Place& place) {
+    if (refused_) {
+        const TopicRefusal refusal{who_, topic, why, place.station, place.point};
+        refused_(refusal);
+    }
+    answer_refused(topic, id, why);
+}
+
+void BrokerSession::answer_refused(const std::string& topic, const std::string& id,
+                                   const web::Problem& why) {
     ++counters_.writes_refused;
     rt::log(rt::LogLevel::warn, "mqtt write refused",
             {{"client", kMqttName}, {"topic", web::excerpt(topic)}, {"why", why.detail}});
@@ -296,14 +314,15 @@ void BrokerSession::write(const mqtt::WriteCommand& command) {
     const Station& station = *place.station;
     const std::string topic = publisher_.topic_of(command.point);
     if (writes_->open >= settings_.writes)
-        return refuse(topic, command.id, web::problem(503, "too many writes are under way"));
+        return refuse(topic, command.id, web::problem(503, "too many writes are under way"), place);
     if (!publisher_.has_room_for_answer(writes_->open))
-        return refuse(topic, command.id, web::problem(503, "too many answers wait for the broker"));
+        return refuse(topic, command.id, web::problem(503, "too many answers wait for the broker"),
+                      place);
     const profile::ProfileRef profile = station.configured->profile;
     auto order = web::order_of(*station.bus, station.id, *profile, *place.point, command.value);
     if (!order) {
         publisher_.repeat(command.point);  // for clients that ignore our answers
-        return refuse(topic, command.id, order.error());
+        return refuse(topic, command.id, order.error(), place);
     }
     bus::Request request = order->request;
     request.client = writes_->client;
@@ -325,7 +344,7 @@ void BrokerSession::finish(const Order& order, const bus::Answer& answer) {
     const auto result = web::write_result(order.order, answer, *order.profile);
     const auto point = publisher_.subjects().find_point(order.station, order.point);
     if (!result && point) publisher_.repeat(*point);
-    if (!result && answer.refusal) return refuse(order.topic, order.id, result.error());
+    if (!result && answer.refusal) return answer_refused(order.topic, order.id, result.error());
     ++(result ? counters_.writes_ok : counters_.writes_failed);
     json::object body{{"ok", static_cast<bool>(result)}};
     for (const auto& [name, value] : result ? *result : web::json_of(result.error()))
@@ -343,20 +362,28 @@ mqtt::Counters BrokerSession::counters() const {
     all.writes_ok = counters_.writes_ok;
     all.writes_refused = counters_.writes_refused;
     all.writes_failed = counters_.writes_failed;
+    all.broker = settings_.broker();
+    all.certificate_expiry = certificate_expiry_;
     return all;
 }
 
-Northbound::Northbound(boost::asio::any_io_executor executor, rt::Clock& clock)
-    : executor_(std::move(executor)), clock_(clock) {}
+Northbound::Northbound(boost::asio::any_io_executor executor, rt::Clock& clock,
+                       TopicRefusals refused)
+    : executor_(std::move(executor)), clock_(clock), refused_(std::move(refused)) {}
 
 void Northbound::show(const std::shared_ptr<const Snapshot>& snapshot) {
     if (session_ && session_->fits(*snapshot)) return session_->show(snapshot);
     std::unique_ptr<BrokerSession> next;
-    if (snapshot->config->mqtt) next = std::make_unique<BrokerSession>(executor_, clock_, snapshot);
+    if (snapshot->config->mqtt)
+        next = std::make_unique<BrokerSession>(executor_, clock_, snapshot, refused_);
     if (session_ && next) next->take_over(*session_);
     leave();
     session_ = std::move(next);
     if (session_ && running_) session_->start();
+}
+
+void Northbound::renew(const tls::Material& files) {
+    if (session_) session_->renew(files);
 }
 
 void Northbound::start() {

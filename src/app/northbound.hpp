@@ -27,18 +27,30 @@ mqtt::Subjects subjects_of(const config::Config& config);
 /// True if a session at the broker can go on: its settings and what it publishes are the same.
 bool is_same_session(const config::Config& before, const config::Config& now);
 
+/// A write of a topic that was refused before it came to a line. Valid for the call only.
+struct TopicRefusal {
+    WhoRef who;
+    std::string_view topic;
+    const web::Problem& why;
+    const Station* station = nullptr;  ///< null: no such topic, or one that is malformed
+    const points::Point* point = nullptr;
+};
+using TopicRefusals = std::function<void(const TopicRefusal&)>;
+
 /// A plant's session at an MQTT broker: publishes its points and the states of its stations and
 /// lines, and carries out writes of points. The clock outlives it. One thread.
 class BrokerSession {
   public:
     /// `snapshot` must have `mqtt:`.
     BrokerSession(boost::asio::any_io_executor executor, rt::Clock& clock,
-                  std::shared_ptr<const Snapshot> snapshot);
+                  std::shared_ptr<const Snapshot> snapshot, TopicRefusals refused);
 
     /// True if this session can serve the snapshot unchanged: show() is enough.
     bool fits(const Snapshot& snapshot) const;
     /// Uses this snapshot from now on; fits(*snapshot) must be true.
     void show(std::shared_ptr<const Snapshot> snapshot);
+    /// Files for the next connection to the broker.
+    void renew(const tls::Material& files);
     /// Before start(): takes over what another session, which is stopped next, has not published
     /// yet. At the same broker this session answers its outstanding writes, too.
     void take_over(BrokerSession& before);
@@ -83,7 +95,10 @@ class BrokerSession {
     void on_command(const mqtt::Command& command);
     void on_rebirth();
     void write(const mqtt::WriteCommand& command);
-    void refuse(const std::string& topic, const std::string& id, const web::Problem& why);
+    /// Tells the client, and the log.
+    void answer_refused(const std::string& topic, const std::string& id, const web::Problem& why);
+    void refuse(const std::string& topic, const std::string& id, const web::Problem& why,
+                const Place& place);
     void finish(const Order& order, const bus::Answer& answer);
 
     rt::Clock& clock_;
@@ -97,7 +112,9 @@ class BrokerSession {
     std::unique_ptr<rt::Alarm> rebirth_alarm_;  ///< of the pending rebirth
     TimePoint next_rebirth_{};                  ///< earliest time of the next rebirth
     bool rebirth_waits_ = false;
+    std::int64_t certificate_expiry_ = 0;
     mqtt::Counters counters_;         ///< of writes, and of earlier sessions
+    TopicRefusals refused_;           ///< null: nobody wants to know
     WhoRef who_;                      ///< who writes: whoever may publish at the broker
     std::shared_ptr<Writes> writes_;  ///< null once another session has taken them over
     mqtt::Client client_;
@@ -106,7 +123,8 @@ class BrokerSession {
 /// The plant's MQTT service, across all reloads. The clock outlives it. One thread.
 class Northbound {
   public:
-    Northbound(boost::asio::any_io_executor executor, rt::Clock& clock);
+    /// `refused` is told of writes that are refused before they come to a line.
+    Northbound(boost::asio::any_io_executor executor, rt::Clock& clock, TopicRefusals refused = {});
 
     /// Serves this snapshot from now on; without `mqtt:` nothing. If broker, points and stations
     /// are the same, the connection stays; else it is made anew, and queued messages are kept.
@@ -116,6 +134,9 @@ class Northbound {
     void stop();
     /// True if the broker has got the last message, or it is not waited for any more.
     bool left() const { return !closing_ || closing_->done(); }
+
+    /// Files for the next connection to the broker; none is closed.
+    void renew(const tls::Material& files);
 
     /// Reports an event of a line of the snapshot.
     void on_bus_event(const std::string& line, const bus::BusEvent& event);
@@ -129,6 +150,7 @@ class Northbound {
 
     boost::asio::any_io_executor executor_;
     rt::Clock& clock_;
+    TopicRefusals refused_;
     std::unique_ptr<BrokerSession> session_;        ///< null without a broker
     std::unique_ptr<mqtt::GracefulClose> closing_;  ///< of the previous or the last session
     bool running_ = false;

@@ -200,8 +200,8 @@ void Reloader::Job::refuse_tokens() {
     next = nullptr;
     verdict.outcome = ReloadOutcome::refused;
     verdict.why =
-        "only tokens have changed since, and those that ran before allow more; ask with weaker "
-        "where that is meant";
+        "only tokens, or who comes in without one, have changed since, and what ran before allows "
+        "more; ask with weaker where that is meant";
 }
 
 void Reloader::Job::compare() {

@@ -4,6 +4,7 @@
 #include <unistd.h>
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <system_error>
@@ -22,6 +23,17 @@ std::string rotated_name(const std::string& file, std::uint64_t first) {
     std::string digits = std::to_string(first);
     if (digits.size() < kDigits) digits.insert(0, kDigits - digits.size(), '0');
     return file + '.' + digits;
+}
+
+std::optional<std::uint64_t> number_in(const std::string& name, const std::string& file) {
+    const std::string start = fs::path(file).filename().string() + '.';
+    const std::string own = fs::path(name).filename().string();
+    if (!own.starts_with(start)) return std::nullopt;
+    std::uint64_t number = 0;
+    const auto [end, wrong] =
+        std::from_chars(own.data() + start.size(), own.data() + own.size(), number);
+    if (wrong != std::errc{} || number == 0) return std::nullopt;
+    return number;
 }
 
 /// Their numbers have leading zeros: the order of names is that of records.

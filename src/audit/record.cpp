@@ -101,6 +101,12 @@ void append_json(std::string& out, std::string_view text) {
     out += '"';
 }
 
+std::string member(std::string_view key, std::string_view value) {
+    std::string text = ",\"" + std::string(key) + "\":";
+    append_json(text, value);
+    return text;
+}
+
 Composer& Composer::begin(WallTime time, Kind kind) {
     body_.clear();
     body_ += "\"time\":\"";

@@ -1,5 +1,8 @@
 #include "panelgate/audit/repeats.hpp"
 
+#include <algorithm>
+#include <cstdint>
+#include <iterator>
 #include <utility>
 
 namespace panelgate::audit {
@@ -21,6 +24,21 @@ bool Repeats::has_many(std::string_view client) const {
     return false;
 }
 
+/// Room for a new key comes back with time.
+bool Repeats::may_begin(TimePoint now) {
+    const std::int64_t earned = std::max<std::int64_t>(0, (now - filled_) / kNewEach);
+    if (room_ + earned >= kNewAtOnce) {
+        room_ = kNewAtOnce;
+        filled_ = now;
+    } else {
+        room_ += static_cast<int>(earned);
+        filled_ += earned * kNewEach;
+    }
+    if (room_ == 0 || entries_.size() >= kMost) return false;
+    --room_;
+    return true;
+}
+
 bool Repeats::is_new(TimePoint now, WallTime wall, std::string_view key, unsigned in_full,
                      const std::function<std::string()>& members, const Client& client) {
     auto found = entries_.find(key);
@@ -29,7 +47,7 @@ bool Repeats::is_new(TimePoint now, WallTime wall, std::string_view key, unsigne
         return is_new(now, wall, rest, 0,
                       [&] { return client.members() + std::string(kOtherPlaces); });
     }
-    if (found == entries_.end() && entries_.size() < kMost) {
+    if (found == entries_.end() && may_begin(now)) {
         found = entries_.emplace(std::string(key), Entry{now, 0, {members(), 0, {}, {}}}).first;
     } else if (found == entries_.end()) {
         const Entry others{now, 0, {std::string(kOthersMembers), 0, {}, {}}};
@@ -49,16 +67,18 @@ std::vector<Repeats::Counted> Repeats::due(TimePoint now, bool all) {
     std::vector<Counted> counted;
     for (auto it = entries_.begin(); it != entries_.end();) {
         Entry& entry = it->second;
-        if (!all && now - entry.began < kInterval) {
-            ++it;
-        } else if (entry.counted.count == 0) {
-            it = entries_.erase(it);
-        } else {
-            counted.push_back(entry.counted);  // it goes on: the next interval is counted, too
-            entry.counted.count = 0;
-            entry.began = now;
-            ++it;
+        const Duration waited = now - entry.since;
+        if (entry.counted.count == 0) {
+            it = all || waited >= kInterval ? entries_.erase(it) : std::next(it);
+            continue;
         }
+        if (all || waited >= entry.step) {
+            counted.push_back(entry.counted);  // it goes on: what comes is counted, too
+            entry.counted.count = 0;
+            entry.since = now;
+            entry.step = std::min<Duration>(2 * entry.step, kInterval);
+        }
+        ++it;
     }
     return counted;
 }

@@ -21,7 +21,7 @@ namespace panelgate::audit {
 
 namespace {
 
-constexpr Duration kAgain = 1s;  // between two tries while the disk takes nothing
+constexpr Duration kAgain = 1s;  // between two tries while the disk takes nothing, or two looks
 
 /// Signals are for the loop's thread.
 std::thread start_thread(std::function<void()> run) {
@@ -123,8 +123,9 @@ struct Trail::State {
     Settings settings;
     std::optional<Settings> next;
     std::string pending;
-    std::size_t of_last = 0;  ///< bytes of `pending` from before `next` was wanted
-    std::uint64_t lost = 0;   ///< not yet recorded
+    std::size_t of_last = 0;      ///< bytes of `pending` from before `next` was wanted
+    std::uint64_t lost = 0;       ///< not yet recorded
+    std::uint64_t told_lost = 0;  ///< in a record that is not yet written
     Counters counters;
     bool stop = false;
 
@@ -148,7 +149,9 @@ bool Trail::State::wait(std::unique_lock<std::mutex>& lock) {
         wake.wait_for(lock, kAgain, [&] { return stop; });
         return stop;
     }
-    wake.wait(lock, [&] { return stop || next || !pending.empty(); });
+    // A file that was removed is seen even when there is nothing to record.
+    if (!wake.wait_for(lock, kAgain, [&] { return stop || next || !pending.empty(); }))
+        return false;
     wake.wait_for(lock, settings.flush,
                   [&] { return stop || next || pending.size() > settings.buffer / 2; });
     return stop;
@@ -173,6 +176,7 @@ void Trail::State::take_over() {
     const std::uint64_t left_out = std::exchange(lost, 0);
     std::swap(taken, pending);
     if (left_out == 0) return;
+    told_lost = left_out;
     composer.begin(hooks.wall(), Kind::lost).number("count", left_out);
     taken += composer.body();
     taken += '\n';
@@ -187,7 +191,7 @@ void Trail::State::anchor() {
     if (!due) return;
     anchored = last.number;
     anchored_at = time;
-    hooks.tell({Notice::Kind::anchor, {}, last});
+    hooks.tell({Notice::Kind::anchor, writer.chain_id(), last});
 }
 
 void Trail::State::work() {
@@ -209,6 +213,7 @@ void Trail::State::work() {
         hooks.tell({good ? Notice::Kind::recovered : Notice::Kind::failing, why, {}});
         if (!good) ++failures;
     }
+    if (good) told_lost = 0;
     if (good) anchor();
 }
 
@@ -237,7 +242,7 @@ void Trail::State::run() {
         round(lock);
     }
     // What came while the last try was going on, and what belongs to another file.
-    for (int i = 0; i < 2 && !failing; ++i) round(lock);
+    for (int i = 0; i < 2; ++i) round(lock);
 }
 
 Trail::Trail(const Settings& settings, Hooks hooks)
@@ -247,7 +252,7 @@ Trail::Trail(const Settings& settings, Hooks hooks)
 
 Trail::~Trail() { close(); }
 
-Position Trail::close() {
+Trail::End Trail::close() {
     if (state_->thread.joinable()) {
         {
             const std::scoped_lock lock(state_->mutex);
@@ -256,7 +261,15 @@ Position Trail::close() {
         state_->wake.notify_one();
         state_->thread.join();
     }
-    return state_->writer.last();
+    // What the thread had taken, what it had not, and what was counted only.
+    const auto lines = [](const std::string& text) {
+        return static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n'));
+    };
+    Writer& writer = state_->writer;
+    const std::uint64_t told = state_->told_lost;  // by one of the records
+    return {writer.last(), writer.chain_id(),
+            writer.unwritten() + lines(state_->taken) + lines(state_->pending) + state_->lost +
+                told - (told > 0 ? 1 : 0)};
 }
 
 void Trail::add(std::string_view body) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdlib>
+#include <utility>
 
 namespace panelgate::audit {
 
@@ -34,30 +35,73 @@ std::string records_text(std::uint64_t first, std::uint64_t last) {
     return "records " + std::to_string(first) + " to " + std::to_string(last);
 }
 
-/// What stands behind `key` in a log line: its digits (of base 16 for a hash).
-std::string_view digits_behind(std::string_view line, std::string_view key, bool hex) {
-    const auto at = line.find(key);
-    if (at == line.npos) return {};
-    std::string_view rest = line.substr(at + key.size());
-    rest.remove_prefix(std::min(rest.find_first_not_of("\"=: "), rest.size()));
-    const auto end = rest.find_first_not_of(hex ? "0123456789abcdef" : "0123456789");
-    return rest.substr(0, end);
+/// The fields of a line of the log, behind its event.
+class Fields {
+  public:
+    Fields(std::string_view rest, bool json) : rest_(rest), json_(json) {}
+
+    /// Takes the next field, which must be this one.
+    std::optional<std::string_view> take(std::string_view key) {
+        const std::string begin =
+            json_ ? ",\"" + std::string(key) + "\":\"" : ' ' + std::string(key) + '=';
+        if (!rest_.starts_with(begin)) return std::nullopt;
+        rest_.remove_prefix(begin.size());
+        const auto end = std::min(rest_.find_first_of(json_ ? "\"" : " \r\"\\"), rest_.size());
+        const std::string_view value = rest_.substr(0, end);
+        rest_.remove_prefix(json_ ? std::min(end + 1, rest_.size()) : end);
+        return value;
+    }
+
+  private:
+    std::string_view rest_;
+    bool json_;
+};
+
+/// What panelgate itself has written: a value with a blank stands in quotes, and no value has a
+/// bare quote, so the event stands before the first one; in JSON `,"` begins a member.
+std::optional<Fields> fields_of(std::string_view line, std::string_view level,
+                                std::string_view event) {
+    constexpr std::string_view kMessage = "\"MESSAGE\":\"";  // journalctl -o json
+    const std::string member = ",\"event\":\"" + std::string(event) + '"';
+    if (const auto at = line.find(member); at != line.npos)
+        return Fields(line.substr(at + member.size()), true);
+    const auto message = line.find(kMessage);
+    if (message != line.npos && message > 0 &&
+        (line[message - 1] == '{' || line[message - 1] == ','))
+        line.remove_prefix(message + kMessage.size());
+    const std::string words = std::string(level) + ' ' + std::string(event) + ' ';
+    const auto at = line.find(words);
+    if (at == line.npos || line.find('"') < at) return std::nullopt;
+    if (at > 0 && line[at - 1] != ' ' && line[at - 1] != '>') return std::nullopt;
+    return Fields(line.substr(at + words.size() - 1), false);
+}
+
+std::optional<std::uint64_t> number_of(std::optional<std::string_view> text) {
+    if (!text) return std::nullopt;
+    std::uint64_t value = 0;
+    const char* last = text->data() + text->size();
+    const auto [end, wrong] = std::from_chars(text->data(), last, value);
+    if (wrong != std::errc{} || end != last || value == 0) return std::nullopt;
+    return value;
+}
+
+bool is_hex(std::string_view text) {
+    return text.find_first_not_of("0123456789abcdef") == text.npos;
 }
 
 }  // namespace
 
 void collect_anchor(std::string_view log_line, Anchors& anchors) {
-    constexpr std::string_view kEvent = "audit anchor";
     constexpr std::size_t kShortest = 16;
-    const auto at = log_line.find(kEvent);
-    if (at == log_line.npos) return;
-    const std::string_view rest = log_line.substr(at + kEvent.size());
-    const std::string_view number = digits_behind(rest, "number", false);
-    const std::string_view hash = digits_behind(rest, "hash", true);
-    std::uint64_t value = 0;
-    const auto [end, wrong] = std::from_chars(number.data(), number.data() + number.size(), value);
-    if (wrong != std::errc{} || value == 0 || hash.size() < kShortest || hash.size() > 64) return;
-    anchors[value] = hash;
+    if (auto fields = fields_of(log_line, "error", "audit records lost"))
+        anchors.lost += number_of(fields->take("count")).value_or(0);
+    auto fields = fields_of(log_line, "info", "audit anchor");
+    if (!fields) return;
+    const auto number = number_of(fields->take("number"));
+    const std::string_view hash = fields->take("hash").value_or("");
+    const std::string_view chain = fields->take("chain").value_or("");
+    if (!number || hash.size() < kShortest || hash.size() > 64) return;
+    if (is_hex(hash) && is_hex(chain)) anchors.chains[std::string(chain)][*number] = hash;
 }
 
 void Verifier::begin_file(std::string name) {
@@ -141,9 +185,31 @@ void Verifier::judge(const Sealed& record) {
 void Verifier::accept(const Sealed& record) {
     report_.last = {record.number, record.hash};
     ++report_.records;
+    if (member_of(record.body, "kind") == "file") look_at_file(record);
     remark(record);
-    const auto anchor = anchors_.find(record.number);
-    if (anchor == anchors_.end()) return;
+    if (!report_.fault) compare(record);
+}
+
+/// Each file names its chain, and from which record on files are kept.
+void Verifier::look_at_file(const Sealed& record) {
+    std::string_view chain = member_of(record.body, "chain");
+    if (!is_hex(chain)) chain = {};
+    if (has_chain_ && chain != report_.chain) {
+        report_.fault = fault_here(Fault::Kind::changed, record.number,
+                                   record_text(record.number) + " begins a file of another chain");
+        decided_ = true;
+        return;
+    }
+    report_.chain = chain;
+    has_chain_ = true;
+    kept_from_ = number_of(member_of(record.body, "from")).value_or(0);
+}
+
+void Verifier::compare(const Sealed& record) {
+    const auto named = anchors_.chains.find(report_.chain);
+    if (named == anchors_.chains.end()) return;
+    const auto anchor = named->second.find(record.number);
+    if (anchor == named->second.end()) return;
     if (text_of(record.hash).starts_with(anchor->second)) {
         ++report_.anchored;
         return;
@@ -210,37 +276,86 @@ void Verifier::decide_at_end() {
            record_text(found) + " stands where " + record_text(expected) + " belongs");
 }
 
+void Verifier::note(std::string text) {
+    if (report_.remarks.size() < kRemarks) report_.remarks.push_back(std::move(text));
+}
+
 /// What the records themselves say is missing.
 void Verifier::remark(const Sealed& record) {
     const std::string_view kind = member_of(record.body, "kind");
-    if ((kind != "lost" && kind != "start") || report_.remarks.size() >= kRemarks) return;
+    if (kind != "lost" && kind != "start" && kind != "file") return;
     const std::string when =
         record_text(record.number) + " (" + std::string(member_of(record.body, "time")) + "): ";
+    const std::string_view gone = member_of(record.body, "gone");
+    if (number_of(gone))
+        note(when + "the file before was removed while it was written, with the records from " +
+             std::string(gone) + " on");
     if (kind == "lost")
-        report_.remarks.push_back(when + std::string(member_of(record.body, "count")) +
-                                  " records were left out, the disk took nothing");
+        note(when + std::string(member_of(record.body, "count")) +
+             " records were left out, the disk took nothing");
     if (member_of(record.body, "unclean") == "true")
-        report_.remarks.push_back(when +
-                                  "the run before did not end in order; what it did in its "
-                                  "last second may be missing");
+        note(when +
+             "the run before did not end in order; what it did in its last second, or since its "
+             "log says `audit fails`, may be missing");
     const std::string_view torn = member_of(record.body, "torn_bytes");
     if (!torn.empty())
-        report_.remarks.push_back(when + "a torn line of " + std::string(torn) +
-                                  " bytes was found and taken over into this record");
+        note(when + "a torn line of " + std::string(torn) +
+             " bytes was found and taken over into this record");
+}
+
+/// Files that the chain itself says are kept must be there.
+void Verifier::check_begin() {
+    if (report_.records == 0 || kept_from_ == 0 || report_.first <= kept_from_) return;
+    const std::string missing = records_text(kept_from_, report_.first - 1);
+    if (!all_)
+        return note("these files begin with " + record_text(report_.first) + "; " + missing +
+                    " stand in other files of this audit");
+    report_.fault =
+        Fault{Fault::Kind::removed, kept_from_, file_, 0,
+              missing + " removed: the files begin with " + record_text(report_.first) +
+                  ", and rotation has dropped only what stood before " + record_text(kept_from_)};
 }
 
 void Verifier::check_end() {
-    if (anchors_.empty() || anchors_.rbegin()->first <= report_.last.number) return;
-    const std::uint64_t named = anchors_.rbegin()->first;
+    const auto named_here = anchors_.chains.find(report_.chain);
+    if (named_here == anchors_.chains.end()) return;
+    const std::uint64_t named = named_here->second.rbegin()->first;
+    if (named <= report_.last.number) return;
     report_.fault = Fault{Fault::Kind::removed, report_.last.number + 1, file_, 0,
                           "the log names " + record_text(named) + ", but the files end with " +
                               record_text(report_.last.number) + ": " +
                               records_text(report_.last.number + 1, named) + " removed at the end"};
 }
 
+/// A log that names nothing of these files proves nothing.
+void Verifier::check_anchors() {
+    if (!anchors_.is_read || report_.records == 0 || report_.anchored > 0) return;
+    const std::string chain = report_.chain.empty() ? "this chain" : "the chain " + report_.chain;
+    report_.fault =
+        Fault{Fault::Kind::anchor, report_.last.number, file_, 0,
+              "the log names no record of " + chain +
+                  " in these files, so nothing was compared: it is another log, or the chain was "
+                  "made anew"};
+}
+
+void Verifier::tell_of_log() {
+    if (anchors_.lost > 0)
+        note("the log says that " + std::to_string(anchors_.lost) +
+             " records could not be written when a run ended");
+    for (const auto& [chain, named] : anchors_.chains) {
+        if (chain == report_.chain || named.empty()) continue;
+        note("the log names records of another chain too, " +
+             (chain.empty() ? "without id" : chain) + ", up to " +
+             record_text(named.rbegin()->first) + ": of another audit, or of one that was removed");
+    }
+}
+
 Report Verifier::finish() {
     if (suspect_) decide_at_end();
+    if (!report_.fault) check_begin();
     if (!report_.fault) check_end();
+    if (!report_.fault) check_anchors();
+    tell_of_log();
     return std::move(report_);
 }
 

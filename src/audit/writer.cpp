@@ -2,17 +2,21 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <utility>
 #include <vector>
 
 #include "panelgate/audit/files.hpp"
+#include "panelgate/base/bytes.hpp"
 
 namespace panelgate::audit {
 
@@ -52,6 +56,13 @@ std::string rename_aside(const std::string& from, const std::string& to) {
     return {};
 }
 
+/// Tells chains apart in a log; a second audit must not have the same one by chance.
+std::string new_id() {
+    std::array<std::uint8_t, 8> bytes{};
+    if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) return {};
+    return to_hex(bytes, "");
+}
+
 /// A new name is on the disk only when its folder is.
 void sync_folder(const std::string& file) {
     const fs::path folder = fs::path(file).parent_path();
@@ -82,6 +93,9 @@ void Writer::apply(const Settings& settings) {
     take_back();
     chain_ = Chain();
     safe_ = {};
+    id_.clear();
+    from_ = 1;
+    gone_ = 0;
     known_ = begun_ = unclean_ = unsynced_ = false;
     sealed_ = 0;
     torn_bytes_ = 0;
@@ -114,16 +128,38 @@ bool Writer::fail(const std::string& what) {
     return false;
 }
 
-bool Writer::is_moved() const {
+/// Whole lines that a full disk took before it was full are there, if they can be synchronized.
+std::uint64_t Writer::unwritten() {
+    const auto lines = [](const std::string& text, std::size_t from) {
+        const auto begin = text.begin() + static_cast<std::ptrdiff_t>(std::min(from, text.size()));
+        return static_cast<std::uint64_t>(std::count(begin, text.end(), '\n'));
+    };
+    const bool is_there = file_ >= 0 && sealed_ > 0 && ::fdatasync(file_) == 0;
+    return (is_there ? lines(out_, sent_) : sealed_) + lines(batch_, at_);
+}
+
+/// Closes a file that has no longer its name: it was moved away by a rotation that is not ours, or
+/// removed, which is a failure. False: it was removed just now.
+bool Writer::look_after_file() {
     struct stat named{};
     struct stat open{};
-    if (::stat(settings_.file.c_str(), &named) != 0) return errno == ENOENT;
-    return ::fstat(file_, &open) == 0 &&
-           (named.st_ino != open.st_ino || named.st_dev != open.st_dev);
+    const bool there = ::stat(settings_.file.c_str(), &named) == 0;
+    if (!there && errno != ENOENT) return true;
+    if (::fstat(file_, &open) != 0) return true;
+    if (there && named.st_ino == open.st_ino && named.st_dev == open.st_dev) return true;
+    close();
+    if (open.st_nlink > 0) {
+        remark_ = settings_.file + " was moved away, and a new one begins";
+        return true;
+    }
+    gone_ = first_;
+    why_ = settings_.file + " was removed while it was written, with the records " +
+           std::to_string(first_) + " to " + std::to_string(safe_.number);
+    return false;
 }
 
 bool Writer::ensure_open() {
-    if (file_ >= 0 && is_moved()) close();  // by a log rotation that is not ours
+    if (file_ >= 0 && !look_after_file()) return false;
     if (file_ >= 0) return true;
     if (!open() || !resume()) {
         close();
@@ -152,6 +188,34 @@ bool Writer::open() {
     return true;
 }
 
+/// What the first record of a file says of its chain.
+void Writer::read_head(std::string_view head) {
+    const auto record = parse_line(head.substr(0, head.find('\n')));
+    first_ = record ? record->number : chain_.last().number;
+    if (!record || member_of(record->body, "kind") != "file") return;
+    id_ = member_of(record->body, "chain");
+    const std::string from(member_of(record->body, "from"));
+    from_ = std::strtoull(from.c_str(), nullptr, 10);
+}
+
+/// Goes on where the newest full file ends.
+void Writer::resume_after_older() {
+    const auto older = rotated_files(settings_.file);
+    const int file = older.empty() ? -1 : ::open(older.back().c_str(), O_RDONLY | O_CLOEXEC);
+    struct stat found{};
+    if (file >= 0 && ::fstat(file, &found) == 0) {
+        const auto size = static_cast<std::size_t>(found.st_size);
+        const std::size_t count = std::min(size, kTail);
+        const std::string end = read_at(file, static_cast<off_t>(size - count), count);
+        const Tail tail = parse_tail(end);
+        chain_ = Chain(tail.last);
+        unclean_ = tail.last.number > 0 && !tail.ended;
+        if (tail.last.number > 0) read_head(read_at(file, 0, kTail));
+    }
+    if (file >= 0) ::close(file);
+    known_ = true;
+}
+
 /// Finds out where the chain stands, and goes on there.
 bool Writer::resume() {
     if (size_ > 0) {
@@ -160,26 +224,10 @@ bool Writer::resume() {
         if (!resume_from(end, count == size_)) return false;
     }
     if (size_ > 0) {
-        const std::string first = read_at(file_, 0, kTail);
-        const auto record = parse_line(std::string_view(first).substr(0, first.find('\n')));
-        first_ = record ? record->number : chain_.last().number;
+        read_head(read_at(file_, 0, kTail));
         return true;
     }
-    if (!known_) {
-        const auto older = rotated_files(settings_.file);
-        const int file = older.empty() ? -1 : ::open(older.back().c_str(), O_RDONLY | O_CLOEXEC);
-        struct stat found{};
-        if (file >= 0 && ::fstat(file, &found) == 0) {
-            const auto size = static_cast<std::size_t>(found.st_size);
-            const std::size_t count = std::min(size, kTail);
-            const std::string end = read_at(file, static_cast<off_t>(size - count), count);
-            const Tail tail = parse_tail(end);
-            chain_ = Chain(tail.last);
-            unclean_ = tail.last.number > 0 && !tail.ended;
-        }
-        if (file >= 0) ::close(file);
-        known_ = true;
-    }
+    if (!known_) resume_after_older();
     begin_file();
     return true;
 }
@@ -215,7 +263,15 @@ bool Writer::set_aside(const char* why) {
 }
 
 void Writer::begin_file() {
+    if (chain_.last().number == 0) {
+        id_ = new_id();
+        from_ = 1;
+    }
     composer_.begin(wall_(), Kind::file).text("previous", text_of(chain_.last().hash));
+    composer_.text("chain", id_);
+    if (from_ > 0) composer_.number("from", from_);
+    if (const std::uint64_t gone = std::exchange(gone_, 0); gone > 0)
+        composer_.number("gone", gone);
     first_ = chain_.last().number + 1;
     if (sent_ == out_.size()) {
         chain_.append(out_, composer_.body());
@@ -231,6 +287,8 @@ void Writer::begin_run() {
     composer_.text("remark", remark_);
     chain_.append(out_, std::string(composer_.body()) + start_);
     ++sealed_;
+    if (unclean_ && remark_.empty())
+        remark_ = "the run before did not end in order: what it recorded last may be missing";
 }
 
 void Writer::seal() {
@@ -289,9 +347,13 @@ bool Writer::rotate() {
     return true;
 }
 
-void Writer::drop_oldest() const {
+void Writer::drop_oldest() {
     const auto older = rotated_files(settings_.file);
-    for (std::size_t i = 0; i + settings_.keep < older.size(); ++i) std::remove(older[i].c_str());
+    if (older.size() <= settings_.keep) return;
+    const std::size_t count = older.size() - settings_.keep;
+    for (std::size_t i = 0; i < count; ++i) std::remove(older[i].c_str());
+    from_ = chain_.last().number + 1;
+    if (settings_.keep > 0) from_ = number_in(older[count], settings_.file).value_or(from_);
 }
 
 }  // namespace panelgate::audit

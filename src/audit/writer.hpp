@@ -40,7 +40,11 @@ class Writer {
     const Position& last() const { return safe_; }
     std::uint64_t records() const { return records_; }
     std::uint64_t rotations() const { return rotations_; }
-    /// What should be said of the file that was found at the start; told once.
+    /// The chain's id, which the log names with its records; empty: its first file has none.
+    const std::string& chain_id() const { return id_; }
+    /// Records that were taken and are not on the disk, as far as it can tell.
+    std::uint64_t unwritten();
+    /// What should be said of the file that was found, or has gone; told once.
     std::string remark() { return std::exchange(remark_, {}); }
 
   private:
@@ -49,9 +53,11 @@ class Writer {
     bool resume();
     bool resume_from(std::string_view end, bool is_whole);
     bool set_aside(const char* why);
-    bool is_moved() const;
+    bool look_after_file();
+    void read_head(std::string_view head);
+    void resume_after_older();
     bool rotate();
-    void drop_oldest() const;
+    void drop_oldest();
     void begin_file();
     void begin_run();
     void seal();
@@ -70,6 +76,9 @@ class Writer {
     bool known_ = false;  ///< the chain's position is known
     bool begun_ = false;  ///< the record `start` is written
     bool unclean_ = false;
+    std::string id_;
+    std::uint64_t from_ = 1;  ///< the first record that rotation has not dropped
+    std::uint64_t gone_ = 0;  ///< the first record of a file that was removed; 0: none was
     std::uint64_t torn_bytes_ = 0;
     std::string torn_;
     std::string remark_;

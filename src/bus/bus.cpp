@@ -233,16 +233,19 @@ void Bus::transact(Request request, AnswerHandler handler) {
 }
 
 void Bus::count_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) {
-    // A broadcast over several lines is judged before it is submitted to any of them.
+    // A broadcast over several lines is judged before it is submitted to any of them. A request
+    // that could have been submitted was refused by the access of the listener or the station.
+    const auto request =
+        modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
     std::string rule;
-    if (station == 0) {
-        const auto request =
-            modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
-        std::optional<Refusal> denial;
-        if (request) denial = state_->rights.judge(who, {.station = station, .asked = &*request});
+    if (station == 0 && request) {
+        const auto denial = state_->rights.judge(who, {.station = station, .asked = &*request});
         if (denial) rule = denial->why;
+        if (denial) ++state_->denials[rule];
     }
-    if (!rule.empty()) ++state_->denials[rule];
+    if (rule.empty() && station == 0 && unrecordable(state_->settings, station))
+        rule = label(Rule::unrecorded);
+    if (rule.empty() && request) rule = label(Rule::read_only);
     state_->account.add_refused(station, pdu, who, std::move(rule));
 }
 

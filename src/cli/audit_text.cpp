@@ -114,11 +114,86 @@ std::string audit_line(const json::object& record) {
     return line;
 }
 
+namespace {
+
+/// Takes a number of two digits, from `least` to `most`, behind `separator` off.
+bool take_two(std::string_view& text, char separator, int least, int most, int& value) {
+    if (!text.starts_with(separator) || text.size() < 3) return false;
+    text.remove_prefix(1);
+    const auto [end, wrong] = std::from_chars(text.data(), text.data() + 2, value);
+    if (wrong != std::errc{} || end != text.data() + 2) return false;
+    text.remove_prefix(2);
+    return value >= least && value <= most;
+}
+
+/// "Z", "+01:00", or nothing for UTC; its minutes.
+std::optional<int> zone_of(std::string_view text) {
+    if (text.empty() || text == "Z" || text == "z") return 0;
+    const bool before = text.front() == '-';
+    int hours = 0;
+    int minutes = 0;
+    if (!take_two(text, before ? '-' : '+', 0, 14, hours) || !take_two(text, ':', 0, 59, minutes))
+        return std::nullopt;
+    if (!text.empty()) return std::nullopt;
+    return (before ? -1 : 1) * (hours * 60 + minutes);
+}
+
+/// Takes "2026-11-26" off.
+std::optional<std::chrono::sys_days> take_day(std::string_view& text) {
+    int year = 0;
+    int month = 0;
+    int day = 0;
+    const auto [end, wrong] = std::from_chars(text.data(), text.data() + 4, year);
+    const bool digits = wrong == std::errc{} && end == text.data() + 4;
+    text.remove_prefix(4);
+    if (!digits || !take_two(text, '-', 1, 12, month) || !take_two(text, '-', 1, 31, day))
+        return std::nullopt;
+    const std::chrono::year_month_day date(std::chrono::year(year),
+                                           std::chrono::month(static_cast<unsigned>(month)),
+                                           std::chrono::day(static_cast<unsigned>(day)));
+    if (!date.ok()) return std::nullopt;
+    return std::chrono::sys_days(date);
+}
+
+/// Takes ".25" off; nullopt if no digit follows the point.
+std::optional<std::string> take_fraction(std::string_view& text) {
+    if (!text.starts_with('.')) return std::string();
+    const std::size_t end = std::min(text.find_first_not_of("0123456789", 1), text.size());
+    if (end < 2) return std::nullopt;
+    std::string fraction(text.substr(0, end));
+    text.remove_prefix(end);
+    return fraction;
+}
+
+/// A day, or a day and a time (RFC 3339), as the beginning of a record's time; nullopt if there is
+/// no such.
+std::optional<std::string> point_in_time(std::string_view typed) {
+    std::string_view rest = typed;
+    const auto day = take_day(rest);
+    if (!day) return std::nullopt;
+    if (rest.empty()) return std::string(typed);
+    int hour = 0;
+    int minute = 0;
+    int second = 0;
+    if (std::string_view("Tt ").find(rest.front()) == rest.npos) return std::nullopt;
+    if (!take_two(rest, rest.front(), 0, 23, hour) || !take_two(rest, ':', 0, 59, minute))
+        return std::nullopt;
+    if (rest.starts_with(':') && !take_two(rest, ':', 0, 60, second)) return std::nullopt;
+    const auto fraction = take_fraction(rest);
+    const auto zone = fraction ? zone_of(rest) : std::nullopt;
+    if (!zone) return std::nullopt;
+    const WallTime time = WallTime(day->time_since_epoch()) + std::chrono::hours(hour) +
+                          std::chrono::minutes(minute - *zone) + std::chrono::seconds(second);
+    return rfc3339(time).substr(0, 19) + *fraction;
+}
+
+}  // namespace
+
 std::optional<std::string> audit_time(std::string_view typed, WallTime now) {
     using std::chrono::seconds;
     constexpr std::array<std::pair<std::string_view, std::int64_t>, 5> kUnits{
         {{"min", 60}, {"s", 1}, {"h", 3600}, {"d", 86'400}, {"w", 604'800}}};
-    if (typed.size() >= 10 && typed[4] == '-' && typed[7] == '-') return std::string(typed);
+    if (typed.size() >= 10 && typed[4] == '-' && typed[7] == '-') return point_in_time(typed);
     constexpr std::int64_t kMost = 100'000'000;
     std::int64_t number = 0;
     const auto [end, wrong] = std::from_chars(typed.data(), typed.data() + typed.size(), number);

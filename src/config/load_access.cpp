@@ -175,6 +175,15 @@ void load_expiry(MapReader& in, web::Token& token) {
                        yaml::quote(*typed));
 }
 
+/// Also one that was typed in capitals: taken for the token, it would let in whoever reads it.
+bool looks_like_hash(std::string_view secret) {
+    constexpr std::string_view kHashOf = "sha256:";
+    return secret.size() >= kHashOf.size() &&
+           std::ranges::equal(secret.substr(0, kHashOf.size()), kHashOf, [](char a, char b) {
+               return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b;
+           });
+}
+
 web::Token load_token(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a token", kTokenExample);
     in.elsewhere(kTokenKeysElsewhere);
@@ -189,10 +198,12 @@ web::Token load_token(Loading& loading, const Node& node) {
     const std::string secret = load_secret(loading, in, elsewhere, token);
     if (web::is_token_hash(secret)) {
         token.hash = secret;
-    } else if (secret.starts_with("sha256:")) {
-        in.problem("file", "the token file " + token.file +
-                               " must hold the token, or sha256: and 64 hex digits, as `panelgate "
-                               "token new` writes it");
+    } else if (looks_like_hash(secret)) {
+        in.problem(
+            "file",
+            "the token file " + token.file +
+                " must hold the token, or sha256: and 64 hex digits in lower case, as `panelgate "
+                "token new` writes it");
     } else if (!secret.empty()) {
         token.hash = web::hash_of(secret);
         token.characters = secret.size();

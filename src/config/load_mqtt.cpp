@@ -120,22 +120,27 @@ std::string load_password(Loading& loading, MapReader& in, std::string& file) {
     return *text;
 }
 
-void load_file(Loading& loading, MapReader& in, std::string_view key, bool tls, std::string& path) {
+void load_file(Loading& loading, MapReader& in, std::string_view key, bool tls, std::string& path,
+               std::string& content) {
     const auto text = in.text(key);
     if (!text) return;
     path = loading.path_of(*text);
     if (!tls)
         in.problem(key, std::string(key) + " needs TLS; write broker: mqtts://HOST:8883");
-    else if (loading.files.is_special(path) || !loading.files.read(path))
+    else if (const auto file =
+                 loading.files.is_special(path) ? std::nullopt : loading.files.read(path))
+        content = *file;
+    else
         in.problem(key, "cannot read " + path +
                             "; give the path of a PEM file that this program "
                             "may read");
 }
 
 void load_files(Loading& loading, MapReader& in, mqtt::Settings& settings) {
-    load_file(loading, in, "ca", settings.tls, settings.ca);
-    load_file(loading, in, "certificate", settings.tls, settings.certificate);
-    load_file(loading, in, "key", settings.tls, settings.key);
+    load_file(loading, in, "ca", settings.tls, settings.ca, settings.files.ca);
+    load_file(loading, in, "certificate", settings.tls, settings.certificate,
+              settings.files.certificate);
+    load_file(loading, in, "key", settings.tls, settings.key, settings.files.key);
     if (settings.certificate.empty() == settings.key.empty()) return;
     in.problem(settings.key.empty() ? "certificate" : "key",
                "certificate and key belong together; give both");
@@ -161,6 +166,7 @@ void load_tls(Loading& loading, MapReader& in, mqtt::Settings& settings) {
     settings.ca = std::move(beside.ca);
     settings.certificate = std::move(beside.certificate);
     settings.key = std::move(beside.key);
+    settings.files = std::move(beside.files);
 }
 
 void load_format(MapReader& in, mqtt::Settings& settings) {

@@ -226,7 +226,13 @@ bool is_as_wide_network(const std::vector<Network>& wide, const std::vector<Netw
 /// True if all of the first are within the second at each station.
 bool has_items_of(const Rule& wide, const Rule& narrow) {
     if (!wide.has_range()) return true;
-    if (!narrow.has_range() || wide.unlisted_items != narrow.unlisted_items) return false;
+    if (!narrow.has_range()) return false;
+    // Of stations that are not listed a rule speaks only if it names none, or one of them.
+    const bool only_listed = !narrow.stations.empty() &&
+                             std::ranges::all_of(narrow.stations, [&](const access::Place& place) {
+                                 return narrow.items.contains(place);
+                             });
+    if (!only_listed && wide.unlisted_items != narrow.unlisted_items) return false;
     return std::ranges::all_of(narrow.items, [&](const auto& at) {
         const auto other = wide.items.find(at.first);
         if (other == wide.items.end()) return false;

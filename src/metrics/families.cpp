@@ -76,7 +76,8 @@ void add_tls(Families& out, const Snapshot& snapshot) {
                                      "TLS handshakes of clients, by how they ended.");
     Family expiry =
         make_gauge("panelgate_certificate_expiry_timestamp_seconds",
-                   "When the certificate that a listener shows to new clients stops being valid.");
+                   "When the certificate that a listener shows to new clients stops being "
+                   "valid, or the one that the gateway shows to its MQTT broker.");
     const auto add = [&](const std::string& listener, const tls::Counters& tls) {
         if (tls.certificate_expiry == 0) return;
         add_handshakes(handshakes, listener, tls);
@@ -85,6 +86,9 @@ void add_tls(Families& out, const Snapshot& snapshot) {
     for (const tcp_server::Counters& listener : snapshot.listeners)
         add(listener.listener, listener.tls);
     if (snapshot.http) add(snapshot.http->listener, snapshot.http->tls);
+    if (snapshot.mqtt && snapshot.mqtt->certificate_expiry != 0)
+        expiry.gauge({{"listener", snapshot.mqtt->broker}},
+                     static_cast<double>(snapshot.mqtt->certificate_expiry));
     Family renewals = make_counter("panelgate_certificate_renewals_total",
                                    "New certificate files of a listener, by what became of them: "
                                    "replaced those in use, or not taken, so that those were kept.");

@@ -420,6 +420,8 @@ std::unique_ptr<GracefulClose> Client::stop() {
 
 void Client::wake() { state_->wake(); }
 
+void Client::renew(const tls::Material& files) { state_->settings.files = Files{files}; }
+
 Counters Client::counters() const {
     Counters counters;
     counters.connected = state_->connected;

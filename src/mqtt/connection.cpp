@@ -5,7 +5,10 @@
 #include <chrono>
 #include <cstring>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
+
+#include "panelgate/tls/context.hpp"
 
 namespace panelgate::mqtt {
 
@@ -35,10 +38,8 @@ mosquitto* new_session(const std::string& client_id, void* owner) {
     return session;
 }
 
-constexpr int kVerifyPeer = 1;  // SSL_VERIFY_PEER
-constexpr int kReads = 64;      // per wake-up
+constexpr int kReads = 64;  // per wake-up
 constexpr const char* kNothing = "panelgate/barrier";
-constexpr const char* kSystemTrust = "/etc/ssl/certs";
 
 }  // namespace
 
@@ -57,6 +58,12 @@ struct Connection::Callbacks {
     static void delivered(mosquitto*, void* owner, int id) {
         of(owner).happened_.delivered.push_back(id);
     }
+    /// "OpenSSL Error[0]: error:0A000418:SSL routines::tlsv1 alert unknown ca"
+    static void logged(mosquitto*, void* owner, int, const char* text) {
+        const std::string_view line(text);
+        if (line.starts_with("OpenSSL Error") && of(owner).tls_error_.empty())
+            of(owner).tls_error_ = line.substr(line.rfind(':') + 1);
+    }
     static void received(mosquitto*, void* owner, const mosquitto_message* message) {
         const Settings& settings = of(owner).settings_;
         const auto size = static_cast<std::size_t>(message->payloadlen);
@@ -73,14 +80,21 @@ Connection::Connection(const Settings& settings, const std::string& client_id)
 
 Connection::~Connection() = default;
 
-std::string Connection::set_up_tls() {
+std::string Connection::set_up_tls() try {
     if (!settings_.tls) return "";
-    const char* const folder = settings_.ca.empty() ? kSystemTrust : nullptr;
-    const int code =
-        mosquitto_tls_set(session_.get(), or_null(settings_.ca), folder,
-                          or_null(settings_.certificate), or_null(settings_.key), nullptr);
-    if (code != MOSQ_ERR_SUCCESS) return "cannot use ca, certificate or key: " + why(code);
-    return why(mosquitto_tls_opts_set(session_.get(), kVerifyPeer, nullptr, nullptr));
+    client_ = std::make_unique<tls::ClientContext>(settings_.client(), settings_.host);
+    mosquitto_log_callback_set(session_.get(), Callbacks::logged);
+    mosquitto_int_option(session_.get(), MOSQ_OPT_SSL_CTX_WITH_DEFAULTS, 0);
+    return why(mosquitto_void_option(session_.get(), MOSQ_OPT_SSL_CTX, client_->native()));
+} catch (const tls::Unusable& unusable) {
+    return unusable.what();
+}
+
+std::string Connection::reason(int code) const {
+    if (code == MOSQ_ERR_SUCCESS || !client_) return why(code);
+    if (!client_->refusal().empty())
+        return "TLS: " + client_->refusal() + " (`tls: ca` names who may sign it)";
+    return tls_error_.empty() ? why(code) : "TLS: the broker ends it: " + tls_error_;
 }
 
 std::string Connection::set_up(const Message& will) {
@@ -106,8 +120,8 @@ std::string Connection::connect(const Message& will) {
     std::string failed = set_up(will);
     if (!failed.empty()) return failed;
     const auto keep_alive = std::chrono::floor<std::chrono::seconds>(settings_.keep_alive).count();
-    return why(mosquitto_connect(session_.get(), settings_.host.c_str(), settings_.port,
-                                 static_cast<int>(keep_alive)));
+    return reason(mosquitto_connect(session_.get(), settings_.host.c_str(), settings_.port,
+                                    static_cast<int>(keep_alive)));
 }
 
 int Connection::socket() const { return mosquitto_socket(session_.get()); }
@@ -119,15 +133,15 @@ std::string Connection::read() {
     for (int i = 0; i < kReads; ++i) {
         errno = 0;
         const int code = mosquitto_loop_read(session_.get(), 1);
-        if (code != MOSQ_ERR_SUCCESS) return why(code);
+        if (code != MOSQ_ERR_SUCCESS) return reason(code);
         if (errno == EAGAIN || errno == EWOULDBLOCK) break;
     }
     return "";
 }
 
-std::string Connection::write() { return why(mosquitto_loop_write(session_.get(), 1)); }
+std::string Connection::write() { return reason(mosquitto_loop_write(session_.get(), 1)); }
 
-std::string Connection::housekeep() { return why(mosquitto_loop_misc(session_.get())); }
+std::string Connection::housekeep() { return reason(mosquitto_loop_misc(session_.get())); }
 
 int Connection::publish(const Message& message) {
     int id = 0;

@@ -12,6 +12,7 @@
 
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/mqtt/subjects.hpp"
+#include "panelgate/tls/client_context.hpp"
 
 struct mosquitto;
 
@@ -104,11 +105,15 @@ class Connection {
 
   private:
     struct Callbacks;
+    /// errno must be that of the failed call.
+    std::string reason(int code) const;
     std::string set_up(const Message& will);
     std::string set_up_tls();
 
     const Settings settings_;
     Happened happened_;
+    std::string tls_error_;                       ///< OpenSSL's word for it, by libmosquitto
+    std::unique_ptr<tls::ClientContext> client_;  ///< null: plain; outlives the session
     std::unique_ptr<mosquitto, void (*)(mosquitto*)> session_;
 };
 

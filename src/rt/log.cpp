@@ -104,8 +104,13 @@ std::string escaped(std::string_view text) {
     return out;
 }
 
+/// What is not plain stands in quotes, and no value has a bare quote: a text of a client cannot
+/// look like an event (the audit's anchors are read by position), nor move a terminal's cursor.
 std::string text_value(const std::string& value) {
-    const bool plain = !value.empty() && value.find_first_of(" \"\\=\n\t\r") == std::string::npos;
+    const bool plain = !value.empty() && std::ranges::all_of(value, [](char c) {
+        const auto u = static_cast<unsigned char>(c);
+        return u > 0x20 && u != 0x7f && c != '"' && c != '\\' && c != '=';
+    });
     return plain ? value : '"' + escaped(value) + '"';
 }
 

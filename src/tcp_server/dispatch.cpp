@@ -122,31 +122,49 @@ std::vector<Target> targets_of(std::uint8_t unit, const UnitMap& units) {
     return targets;
 }
 
-/// Returns the targets that refuse every write; one refusal denies the whole broadcast.
-std::vector<Target> refusing(std::vector<Target> targets) {
-    std::erase_if(targets,
-                  [](const Target& target) { return !target.bus->write_refusal(target.station); });
-    return targets;
+/// Refuses with 01, or with 06 if it is only that nothing can be recorded now.
+Refuse deny(std::vector<Target> unwilling, const std::vector<bus::Refusal>& refusals) {
+    const bool unrecorded = std::ranges::all_of(refusals, [](const bus::Refusal& refusal) {
+        return refusal.rule == bus::Rule::unrecorded;
+    });
+    if (!unrecorded) return refuse(Fault::denied, std::move(unwilling));
+    return Refuse{refusals.front().code, std::move(unwilling)};
 }
 
-/// Returns the lines that would refuse this broadcast.
-std::vector<Target> denying(std::vector<Target> lines, const modbus::Request& request,
-                            const WhoRef& who) {
+/// Refuses if one of the targets refuses every write: one refusal denies the whole broadcast.
+std::optional<Refuse> refused_write(std::vector<Target> targets) {
+    std::vector<bus::Refusal> refusals;
+    std::erase_if(targets, [&](const Target& target) {
+        auto refusal = target.bus->write_refusal(target.station);
+        if (refusal) refusals.push_back(std::move(*refusal));
+        return !refusal;
+    });
+    if (targets.empty()) return std::nullopt;
+    return deny(std::move(targets), refusals);
+}
+
+/// Refuses if one of the lines would refuse this broadcast.
+std::optional<Refuse> refused_broadcast(std::vector<Target> lines, const modbus::Request& request,
+                                        const WhoRef& who) {
     const bus::Request broadcast{.station = 0, .request = request, .who = who};
-    std::erase_if(lines, [&](const Target& line) { return !line.bus->refusal_of(broadcast); });
-    return lines;
+    std::vector<bus::Refusal> refusals;
+    std::erase_if(lines, [&](const Target& line) {
+        auto refusal = line.bus->refusal_of(broadcast);
+        if (refusal) refusals.push_back(std::move(*refusal));
+        return !refusal;
+    });
+    if (lines.empty()) return std::nullopt;
+    return deny(std::move(lines), refusals);
 }
 
 Decision decide_broadcast(std::uint8_t function, Result<modbus::Request> request,
                           const Settings& settings, std::vector<Target> lines, const WhoRef& who) {
     if (settings.broadcast == BroadcastMode::deny) return refuse(Fault::denied, std::move(lines));
     // Check all lines before sending to any.
-    if (auto unwilling = refusing(lines); !unwilling.empty())
-        return refuse(Fault::denied, std::move(unwilling));
+    if (auto refused = refused_write(lines)) return std::move(*refused);
     if (!modbus::is_broadcastable(function)) return refuse(Fault::denied, std::move(lines));
     if (!request) return refuse(request.error(), std::move(lines));
-    if (auto unwilling = denying(lines, *request, who); !unwilling.empty())
-        return refuse(Fault::denied, std::move(unwilling));
+    if (auto refused = refused_broadcast(lines, *request, who)) return std::move(*refused);
     Broadcast all{{}, std::move(*request)};
     for (const Target& line : lines) all.lines.push_back(line.bus);
     return all;
@@ -173,8 +191,8 @@ Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const
     if (broadcast)
         return decide_broadcast(pdu[0], std::move(request), settings, std::move(targets), who);
     // A valid request is refused by the bus itself.
-    const bool denied = writes && !refusing(targets).empty();
-    return refuse(denied ? Fault::denied : request.error(), std::move(targets));
+    if (auto refused = writes ? refused_write(targets) : std::nullopt) return std::move(*refused);
+    return refuse(request.error(), std::move(targets));
 }
 
 }  // namespace panelgate::tcp_server

@@ -8,7 +8,6 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
 #include <cstddef>
-#include <iterator>
 #include <set>
 #include <string>
 #include <system_error>
@@ -101,7 +100,7 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
     void on_accepted(tcp::socket socket);
     void admit(tcp::socket socket, const tcp::endpoint& peer);
     bool make_room(const tcp::endpoint& peer);
-    void evict(std::size_t index, bool idle, const tcp::endpoint& peer);
+    void evict(Session& victim, bool idle, const tcp::endpoint& peer);
     void count_refused(const tcp::endpoint& peer, const Place& place);
     void on_closed(const std::shared_ptr<Session>& session);
     void apply_roles(const Settings& before);
@@ -188,16 +187,24 @@ void Listener::Core::on_accepted(tcp::socket socket) {
     if (!allowed_.allows(peer.address())) {
         shared_->log(rt::LogLevel::info, "connection refused",
                      {{"client", text(peer)}, {"reason", "not in the allow list"}});
-    } else if (make_room(peer)) {
+    } else if (shared_->handshakes || make_room(peer)) {
         admit(std::move(socket), peer);
     }
 }
 
-/// Beyond a limit a connection gives way to the newcomer, or the newcomer is refused (P9).
+/// Beyond a limit a connection gives way to the newcomer, or the newcomer is refused (P9). Nobody
+/// gives way to one who has not shown by a TLS handshake who he is; handshakes have limits of their
+/// own.
 bool Listener::Core::make_room(const tcp::endpoint& peer) {
     std::vector<Guest> guests;
+    std::vector<std::shared_ptr<Session>> seated;
     guests.reserve(sessions_.size());
-    for (const auto& session : sessions_) guests.push_back(session->guest());
+    seated.reserve(sessions_.size());
+    for (const auto& session : sessions_) {
+        if (session->is_at_the_door()) continue;
+        guests.push_back(session->guest());
+        seated.push_back(session);
+    }
     const Settings& settings = shared_->settings;
     const PlaceLimits limits{settings.max_connections, settings.max_connections_per_address};
     const Place place = find_place(guests, host_number(peer.address().to_string()), limits);
@@ -205,22 +212,20 @@ bool Listener::Core::make_room(const tcp::endpoint& peer) {
         ++shared_->counters.refused;
         count_refused(peer, place);
     } else if (place.taken_from) {
-        evict(*place.taken_from, guests[*place.taken_from].idle, peer);
+        evict(*seated[*place.taken_from], guests[*place.taken_from].idle, peer);
     }
     return place.found;
 }
 
 /// Closes one of sessions_ for a newcomer. A busy one leaves requests without an answer, which an
 /// operator should know.
-void Listener::Core::evict(std::size_t index, bool idle, const tcp::endpoint& peer) {
-    const std::shared_ptr<Session> victim =
-        *std::next(sessions_.begin(), static_cast<std::ptrdiff_t>(index));
+void Listener::Core::evict(Session& victim, bool idle, const tcp::endpoint& peer) {
     const rt::LogLevel level = idle ? rt::LogLevel::info : rt::LogLevel::warn;
     const char* reason = idle ? "the longest idle one" : "its address has the most, all busy";
     ++shared_->counters.evicted;
     shared_->log(level, "connection gives way",
-                 {{"client", victim->client()}, {"reason", reason}, {"to", text(peer)}});
-    victim->close();
+                 {{"client", victim.client()}, {"reason", reason}, {"to", text(peer)}});
+    victim.close();
 }
 
 /// Logs once until a connection closes.
@@ -247,12 +252,18 @@ void Listener::Core::admit(tcp::socket socket, const tcp::endpoint& peer) {
                            .address = peer.address().to_string(),
                            .listener = shared_->settings.name(),
                            .standing = Role::operator_});
-    session->start(Caller(text(peer), std::move(who)));
+    session->start(Caller(text(peer), std::move(who)),
+                   [weak = weak_from_this()](const tcp::endpoint& client) {
+                       const auto self = weak.lock();
+                       return self && self->make_room(client);
+                   });
 }
 
 void Listener::Core::on_closed(const std::shared_ptr<Session>& session) {
     sessions_.erase(session);
-    if (std::exchange(full_, false)) shared_->log(rt::LogLevel::info, "connections accepted again");
+    const bool had_place = !session->is_at_the_door();
+    if (had_place && std::exchange(full_, false))
+        shared_->log(rt::LogLevel::info, "connections accepted again");
     notify_when_empty();
 }
 

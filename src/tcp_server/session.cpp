@@ -35,13 +35,14 @@ Session::Session(asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
       due_alarm_(shared_->clock.make_alarm()),
       output_alarm_(shared_->clock.make_alarm()) {}
 
-void Session::start(Caller caller) {
+void Session::start(Caller caller, PlaceHandler take_place) {
     host_ = caller.host();
     pipeline_ = std::make_shared<Pipeline>(shared_, std::move(caller), [weak = weak_from_this()] {
         if (const auto self = weak.lock()) self->go_on();
     });
     if (!shared_->handshakes) return read();
     handshaking_ = true;
+    take_place_ = std::move(take_place);
     error_code gone;
     const asio::ip::tcp::endpoint client = stream_.socket().remote_endpoint(gone);
     shared_->handshakes->begin(shared_from_this(), stream_, pipeline_->client(),
@@ -51,9 +52,12 @@ void Session::start(Caller caller) {
 
 /// The handshake keeps the session until here.
 void Session::on_secure(bool secure) {
-    handshaking_ = false;
+    const PlaceHandler take_place = std::exchange(take_place_, nullptr);
     if (closed_) return;
-    if (!secure) return close();
+    error_code gone;
+    const asio::ip::tcp::endpoint client = stream_.socket().remote_endpoint(gone);
+    if (!secure || gone || !take_place(client)) return close();
+    handshaking_ = false;
     const tls::Peer& peer = stream_.peer();
     const auto role = tls::certified_role(shared_->settings.tls, peer);
     if (role && !role->doubt.empty())
@@ -68,8 +72,6 @@ void Session::on_secure(bool secure) {
 Guest Session::guest() const {
     const bool half_sent =
         due_ && shared_->clock.now() - active_ < shared_->settings.half_sent_pause;
-    // Whoever has not shown who he is gives way before anybody who has.
-    if (handshaking_) return {host_, true, TimePoint::min()};
     return {host_, pipeline_->empty() && !writing_ && !half_sent, active_};
 }
 

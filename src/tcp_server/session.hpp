@@ -29,11 +29,14 @@ namespace panelgate::tcp_server {
 class Session : public std::enable_shared_from_this<Session> {
   public:
     using ClosedHandler = std::function<void(const std::shared_ptr<Session>&)>;
+    /// Finds a place for a client of this address; false: there is none.
+    using PlaceHandler = std::function<bool(const boost::asio::ip::tcp::endpoint&)>;
 
     Session(boost::asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
             ClosedHandler on_closed);
 
-    void start(Caller caller);
+    /// `take_place` is called at the end of its TLS handshake: not at all without TLS.
+    void start(Caller caller, PlaceHandler take_place);
     /// Returns the peer's address; for a closed connection, the unspecified address, which no allow
     /// list admits.
     boost::asio::ip::address peer() const;
@@ -42,6 +45,8 @@ class Session : public std::enable_shared_from_this<Session> {
     /// Returns what its place depends on. It is idle unless requests or replies are outstanding, or
     /// a half-sent ADU still goes on.
     Guest guest() const;
+    /// True while its TLS handshake runs: it has no place yet.
+    bool is_at_the_door() const { return handshaking_; }
     /// Takes no more requests, answers those in flight, refuses queued ones, then closes.
     void finish();
     /// Closes at once, because of what its certificate no longer allows; logged.
@@ -78,6 +83,7 @@ class Session : public std::enable_shared_from_this<Session> {
     tls::Stream stream_;
     std::shared_ptr<Shared> shared_;
     ClosedHandler on_closed_;
+    PlaceHandler take_place_;
     std::shared_ptr<Pipeline> pipeline_;
     std::uint64_t host_{};  ///< of its address
     TimePoint active_;      ///< its last input

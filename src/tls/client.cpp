@@ -19,14 +19,17 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-/// The certificate that is trusted as it is; in the SSL_CTX's application data.
-using Pinned = Owned<X509>;
+struct Believed {
+    Owned<X509> pinned;  ///< trusted as it is; may be null
+    bool anybody = false;
+};
 
 /// The chain counts only where the certificate is not the very one that is expected.
-int judge_server(X509_STORE_CTX* chain, void* pinned) {
-    const auto* const expected = static_cast<const Pinned*>(pinned);
+int judge_server(X509_STORE_CTX* chain, void* argument) {
+    const auto* const believed = static_cast<const Believed*>(argument);
     const X509* const shown = X509_STORE_CTX_get0_cert(chain);
-    if (*expected && X509_cmp(expected->get(), shown) == 0) return 1;
+    if (believed->anybody) return 1;
+    if (believed->pinned && X509_cmp(believed->pinned.get(), shown) == 0) return 1;
     return X509_verify_cert(chain);
 }
 
@@ -41,16 +44,14 @@ class Connecting : public std::enable_shared_from_this<Connecting> {
         SSL_CTX_set_mode(context.get(),
                          SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER);
         auto own = certificates_of(trust.certificate);
-        if (!own.empty()) *pinned_ = std::move(own.front());
+        if (!own.empty()) believed_->pinned = std::move(own.front());
+        believed_->anybody = trust.anybody;
         for (const auto& one : certificates_of(trust.ca))
             X509_STORE_add_cert(SSL_CTX_get_cert_store(context.get()), one.get());
-        SSL_CTX_set_cert_verify_callback(context.get(), judge_server, pinned_.get());
+        SSL_CTX_set_cert_verify_callback(context.get(), judge_server, believed_.get());
         SSL_CTX_set_verify(context.get(), SSL_VERIFY_PEER, nullptr);
         engine_ = std::make_shared<Engine>(context);
-        if (X509_VERIFY_PARAM_set1_ip_asc(SSL_get0_param(engine_->native()), server.c_str()) != 1) {
-            SSL_set1_host(engine_->native(), server.c_str());
-            SSL_set_tlsext_host_name(engine_->native(), server.c_str());
-        }
+        if (!trust.any_name) expect(server);
         kept_ = context;
     }
 
@@ -70,6 +71,12 @@ class Connecting : public std::enable_shared_from_this<Connecting> {
     }
 
   private:
+    void expect(const std::string& server) {
+        SSL* const tls = engine_->native();
+        if (X509_VERIFY_PARAM_set1_ip_asc(SSL_get0_param(tls), server.c_str()) == 1) return;
+        SSL_set1_host(tls, server.c_str());
+        SSL_set_tlsext_host_name(tls, server.c_str());
+    }
     void listen() {
         stream_.socket().async_read_some(
             asio::buffer(chunk_),
@@ -90,7 +97,7 @@ class Connecting : public std::enable_shared_from_this<Connecting> {
 
     Stream& stream_;
     std::function<void(const std::string&)> done_;
-    std::shared_ptr<Pinned> pinned_ = std::make_shared<Pinned>();
+    std::shared_ptr<Believed> believed_ = std::make_shared<Believed>();
     std::shared_ptr<SSL_CTX> kept_;
     std::shared_ptr<Engine> engine_;
     std::array<char, 16 * 1024> chunk_{};

@@ -137,7 +137,7 @@ void Handshakes::Conversation::listen() {
         tcp::socket::wait_read, [self = shared_from_this()](const error_code& error) {
             if (!self->done_) return;
             if (!error) return self->on_readable();
-            self->finish(Outcome::displaced, "the gateway needed its place, or ends");
+            self->finish(Outcome::displaced, "its listener ends, or `allow` shuts it out");
         });
 }
 

@@ -8,6 +8,8 @@
 #include <ctime>
 
 #include "native.hpp"
+#include "panelgate/tls/client_context.hpp"
+#include "panelgate/tls/context.hpp"
 
 namespace panelgate::tls {
 namespace {
@@ -79,6 +81,20 @@ class Judge {
                 ": it still counts, but later revocations are not in it");
         }
     }
+    void judge_client(const std::string& server) {
+        try {
+            const ClientContext usable(settings_, server);
+        } catch (const Unusable& why) {
+            say(why.what());
+        }
+        for (const auto& one : certificates_of(settings_.material.certificate))
+            judge_dates(one.get(),
+                        "the certificate " + subject_of(one.get()) + " in " + settings_.certificate,
+                        "the server refuses it");
+        for (const auto& one : certificates_of(settings_.material.ca))
+            judge_dates(one.get(), "the CA " + subject_of(one.get()) + " in " + settings_.ca,
+                        "the server's certificate is refused");
+    }
     std::vector<std::string> take() { return std::move(said_); }
 
   private:
@@ -117,6 +133,13 @@ std::string date_text(std::int64_t seconds) {
     ::gmtime_r(&time, &parts);
     std::array<char, 16> text{};
     return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%d", &parts)};
+}
+
+std::vector<std::string> client_doubts(const Settings& settings, const std::string& server,
+                                       std::int64_t now) {
+    Judge judge(settings, now);
+    judge.judge_client(server);
+    return judge.take();
 }
 
 std::vector<std::string> doubts(const Settings& settings, const std::vector<std::string>& names,

@@ -4,6 +4,7 @@
 #include <openssl/err.h>
 #include <openssl/pem.h>
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <ctime>
 
@@ -11,6 +12,10 @@ namespace panelgate::tls {
 namespace {
 
 constexpr std::size_t kLongestName = 200;
+/// Characters that end a line, or turn the rest of it round, where a log is shown.
+constexpr std::array<std::string_view, 13> kTurnsLines{
+    "\u0085", "\u2028", "\u2029", "\u200e", "\u200f", "\u202a", "\u202b",
+    "\u202c", "\u202d", "\u202e", "\u2066", "\u2067", "\u2069"};
 
 int no_password(char*, int, int, void*) { return 0; }
 
@@ -79,6 +84,9 @@ std::string name_text(const X509_NAME* name) {
     std::string subject(text, static_cast<std::size_t>(std::max(size, 0L)));
     if (subject.size() > kLongestName) subject.resize(kLongestName);
     std::ranges::replace_if(subject, [](unsigned char c) { return c < ' ' || c == 0x7f; }, '?');
+    for (const std::string_view one : kTurnsLines)
+        for (std::size_t at = subject.find(one); at != subject.npos; at = subject.find(one))
+            subject.replace(at, one.size(), "?");
     return subject;
 }
 

@@ -23,6 +23,8 @@ Outcome outcome_of_chain(long result) {
     }
 }
 
+}  // namespace
+
 std::string words_of_chain(long result) {
     switch (result) {
         case X509_V_ERR_CERT_HAS_EXPIRED:
@@ -46,8 +48,6 @@ std::string words_of_chain(long result) {
             return std::string("cannot be trusted: ") + X509_verify_cert_error_string(result);
     }
 }
-
-}  // namespace
 
 std::string blamed(X509_STORE_CTX* judging) {
     const X509* const own = X509_STORE_CTX_get0_cert(judging);

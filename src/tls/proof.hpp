@@ -19,6 +19,8 @@ struct Refusal {
 };
 /// The certificate that a verification has stopped at, in words.
 std::string blamed(X509_STORE_CTX* judging);
+/// What X509_V_ERR_* says of a certificate: "has expired".
+std::string words_of_chain(long result);
 /// Of a certificate's verification, X509_V_ERR_*.
 Refusal refusal_of(long result, const std::string& blamed);
 

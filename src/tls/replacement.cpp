@@ -123,6 +123,15 @@ class Comparison {
         return "";
     }
 
+    std::string judge_client() const {
+        if (!used_chain_.empty() && !fresh_chain_.empty())
+            if (std::string why = judge_dates(); !why.empty()) return why;
+        const auto valid = [&](const auto& one) { return is_valid(one.get(), now_); };
+        if (std::ranges::any_of(used_ca_, valid) && std::ranges::none_of(fresh_ca_, valid))
+            return "the CA in " + fresh_.ca + " is not valid now: the server would be refused";
+        return "";
+    }
+
   private:
     X509* own() const { return fresh_chain_.front().get(); }
     bool is_used_one_good() const { return is_valid(used_chain_.front().get(), now_); }
@@ -243,6 +252,10 @@ class Comparison {
 std::string why_kept(const Settings& used, const Settings& fresh, Arrival arrival,
                      std::int64_t now) {
     return Comparison(used, fresh, arrival, now).judge();
+}
+
+std::string why_client_kept(const Settings& used, const Settings& fresh, std::int64_t now) {
+    return Comparison(used, fresh, Arrival::noticed, now).judge_client();
 }
 
 Summary summary_of(std::string_view certificate) {

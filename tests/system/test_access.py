@@ -391,6 +391,83 @@ class Explain(unittest.TestCase):
             text = harness.run("check", "-c", file).stdout
             self.assertIn("who may write, by 2 rule(s) of access and else allowed:", text)
 
+    def test_judges_the_door_as_well(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            token = pathlib.Path(folder) / "old"
+            token.write_text("j" * 40)
+            token.chmod(0o600)
+            file.write_text(DOORS.format(token=token))
+            door = "listener=127.0.0.1:18099"
+            rows = ((f"from=127.0.0.1 {door} write aaa/400001", 1, "has access: read_only"),
+                    (f"from=127.0.0.1 {door} read aaa/400001", 0, "allowed"),
+                    (f"from=192.168.1.1 {door} read aaa/400001", 1, "does not let 192.168.1.1 in"),
+                    (f"{door} read ccc/400001", 1, "does not serve line 'l2'"),
+                    ("listener=127.0.0.1:18098 write aaa/400001", 1, "needs the role operator"),
+                    ("token=old write aaa/400001", 1, "the token 'old' ended on 2020-01-01"),
+                    ("broadcast aaa/400001", 1, "reaches station 'ro', which is read_only"),
+                    ("raw aaa/400001", 1, "needs the role engineer"),
+                    ("role=engineer raw aaa/400011", 1, "rule 'r1'"))
+            for question, code, text in rows:
+                done = harness.run("check", "-c", file, "--explain", question)
+                self.assertEqual(done.returncode, code, (question, done.stdout, done.stderr))
+                self.assertIn(text, done.stdout, question)
+            for question in ("listener=9.9.9.9:1 write aaa/400001", "from=10.0.0.777 write aaa/400001",
+                             "from=10.0.0.0/8 write aaa/400001", "write aaa/400011 write aaa/400001",
+                             "write aaa/400011 aaa/400001", f"face=http {door} read aaa/400001"):
+                done = harness.run("check", "-c", file, "--explain", question)
+                self.assertEqual(done.returncode, 64, (question, done.stdout, done.stderr))
+
+    def test_check_names_rules_that_can_never_match_and_what_has_ended(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            token = pathlib.Path(folder) / "old"
+            token.write_text("j" * 40)
+            token.chmod(0o600)
+            text = DOORS.format(token=token).replace("    - {name: r1", VAIN + "    - {name: r1")
+            file.write_text(text + f"audit: {{file: {folder}/no/audit.jsonl}}\n")
+            said = harness.run("check", "-c", file).stderr
+            for name, why in (("n1", "one of its faces"), ("n2", "none of its faces"), ("n3", "one of its roles"),
+                              ("n4", "write nothing"), ("n5", "nothing can write to its range"),
+                              ("n6", "rule 'b3' in line")):
+                self.assertRegex(said, f"rule '{name}'.* never decides anything: .*{why}")
+            self.assertEqual(said.count("never decides anything"), 6, said)
+            self.assertIn("the token 'old' ended on 2020-01-01", said)
+            self.assertIn(f"audit: there is no folder {folder}/no", said)
+
+    def test_tokens_name_own_roles_and_are_neither_over_nor_a_hash_in_capitals(self):
+        for more, code in ((["--role", "setter"], 0), (["--role", "no role"], 64), (["--expires", "2020-01-01"], 64)):
+            done = harness.run("token", "new", "--name", "h", *more)
+            self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            token = pathlib.Path(folder) / "old"
+            token.write_text("SHA256:" + "AB" * 32)
+            token.chmod(0o600)
+            file.write_text(DOORS.format(token=token))
+            done = harness.run("check", "-c", file)
+            self.assertEqual(done.returncode, 78, done.stderr)
+            self.assertIn("64 hex digits in lower case", done.stderr)
+
+
+DOORS = """lines:
+  - {{name: floor1, device: sim, stations: [{{id: 1, name: aaa, profile: generic}}, {{id: 2, name: ro, profile: generic, access: read_only}}]}}
+  - {{name: l2, device: sim, stations: [{{id: 1, name: ccc, profile: generic}}]}}
+modbus_tcp: [{{listen: "127.0.0.1:18099", lines: [floor1], access: read_only, allow: [127.0.0.1/32]}}]
+http: {{listen: "127.0.0.1:18098", allow: [127.0.0.1/32], tokens: [{{name: old, role: admin, file: {token}, expires: 2020-01-01}}]}}
+access:
+  rules:
+    - {{name: r1, deny: [write], stations: [aaa], range: holding-registers/10-19}}
+"""
+VAIN = """    - {name: n1, deny: [write], stations: [aaa], faces: [mqtt]}
+    - {name: n2, deny: [write], stations: [aaa], faces: [http], listeners: ["127.0.0.1:18099"]}
+    - {name: n3, deny: [write], stations: [aaa], roles: [viewer], tokens: [old]}
+    - {name: n4, deny: [write], stations: [aaa], functions: [3]}
+    - {name: n5, deny: [write], stations: [aaa], range: input-registers/1-5}
+    - {name: b3, deny: [read, write], stations: [ccc], range: holding-registers/0-99}
+    - {name: n6, deny: [read, write], stations: [ccc], range: holding-registers/50-60}
+"""
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -315,7 +315,9 @@ def tampered(text, dice):
     return b"".join(lines)
 
 
-class Refusing(unittest.TestCase):
+class Case(unittest.TestCase):
+    """A gateway with an audit, whose folder is not there yet."""
+
     def setUp(self):
         box = tempfile.TemporaryDirectory()
         self.addCleanup(box.cleanup)
@@ -331,6 +333,8 @@ class Refusing(unittest.TestCase):
     def gateway(self, **options):
         return harness.Program("run", "-c", str(self.file), **options)
 
+
+class Refusing(Case):
     def test_writes_are_refused_while_they_cannot_be_recorded(self):
         self.write_config("refuse_writes")
         with self.gateway() as program, program.client() as client:

@@ -1,4 +1,5 @@
 """Values at a real broker, and writes by way of it: mosquitto, listened to by paho."""
+import json
 import pathlib
 import shutil
 import signal
@@ -84,9 +85,11 @@ class Mqtt(unittest.TestCase):
             listener.wait_for(ramp, lambda body: body["quality"] == "good", after=told)
 
     def test_writes_and_refused_writes(self):
-        text = None
+        box = tempfile.TemporaryDirectory()
+        self.addCleanup(box.cleanup)
+        audit = pathlib.Path(box.name) / "audit.jsonl"
         with Broker() as broker, Listener(broker) as listener:
-            text = plant(broker, PRESS, LOCKED, more=", write: points")
+            text = plant(broker, PRESS, LOCKED, more=", write: points") + f"audit: {{file: {audit}}}\n"
             with harness.configured(text) as program:
                 program.log.wait_for("mqtt connected")
                 broker.log.wait_for(r"gateway 0 plant/hall/\+/\+/set")
@@ -108,6 +111,12 @@ class Mqtt(unittest.TestCase):
                 metrics = program.get("/metrics")[1]
                 self.assertIn('panelgate_mqtt_writes_total{outcome="ok"} 2\n', metrics)
                 self.assertIn('panelgate_mqtt_writes_total{outcome="refused"} 7\n', metrics)
+            kept = [json.loads(line) for line in audit.read_text().splitlines()]
+            refused = [one for one in kept if one.get("outcome") == "refused" and one["kind"] != "repeats"]
+            refused_again = sum(one["count"] for one in kept if one["kind"] == "repeats")
+            self.assertEqual(len(refused) + refused_again, 7, kept)
+            self.assertTrue(all(one["face"] == "mqtt" for one in refused))
+            self.assertIn(("press", "UW100"), [(one.get("station"), one.get("at")) for one in refused])
             listener.publish(f"{TOPIC}/press/level/set", b"33", retain=True)
             with harness.configured(text) as program:
                 said = listener.wait_for(f"{TOPIC}/press/level/set/result",
@@ -240,6 +249,42 @@ class Configuration(unittest.TestCase):
                 for name, said in (("right", "mqtt connected"), ("wrong", "mqtt not connected")):
                     self.connects(broker, f", tls: {{ca: {here}/right.pem, certificate: {here}/{name}.pem, "
                                   f"key: {here}/{name}.key}}", said)
+
+    def test_its_new_certificate_is_for_the_next_connection_and_a_bad_one_is_kept_back(self):
+        with tempfile.TemporaryDirectory() as folder:
+            here = pathlib.Path(folder)
+            for name in ("right", "wrong"):
+                self.certify(here, name)
+            mutual = (f"certfile {here}/right.pem\nkeyfile {here}/right.key\ncafile {here}/right.pem\n"
+                      "require_certificate true\nallow_anonymous true\n")
+            for end in ("pem", "key"):
+                shutil.copy(here / f"wrong.{end}", here / f"own.{end}")
+            with Broker(mutual) as broker:
+                text = plant(broker, more=f", tls: {{ca: {here}/right.pem, certificate: {here}/own.pem, "
+                             f"key: {here}/own.key}}").replace(f"mqtt://127.0.0.1:{broker.port}",
+                                                               f"mqtts://localhost:{broker.port}")
+                with harness.configured(text) as program:
+                    program.log.wait_for("mqtt not connected .*TLS: the broker ends it: ")
+                    shutil.copy(here / "right.key", here / "own.key")
+                    program.log.wait_for("certificate not renewed listener=.mqtt mqtts://localhost:.*"
+                                         "does not belong to the certificate")
+                    shutil.copy(here / "right.pem", here / "own.pem")
+                    program.log.wait_for("certificate renewed listener=.mqtt mqtts://localhost:.* "
+                                         "files=.certificate, key. subject=.CN=localhost.")
+                    program.log.wait_for("mqtt connected broker=mqtts://localhost")
+                    self.assertRegex(program.get("/metrics")[1],
+                                     r'panelgate_certificate_expiry_timestamp_seconds\{listener="mqtts://localhost:')
+
+    def test_the_log_says_what_is_wrong_with_the_brokers_certificate(self):
+        with tempfile.TemporaryDirectory() as folder:
+            here = pathlib.Path(folder)
+            for name in ("right", "wrong"):
+                self.certify(here, name)
+            (here / "none.pem").write_text("nothing")
+            with Broker(f"certfile {here}/right.pem\nkeyfile {here}/right.key\nallow_anonymous true\n") as broker:
+                for ca, why in (("wrong", "its certificate CN=localhost is not signed by the CA of `ca`"),
+                                ("none", "none.pem holds no certificate")):
+                    self.connects(broker, f", tls: {{ca: {here}/{ca}.pem}}", f"mqtt not connected .*{why}")
 
     def connects(self, broker, more, said):
         text = plant(broker, more=more).replace(f"mqtt://127.0.0.1:{broker.port}",

@@ -310,7 +310,7 @@ class Reload(unittest.TestCase):
         running, command = self.with_tokens(folder, "the-token-of-before-1", "the-token-that-is-new")
         running.file.write_text("lines: 7\n")  # so the new token is never known
         done = command()
-        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        self.assertEqual((done.returncode, done.stdout), (75, ""))
         self.assertIn("its log says", done.stderr)
         running.program.log.wait_for("reload outcome=invalid cause=SIGHUP")
 

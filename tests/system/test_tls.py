@@ -308,26 +308,6 @@ class Abuse(Tls):
             secure.do_handshake()
         return outgoing.read()
 
-    def test_who_opens_and_says_nothing_takes_one_place_at_most(self):
-        """Of the limit of an address: the next silent one gives way, not a client that is served."""
-        with served(self.made, self.made.tls("required") + ", max_connections_per_address: 4") as program:
-            port = program.modbus_port()
-            with contextlib.ExitStack() as stack:
-                clients = [stack.enter_context(SecureClient(port, self.made.context("scada")))
-                           for _ in range(4)]
-                for client in clients:
-                    self.assertEqual(client.ask(31, READ)[0], 3)
-                silent = [stack.enter_context(socket.create_connection(("127.0.0.1", port)))
-                          for _ in range(20)]
-                for raw in silent[:19]:
-                    raw.settimeout(harness.PATIENCE)
-                    self.assertEqual(raw.recv(1), b"", "it gave way to the next")
-                served_still = 0
-                for client in clients:
-                    with contextlib.suppress(harness.Closed, OSError):
-                        served_still += client.ask(31, READ)[0] == 3
-                self.assertGreaterEqual(served_still, 3)
-
     def test_half_open_handshakes_of_one_address_keep_nobody_out(self):
         with served(self.made, self.made.tls("required")) as program:
             port = program.modbus_port()

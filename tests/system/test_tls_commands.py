@@ -8,6 +8,7 @@ import tempfile
 import unittest
 
 import harness
+from config import gateway, line
 from tls_plant import plant, served
 
 
@@ -180,6 +181,77 @@ class Asking(unittest.TestCase):
             done = harness.run("health", "-c", "/nowhere.yaml", "--http",
                                f"http://127.0.0.1:{program.http_port()}")
             self.assertIn("https://", done.stderr)
+
+
+class AtHome(unittest.TestCase):
+    """Commands beside the gateway, which know all that they need by its configuration."""
+
+    def setUp(self):
+        context = plant()
+        self.made = context.__enter__()  # pylint: disable=unnecessary-dunder-call
+        self.addCleanup(context.__exit__, None, None, None)
+
+    def run_here(self, program, *command):
+        """Where the file says the port."""
+        file = pathlib.Path(self.made.path("panelgate.yaml"))
+        text = file.read_text()
+        file.write_text(text.replace('http: {listen: "127.0.0.1:0"',
+                                     f'http: {{listen: "127.0.0.1:{program.http_port()}"'))
+        return harness.run(*command, "-c", str(file))
+
+    def test_health_of_a_gateway_that_keeps_its_former_certificate(self):
+        pair = [pathlib.Path(self.made.path(name)) for name in ("localhost.crt", "localhost.key")]
+        with served(self.made, http=self.made.tls()) as program:
+            self.assertEqual(self.run_here(program, "health").returncode, 0)
+            self.made.cert("new-server", "localhost", "--force")  # a name less: kept back
+            program.log.wait_for("certificate not renewed")
+            for change in (lambda: None, lambda: pair[0].write_text("junk"), pair[0].unlink):
+                change()
+                done = self.run_here(program, "health")
+                self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_what_holds_a_secret_wants_the_cas_signature(self):
+        with plant() as other:
+            self.made.cert("new-server", "localhost", "--force")
+            with served(self.made, http=self.made.tls(ca=self.made.path("ca.crt"))) as program:
+                self.made.cert("new-server", "localhost", "127.0.0.1", "--force")
+                done = self.run_here(program, "status")
+                self.assertEqual(done.returncode, 0, done.stderr)
+                pathlib.Path(self.made.path("ca.crt")).write_bytes(
+                    pathlib.Path(other.path("ca.crt")).read_bytes())
+                done = self.run_here(program, "status")
+                self.assertEqual(done.returncode, 69)
+                self.assertIn("cannot be trusted", done.stderr)
+
+    def test_a_reload_that_cannot_be_asked_what_came_of_it(self):
+        with served(self.made, http=self.made.tls("required")) as program:
+            file = pathlib.Path(self.made.path("panelgate.yaml"))
+            file.write_text(file.read_text().replace("anonymous: admin", "anonymous: viewer"))
+            done = self.run_here(program, "reload")
+            self.assertEqual((done.returncode, done.stdout), (75, ""), done.stderr)
+            self.assertIn("its log says", done.stderr)
+            program.log.wait_for("reload outcome=(applied|failed)")
+
+
+class Says(unittest.TestCase):
+    def test_check_says_who_writes_by_a_certificate(self):
+        rules = "{rules: [{name: no, deny: [write], roles: [viewer]}]}"
+        with plant() as made:
+            text = gateway(line(), modbus='listen: "127.0.0.1:1802", ' +
+                           made.tls("required", role_from="certificate"), access=rules)
+            (made.folder / "p.yaml").write_text(text)
+            done = harness.run("check", "-c", made.path("p.yaml"))
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("read, and write where the role in the client's certificate may, "
+                          "for everybody with a certificate", done.stdout)
+            self.assertNotIn("any client", done.stdout + done.stderr)
+            self.assertIn("modbus_tcp 127.0.0.1:1802 with a certificate of an operator: everywhere",
+                          done.stdout)
+            (made.folder / "p.yaml").write_text(text.replace("client: required", "client: optional"))
+            done = harness.run("check", "-c", made.path("p.yaml"))
+            self.assertIn("certificate may, for everybody", done.stdout)
+            self.assertNotIn("everybody with", done.stdout)
+
 
 
 class Port(unittest.TestCase):

@@ -1,6 +1,7 @@
 """What a certificate's role lets its client do at each listener, and what the log says of it."""
 import datetime
 import http.client
+import json
 import re
 import signal
 import socket
@@ -73,6 +74,16 @@ class Roles(unittest.TestCase):
                 self.assertIn(why, refusal[1])
                 self.assertEqual(get(program.http_port(), PLACE, self.made.context(name))[0], 200)
             self.assertEqual(self.put(program, None)[0], 200, "nobody in particular is an operator")
+
+    def test_without_a_role_and_a_token_it_is_a_refusal_and_no_login(self):
+        audit = self.made.path("audit.jsonl")
+        with served(self.made, self.tls, self.tls, anonymous="viewer", audit=f"{{file: {audit}}}") as program:
+            self.assertEqual(self.put(program, "nobody")[0], 401)
+            program.log.wait_for("http request refused .*certificate=.CN=nobody. ")
+        with open(audit, encoding="utf-8") as file:
+            records = [json.loads(one) for one in file]
+        self.assertEqual([one["certificate"] for one in records if one["kind"] == "refusal"], ["CN=nobody"])
+        self.assertNotIn("login", [one["kind"] for one in records])
 
     def test_writes_and_refusals_are_logged_with_the_certificate(self):
         self.made.cert("new-client", "chief", "--role", "admin")

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +11,8 @@ namespace panelgate::audit {
 
 /// A full file's name: FILE.000000000001, with the number of its first record.
 std::string rotated_name(const std::string& file, std::uint64_t first);
+/// The number in a full file's name.
+std::optional<std::uint64_t> number_in(const std::string& name, const std::string& file);
 /// The full files of a chain, oldest first, without the one that is written.
 std::vector<std::string> rotated_files(const std::string& file);
 

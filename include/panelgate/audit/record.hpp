@@ -33,6 +33,9 @@ void append_json(std::string& out, std::string_view text);
 /// Appends the contents of a JSON string, without its quotes.
 void append_json_text(std::string& out, std::string_view text);
 
+/// A member of a record: `,"key":"value"`.
+std::string member(std::string_view key, std::string_view value);
+
 /// Composes the body of one record, `"time":"...","kind":"write",...`, in a buffer that is used
 /// again and again: nothing is allocated once it has grown. Number and hash are added by the chain.
 class Composer {

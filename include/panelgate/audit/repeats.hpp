@@ -13,13 +13,19 @@
 namespace panelgate::audit {
 
 /// Gathers what one client tries again and again without effect, so that it cannot push what had an
-/// effect out of the files: the first ones are recorded in full, further ones are counted for an
-/// interval. Bounded: what finds no place shares one. Pure.
+/// effect out of the files: the first ones are recorded in full, further ones are counted. The
+/// count is recorded after a second, then after two, four, ... so that a crash loses little of it,
+/// and at last once in an interval. Bounded for each client, and for all together: what finds no
+/// place shares one. Pure.
 class Repeats {
   public:
     static constexpr Duration kInterval = 1min;
+    static constexpr Duration kFirst = 1s;  ///< until the first count is recorded
     static constexpr std::size_t kMost = 1024;
     static constexpr std::size_t kMostOfOne = 64;  ///< keys of one client
+    /// New keys of all clients together: so many at once, and then one in so much time.
+    static constexpr int kNewAtOnce = 256;
+    static constexpr Duration kNewEach = 5s;
 
     /// What was counted under one key.
     struct Counted {
@@ -41,19 +47,23 @@ class Repeats {
     /// (`,"client":"..."`), for a new key.
     bool is_new(TimePoint now, WallTime wall, std::string_view key, unsigned in_full,
                 const std::function<std::string()>& members, const Client& client = {});
-    /// Takes what is to be recorded of intervals that have ended; `all`: of all.
+    /// Takes the counts that are to be recorded now; `all`: all of them.
     std::vector<Counted> due(TimePoint now, bool all = false);
     bool empty() const { return entries_.empty(); }
 
   private:
     bool has_many(std::string_view client) const;
+    bool may_begin(TimePoint now);
 
     struct Entry {
-        TimePoint began{};
+        TimePoint since{};  ///< its count was recorded, or it began
         unsigned in_full = 0;
         Counted counted;
+        Duration step = kFirst;  ///< until the count is recorded
     };
     std::map<std::string, Entry, std::less<>> entries_;
+    int room_ = kNewAtOnce;  ///< for new keys
+    TimePoint filled_{};     ///< `room_` counts from then on
 };
 
 }  // namespace panelgate::audit

@@ -19,7 +19,7 @@ struct Notice {
     enum class Kind : std::uint8_t { failing, recovered, anchor, remark };
     Kind kind = Kind::failing;
     std::string text{};  ///< why; the remark
-    Position at{};       ///< of an anchor
+    Position at{};       ///< of an anchor; `text` is its chain's id
 };
 
 /// The audit trail. The loop only appends bodies to a bounded buffer; a thread chains them, writes
@@ -50,9 +50,14 @@ class Trail {
     /// True while nothing can be written, or there is no room.
     bool is_failing() const { return failing_.load(std::memory_order_relaxed); }
     Counters counters() const;
+    /// How it ended.
+    struct End {
+        Position last{};  ///< the last record that is on the disk
+        std::string chain{};
+        std::uint64_t unwritten = 0;  ///< records that the disk has not taken
+    };
     /// Writes what waits, tries for no longer than the disk takes to answer, and ends the thread.
-    /// Returns the last record that is on the disk.
-    Position close();
+    End close();
 
   private:
     struct State;

@@ -25,15 +25,22 @@ struct Fault {
 /// Returns "changed", "removed", ...
 std::string_view label(Fault::Kind kind);
 
-/// Records that the log has named: number and hash, or its beginning.
-using Anchors = std::map<std::uint64_t, std::string>;
-/// Adds the anchor that a line of the log names, of format text or json. Pure.
+/// What the log says of audits.
+struct Anchors {
+    bool is_read = false;  ///< a log was read, whatever it says
+    /// Records that it names, by their chain: number and hash, or its beginning.
+    std::map<std::string, std::map<std::uint64_t, std::string>, std::less<>> chains{};
+    std::uint64_t lost = 0;  ///< records that could not be written when a run ended
+};
+/// Adds what a line of the log says, of format text or json, whatever a collector has put before
+/// it. Only the event itself counts: what clients send stands in quotes there. Pure.
 void collect_anchor(std::string_view log_line, Anchors& anchors);
 
 struct Report {
     std::uint64_t first = 0;  ///< number of the first record; 0: there was none
     std::uint64_t records = 0;
     std::uint64_t anchored = 0;  ///< anchors that were compared
+    std::string chain{};         ///< its id; empty: it has none
     Position last{};
     std::optional<Fault> fault{};
     /// What the records themselves say is missing: runs that did not end in order, torn lines,
@@ -47,7 +54,9 @@ class Verifier {
   public:
     static constexpr std::size_t kRemarks = 1000;
 
-    explicit Verifier(Anchors anchors = {}) : anchors_(std::move(anchors)) {}
+    /// `all`: these are all files of the audit, so that what is missing before them was removed.
+    explicit Verifier(Anchors anchors = {}, bool all = false)
+        : anchors_(std::move(anchors)), all_(all) {}
 
     /// A file begins; lines that follow are its.
     void begin_file(std::string name);
@@ -77,10 +86,19 @@ class Verifier {
     void look_on_after_change(const Sealed& record);
     void look_on_after_jump(const Sealed& record);
     void decide_at_end();
+    void look_at_file(const Sealed& record);
+    void compare(const Sealed& record);
+    void note(std::string text);
     void remark(const Sealed& record);
+    void check_begin();
     void check_end();
+    void check_anchors();
+    void tell_of_log();
 
     Anchors anchors_;
+    bool all_;
+    bool has_chain_ = false;       ///< report_.chain is known
+    std::uint64_t kept_from_ = 0;  ///< the first record that was not dropped by rotation
     Sha256 digest_;
     Report report_;
     std::optional<Suspect> suspect_;

@@ -56,6 +56,9 @@ class Client {
     /// Must be called when the publisher has new messages.
     void wake();
 
+    /// Files of the settings that are used by the next connection.
+    void renew(const tls::Material& files);
+
     /// Returns all counters except those of write outcomes.
     Counters counters() const;
 

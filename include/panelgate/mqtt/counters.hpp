@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
 namespace panelgate::mqtt {
 
@@ -15,6 +16,9 @@ struct Counters {
     std::uint64_t writes_refused = 0;   ///< ... refused before reaching a panel
     std::uint64_t writes_failed = 0;    ///< ... refused or not confirmed by the panel
     std::uint64_t results_dropped = 0;  ///< write results lost because the queue was full
+    std::string broker{};
+    /// End of the gateway's own certificate, in seconds since 1970; 0: it has none.
+    std::int64_t certificate_expiry = 0;
 };
 
 }  // namespace panelgate::mqtt

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/tls/settings.hpp"
 
 namespace panelgate::mqtt {
 
@@ -14,6 +15,12 @@ enum class Format : std::uint8_t { json, sparkplug };
 inline std::string_view label(Format format) {
     return format == Format::json ? "json" : "sparkplug";
 }
+
+/// The contents of `ca`, `certificate` and `key`. Others make no other session: they are for its
+/// next connection.
+struct Files : tls::Material {
+    friend bool operator==(const Files&, const Files&) { return true; }
+};
 
 struct Settings {
     std::string host;
@@ -45,6 +52,10 @@ struct Settings {
     Duration connack_timeout = 10s;    ///< wait for the CONNACK
     Duration first_pause = 500ms;      ///< before the first reconnect; doubled each time
     Duration longest_pause = 15s;
+    Files files{};
+
+    /// Its files, as those of a client.
+    tls::Settings client() const;
 
     /// Returns "mqtt://HOST:PORT" or "mqtts://HOST:PORT".
     std::string broker() const;

@@ -12,6 +12,8 @@ class Stream;
 struct Trust {
     std::string certificate;
     std::string ca;
+    bool any_name = false;  ///< the CA's signature is enough, whatever names it is for
+    bool anybody = false;   ///< whoever is there: for a question that holds no secret
 };
 
 /// Makes a connected stream secure, from the client's side, in the loop: for programs that ask one

@@ -34,8 +34,6 @@ class Context {
     ClientCertificate client() const { return client_; }
 
   private:
-    void use_certificate(const Settings& settings);
-    void use_key(const Settings& settings);
     void use_ca(const Settings& settings);
     void use_crl(const Settings& settings);
 

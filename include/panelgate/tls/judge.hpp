@@ -17,6 +17,10 @@ inline constexpr std::int64_t kAnnouncedDays = 14;
 std::vector<std::string> doubts(const Settings& settings, const std::vector<std::string>& names,
                                 std::int64_t now);
 
+/// The same of a client's files, and what makes them unusable. `server`: whom it asks.
+std::vector<std::string> client_doubts(const Settings& settings, const std::string& server,
+                                       std::int64_t now);
+
 /// "2027-03-01" of a time in seconds since 1970.
 std::string date_text(std::int64_t seconds);
 

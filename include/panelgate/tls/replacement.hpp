@@ -19,6 +19,9 @@ enum class Arrival : std::uint8_t { asked_for, noticed };
 std::string why_kept(const Settings& used, const Settings& fresh, Arrival arrival,
                      std::int64_t now);
 
+/// The same of a client's files.
+std::string why_client_kept(const Settings& used, const Settings& fresh, std::int64_t now);
+
 /// Whose certificate it is, for the log.
 struct Summary {
     std::string subject;

@@ -227,14 +227,12 @@ void Places::apply(const Settings& settings) {
 Places::Arrival Places::admit(const std::string& address) const {
     Arrival arrival;
     if (counted_connections(address) >= limit_of_address_) {
-        arrival.leaves = longest(State::handshake, false, &address);
-        if (!arrival.leaves) arrival.leaves = longest(State::idle, false, &address);
+        arrival.leaves = longest(State::idle, false, &address);
         arrival.probes_only = !arrival.leaves;
     } else if (in_state(address, State::wrong) >= limit_of_throttled_) {
         arrival.leaves = longest(State::wrong, false, &address);
     } else if (guests() >= limit_) {
         arrival.leaves = longest(State::wrong, false);
-        if (!arrival.leaves) arrival.leaves = longest(State::handshake, false);
         if (!arrival.leaves) arrival.leaves = longest(State::idle, false);
         if (!arrival.leaves) arrival.leaves = suspect_of_another(address);
         arrival.probes_only = !arrival.leaves;
@@ -252,8 +250,6 @@ Places::Arrival Places::arrive(Id id, const std::string& address) {
 }
 
 void Places::busy(Id id) { set(id, State::busy); }
-
-void Places::shakes_hands(Id id) { set(id, State::handshake); }
 
 void Places::suspect(Id id) { set(id, State::suspect); }
 

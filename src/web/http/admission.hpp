@@ -101,7 +101,8 @@ class Logins {
 /// limit, that address's longest-idle one; if its address has too many throttled ones, the one
 /// throttled longest; if all places are taken, the one throttled longest, else the longest-idle
 /// one, else an unchecked one of another guessing address. If none can be displaced, a few extra
-/// places answer probes only, and the newest there displaces the oldest. Pure.
+/// places answer probes only, and the newest there displaces the oldest. A client that speaks TLS
+/// arrives when its handshake is over: before, it displaces nobody. Pure.
 class Places {
   public:
     using Id = std::uint64_t;
@@ -118,8 +119,6 @@ class Places {
     /// A complete request has arrived: the connection keeps its place until idle(). These calls
     /// ignore unknown ids.
     void busy(Id id);
-    /// Its TLS handshake has begun: until idle() it gives way before any other.
-    void shakes_hands(Id id);
     /// Its address guesses tokens and its own token is not checked yet: another address may
     /// displace it. Not the same address, or a guess could displace a right token.
     void suspect(Id id);
@@ -132,7 +131,7 @@ class Places {
     void leave(Id id);
 
   private:
-    enum class State : std::uint8_t { idle, handshake, busy, suspect, wrong, streaming };
+    enum class State : std::uint8_t { idle, busy, suspect, wrong, streaming };
     struct Guest {
         std::string address;
         bool probes_only = false;

@@ -146,9 +146,11 @@ void HttpListener::take(tcp::socket socket) {
     }
     const auto caller =
         std::make_shared<Caller>(shared_->site->next_caller(), peer.address().to_string());
-    const bool probes_only = make_room(*caller);
-    auto session =
-        std::make_shared<HttpSession>(std::move(socket), shared_, caller, probes_only, handshakes_);
+    auto session = std::make_shared<HttpSession>(
+        std::move(socket), shared_, caller, handshakes_, [self = weak_from_this(), caller] {
+            const auto listener = self.lock();
+            return listener && listener->make_room(*caller);
+        });
     sessions_.emplace(caller->id(), session);
     asio::co_spawn(
         acceptor_.get_executor(), HttpSession::run(session),

@@ -349,9 +349,12 @@ void record_use(const Caller& caller, Shared& shared) {
     });
 }
 
-/// Logs a token with insufficient rights; unknown tokens are logged as failed logins.
+/// Logs a token or a certificate with insufficient rights; unknown tokens are logged as failed
+/// logins.
 void count_refused(const HttpRequest& request, const Problem& why) {
-    if (why.status != 403) return;
+    const bool by_certificate =
+        why.status == 401 && !carries_token(request) && !request.caller->who()->certificate.empty();
+    if (why.status != 403 && !by_certificate) return;
     std::string path;
     for (const std::string& segment : request.path) path += '/' + segment;
     log_client(*request.caller, "http request refused",
@@ -404,12 +407,14 @@ class Witness {
         for (const std::string& segment : request.path) path_ += '/' + segment;
         if (changes_) body_ = request.body.substr(0, Deed::kMostOfBody);
         caller_ = request.caller;
+        shown_token_ = carries_token(request);
     }
     /// Refusals are recorded whatever was asked for.
     void record(const HttpResponse& response) const {
         const bool is_refusal = response.status == 401 || response.status == 403;
         if (!site_->record || (!changes_ && !is_refusal)) return;
-        site_->record({caller_->who(), method_, path_, body_, response.status, response.body});
+        site_->record(
+            {caller_->who(), method_, path_, body_, response.status, response.body, shown_token_});
     }
 
   private:
@@ -419,6 +424,7 @@ class Witness {
     std::string path_;
     std::string body_;
     std::shared_ptr<Caller> caller_;
+    bool shown_token_ = false;
 };
 
 }  // namespace

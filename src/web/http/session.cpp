@@ -130,13 +130,14 @@ HttpResponse too_many_streams(decltype(HttpResponse::headers) headers) {
 }  // namespace
 
 HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
-                         std::shared_ptr<Caller> caller, bool probes_only,
-                         std::shared_ptr<tls::Handshakes> handshakes)
+                         std::shared_ptr<Caller> caller,
+                         std::shared_ptr<tls::Handshakes> handshakes,
+                         std::function<bool()> take_place)
     : stream_(std::move(socket)),
       shared_(std::move(shared)),
       handshakes_(std::move(handshakes)),
       caller_(std::move(caller)),
-      probes_only_(probes_only),
+      take_place_(std::move(take_place)),
       buffer_(kHeaderLimit + kReadSize + shared_->site->settings.max_body),
       departure_(stream_, shared_->site->settings.half_close_grace),
       turn_(stream_.get_executor()),
@@ -145,6 +146,7 @@ HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<Shared> s
     ErrorCode ignored;
     stream_.socket().set_option(asio::ip::tcp::no_delay(true), ignored);
     local_ = stream_.socket().local_endpoint(ignored).address();
+    if (!handshakes_) probes_only_ = take_place_();
 }
 
 asio::awaitable<void> HttpSession::run(std::shared_ptr<HttpSession> self) {
@@ -163,7 +165,6 @@ asio::awaitable<bool> HttpSession::secure() {
     const std::string name = endpoint_text(caller_->address(), client.port());
     bool ended = false;
     bool secure = false;
-    shared_->places.shakes_hands(caller_->id());
     turn_.expires_at(asio::steady_timer::time_point::max());
     std::function<void(bool)> done = [this, &ended, &secure](bool is_secure) {
         ended = true;
@@ -175,7 +176,7 @@ asio::awaitable<bool> HttpSession::secure() {
         turn_.expires_at(asio::steady_timer::time_point::max());
         co_await turn_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
     }
-    shared_->places.idle(caller_->id());
+    if (secure) probes_only_ = take_place_();
     if (secure) take_certificate();
     co_return secure;
 }

@@ -60,10 +60,11 @@ class Departure {
 /// run() has ended; single-threaded.
 class HttpSession : public std::enable_shared_from_this<HttpSession> {
   public:
-    /// With `probes_only` it answers a single request, and only probes.
+    /// `take_place` is called once, when its TLS handshake is over, if there is one. If it returns
+    /// true, a single request is answered, and only a probe.
     HttpSession(boost::asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
-                std::shared_ptr<Caller> caller, bool probes_only,
-                std::shared_ptr<tls::Handshakes> handshakes);
+                std::shared_ptr<Caller> caller, std::shared_ptr<tls::Handshakes> handshakes,
+                std::function<bool()> take_place);
 
     /// Serves until the client leaves, breaks the protocol or is idle for too long, or until
     /// stop().
@@ -108,7 +109,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     std::shared_ptr<tls::Handshakes> handshakes_;  ///< null: plain HTTP
     std::shared_ptr<Caller> caller_;
     boost::asio::ip::address local_;  ///< local address
-    const bool probes_only_;
+    std::function<bool()> take_place_;
+    bool probes_only_ = false;
     boost::beast::flat_buffer buffer_;
     std::optional<Parser> parser_;
     Departure departure_;

@@ -72,6 +72,14 @@ TEST_F(ConnectionLimits, LeaveDevicesProbesAndTheLogTheirDescriptors) {
     EXPECT_LE(modbus() + http() + kOwnDescriptors + 2 * kDescriptorsPerLine, 1024u);
 }
 
+TEST_F(ConnectionLimits, LeaveHandshakesTheirDescriptors) {
+    config.modbus_tcp[0].tls.emplace();
+    fit_connections(config, 1024);
+    EXPECT_LE(modbus() + http() + kOwnDescriptors + 2 * kDescriptorsPerLine +
+                  config.modbus_tcp[0].tls->max_handshakes,
+              1024u);
+}
+
 TEST_F(ConnectionLimits, LetSomebodyInEvenWithHardlyAny) {
     fit_connections(config, 64);
     EXPECT_EQ(modbus(), 12u);

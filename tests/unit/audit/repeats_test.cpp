@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 namespace panelgate::audit {
 namespace {
@@ -15,18 +16,23 @@ bool note(Repeats& repeats, Duration after, const std::string& key, unsigned in_
                           [&] { return ",\"client\":\"" + key + '"'; });
 }
 
-TEST(AuditRepeats, TheFirstIsRecordedAndTheRestIsCountedOncePerInterval) {
+TEST(AuditRepeats, TheFirstIsRecordedAndTheRestIsCountedSoonAndThenOnceInAnInterval) {
     Repeats repeats;
     EXPECT_TRUE(note(repeats, 0s, "a"));
-    for (int i = 1; i <= 50; ++i) EXPECT_FALSE(note(repeats, i * 1s, "a"));
-    EXPECT_TRUE(note(repeats, 5s, "b"));
-    EXPECT_TRUE(repeats.due(kStart + 59s).empty());
-    const auto due = repeats.due(kStart + 61s);
-    ASSERT_EQ(due.size(), 1U);
-    EXPECT_EQ(due[0].count, 50U);
-    EXPECT_EQ(due[0].members, R"(,"client":"a")");
-    EXPECT_EQ(due[0].first, WallTime(1s));
-    EXPECT_EQ(due[0].last, WallTime(50s));
+    EXPECT_TRUE(note(repeats, 0s, "b"));
+    std::vector<int> recorded;
+    std::uint64_t count = 0;
+    for (int i = 1; i <= 300; ++i) {
+        EXPECT_FALSE(note(repeats, i * 1s, "a"));
+        for (const auto& counted : repeats.due(kStart + i * 1s)) {
+            EXPECT_EQ(counted.members, R"(,"client":"a")");
+            EXPECT_EQ(counted.last, WallTime(std::chrono::seconds(i)));
+            count += counted.count;
+            recorded.push_back(i);
+        }
+    }
+    EXPECT_EQ(recorded, (std::vector{1, 3, 7, 15, 31, 63, 123, 183, 243}));
+    EXPECT_EQ(count, 243U);
 }
 
 TEST(AuditRepeats, OneThatGoesOnIsCountedOnAndOneThatHasEndedBeginsAnew) {
@@ -64,16 +70,18 @@ TEST(AuditRepeats, PlacesOfOneClientShareARecordAtLast) {
     EXPECT_EQ(due[0].members, R"(,"client":"eve","at":"other places")");
 }
 
-TEST(AuditRepeats, ManyClientsShareAPlaceAtLast) {
+TEST(AuditRepeats, ManyClientsShareAPlaceAtLastAndRoomComesBackSlowly) {
     Repeats repeats;
-    for (std::size_t i = 0; i < Repeats::kMost; ++i)
-        EXPECT_TRUE(note(repeats, 0s, std::to_string(i)));
+    for (int i = 0; i < Repeats::kNewAtOnce; ++i) EXPECT_TRUE(note(repeats, 0s, std::to_string(i)));
     EXPECT_TRUE(note(repeats, 0s, "x"));
     for (int i = 0; i < 100; ++i) EXPECT_FALSE(note(repeats, 0s, "y" + std::to_string(i)));
     const auto due = repeats.due(kStart, true);
     ASSERT_EQ(due.size(), 1U);
     EXPECT_EQ(due[0].count, 100U);
     EXPECT_EQ(due[0].members, R"(,"client":"others")");
+    int in_full = 0;
+    for (int i = 0; i < 600; ++i) in_full += note(repeats, i * 1s, "z" + std::to_string(i)) ? 1 : 0;
+    EXPECT_EQ(in_full, 600 / 5 - 1);
 }
 
 }  // namespace

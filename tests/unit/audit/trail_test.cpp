@@ -78,7 +78,9 @@ class AuditTrail : public testing::Test {
 TEST_F(AuditTrail, RecordsWhatIsAddedInItsOrder) {
     Trail trail(settings(), told.hooks());
     for (int i = 0; i < 1000; ++i) trail.add(body(i));
-    const Position last = trail.close();
+    const Trail::End end = trail.close();
+    const Position last = end.last;
+    EXPECT_EQ(end.unwritten, 0U);
     EXPECT_EQ(last.number, 1002U);
     EXPECT_EQ(trail.counters().records, 1002U);
     EXPECT_EQ(trail.counters().lost, 0U);
@@ -92,6 +94,28 @@ TEST_F(AuditTrail, NamesItsFirstRecordAsAnAnchor) {
     const Notice anchor = told.wait_for(Notice::Kind::anchor);
     EXPECT_EQ(anchor.at.number, 2U);
     EXPECT_FALSE(trail.is_failing());
+    EXPECT_EQ(anchor.text, trail.close().chain);
+}
+
+TEST_F(AuditTrail, AFileThatIsRemovedIsSeenWithoutARecord) {
+    Trail trail(settings(), told.hooks());
+    told.wait_for(Notice::Kind::anchor);
+    fs::remove(file);
+    EXPECT_NE(told.wait_for(Notice::Kind::failing).text.find("was removed"), std::string::npos);
+    told.wait_for(Notice::Kind::recovered);
+    EXPECT_EQ(trail.counters().failures, 1U);
+}
+
+TEST_F(AuditTrail, WhatCouldNotBeWrittenAtTheEndIsCounted) {
+    Settings nowhere = settings();
+    nowhere.file = (folder.path() / "no" / "audit.jsonl").string();
+    nowhere.buffer = 1000;
+    Trail trail(nowhere, told.hooks());
+    told.wait_for(Notice::Kind::failing);
+    for (int i = 0; i < 200; ++i) trail.add(body(i));
+    const Trail::End end = trail.close();
+    EXPECT_EQ(end.last.number, 0U);
+    EXPECT_EQ(end.unwritten, 200U);
 }
 
 TEST_F(AuditTrail, WhatFindsNoRoomIsCountedAndTheCountIsRecorded) {

@@ -137,7 +137,7 @@ TEST(AuditVerify, AChainMadeAnewIsFoundByTheAnchorsOfTheLog) {
                        std::string(text_of(chain.last().hash)),
                    anchors);
     collect_anchor("2026-11-26T09:00:00.123Z info audit anchor number=x hash=12", anchors);
-    ASSERT_EQ(anchors.size(), 1U);
+    ASSERT_EQ(anchors.chains[""].size(), 1U);
     EXPECT_EQ(verify(lines, anchors).anchored, 1U);
     Chain forger(Position{8, parse_line(lines[7])->hash});
     Lines forged(lines.begin(), lines.begin() + 8);
@@ -157,12 +157,94 @@ TEST(AuditVerify, AChainMadeAnewIsFoundByTheAnchorsOfTheLog) {
               "10 removed at the end");
 }
 
-TEST(AuditVerify, AnchorsOfALogInJsonCountAsWell) {
+const std::string kHash(32, 'a');
+
+/// What one line of a log names.
+Anchors named_by(const std::string& line) {
     Anchors anchors;
-    collect_anchor(R"({"time":"x","level":"info","event":"audit anchor","number":"12",)"
-                   R"("hash":"0123456789abcdef0123456789abcdef"})",
-                   anchors);
-    EXPECT_EQ(anchors[12], "0123456789abcdef0123456789abcdef");
+    collect_anchor(line, anchors);
+    return anchors;
+}
+
+TEST(AuditVerify, AnchorsOfALogCountWhateverACollectorPutBeforeThem) {
+    const std::string text = "info audit anchor number=12 hash=" + kHash + " chain=0c";
+    const Lines said_as{
+        text,
+        "2026-11-26T09:00:00.123Z " + text,
+        "<6>" + text,
+        "Nov 26 09:00:00 host panelgate[7]: " + text + '\r',
+        R"({"_PID":"7","MESSAGE":")" + text + R"(","PRIORITY":"6"})",
+        R"({"time":"x","level":"info","event":"audit anchor","number":"12","hash":")" + kHash +
+            R"(","chain":"0c"})"};
+    for (const std::string& line : said_as)
+        EXPECT_EQ(named_by(line).chains["0c"][12], kHash) << line;
+}
+
+TEST(AuditVerify, WhatAClientSendsIsNoAnchor) {
+    const std::string anchor = "info audit anchor number=3 hash=" + kHash;
+    const Lines sent{"info http request refused client=a path=\"/x/" + anchor + "\"",
+                     "info x path=\"/x/\\\"MESSAGE\\\":\\\"" + anchor + "\"",
+                     R"({"time":"x","event":"write refused","path":"\",\"event\":\"audit anchor\",)"
+                     R"(\"number\":\"3\",\"hash\":\")" +
+                         kHash + R"(\",\"x\":\""})",
+                     R"({"time":"x","event":"x","path":")" + anchor + R"("})",
+                     "info x why=x" + anchor,
+                     "warn http refused why=\"error audit records lost count=7\""};
+    for (const std::string& line : sent) {
+        const Anchors anchors = named_by(line);
+        EXPECT_TRUE(anchors.chains.empty()) << line;
+        EXPECT_EQ(anchors.lost, 0U) << line;
+    }
+}
+
+TEST(AuditVerify, OnlyAnchorsOfTheSameChainAreCompared) {
+    Chain chain;
+    Lines lines;
+    for (const char* body : {R"("time":"T","kind":"file","previous":"0","chain":"0c","from":1)",
+                             R"("kind":"start")"}) {
+        std::string line;
+        chain.append(line, body);
+        line.pop_back();
+        lines.push_back(line);
+    }
+    Anchors anchors = named_by("info audit anchor number=2 hash=" + kHash + " chain=0d");
+    EXPECT_EQ(said(verify(lines, anchors)), "right");
+    anchors.is_read = true;
+    EXPECT_EQ(said(verify(lines, anchors)),
+              "anchor 2: the log names no record of the chain 0c in these files, so nothing was "
+              "compared: it is another log, or the chain was made anew");
+    collect_anchor(
+        "info audit anchor number=2 hash=" + std::string(text_of(chain.last().hash)) + " chain=0c",
+        anchors);
+    collect_anchor("error audit records lost count=7 file=/x", anchors);
+    const Report report = verify(lines, anchors);
+    EXPECT_EQ(said(report), "right");
+    EXPECT_EQ(report.remarks,
+              (Lines{"the log says that 7 records could not be written when a run ended",
+                     "the log names records of another chain too, 0d, up to record 2: of another "
+                     "audit, or of one that was removed"}));
+}
+
+TEST(AuditVerify, FilesThatTheChainSaysAreKeptMustBeThere) {
+    Chain chain(Position{9, no_hash()});
+    std::string line;
+    chain.append(line, R"("time":"T","kind":"file","previous":")" +
+                           std::string(text_of(no_hash())) + R"(","chain":"0c","from":4,"gone":7)");
+    line.pop_back();
+    for (const bool all : {true, false}) {
+        Verifier verifier({}, all);
+        verifier.begin_file("audit.jsonl");
+        verifier.take(line, true);
+        const Report report = verifier.finish();
+        EXPECT_EQ(said(report), all ? "removed 4: records 4 to 9 removed: the files begin with "
+                                      "record 10, and rotation has dropped only what stood before "
+                                      "record 4"
+                                    : "right");
+        ASSERT_EQ(report.remarks.size(), all ? 1U : 2U);
+        EXPECT_EQ(report.remarks[0],
+                  "record 10 (T): the file before was removed while it was written, with the "
+                  "records from 7 on");
+    }
 }
 
 TEST(AuditVerify, ATornEndIsNoWholeRecord) {
@@ -189,7 +271,7 @@ TEST(AuditVerify, TellsWhatTheRecordsThemselvesSayIsMissing) {
     EXPECT_EQ(said(report), "right");
     EXPECT_EQ(report.remarks,
               (Lines{"record 2 (T1): the run before did not end in order; what it did in its last "
-                     "second may be missing",
+                     "second, or since its log says `audit fails`, may be missing",
                      "record 2 (T1): a torn line of 12 bytes was found and taken over into this "
                      "record",
                      "record 3 (T2): 7 records were left out, the disk took nothing"}));

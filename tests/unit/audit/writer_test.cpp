@@ -180,9 +180,61 @@ TEST_F(AuditWriter, AnotherRotationMayTakeTheFileAway) {
     ASSERT_TRUE(write(*writer, 3, 5));
     EXPECT_EQ(lines_of(file).size(), 3U);
     EXPECT_FALSE(verify(files()).fault);
+    EXPECT_EQ(writer->remark(), file + " was moved away, and a new one begins");
+}
+
+TEST_F(AuditWriter, AFileThatWasRemovedIsAFailureAndTheNextOneSaysSo) {
+    const auto writer = make(settings());
+    ASSERT_TRUE(write(*writer, 1, 3));
     fs::remove(file);
+    EXPECT_FALSE(writer->work());
+    EXPECT_EQ(writer->why(), file + " was removed while it was written, with the records 1 to 4");
     ASSERT_TRUE(write(*writer, 5, 6));
-    EXPECT_EQ(lines_of(file).size(), 2U);
+    const auto lines = lines_of(file);
+    ASSERT_EQ(lines.size(), 2U);
+    EXPECT_NE(lines[0].find(R"(,"from":1,"gone":1,)"), std::string::npos) << lines[0];
+    Verifier all({}, true);
+    all.begin_file(file);
+    for (const std::string& line : lines) all.take(line, true);
+    const Report report = all.finish();
+    ASSERT_TRUE(report.fault);
+    EXPECT_EQ(report.fault->number, 1U);
+    EXPECT_EQ(report.fault->kind, Fault::Kind::removed);
+}
+
+TEST_F(AuditWriter, WhatRotationDropsIsNotCalledRemovedAndWhatIsRemovedIs) {
+    Settings small = settings();
+    small.rotate = 1000;
+    small.keep = 2;
+    const auto writer = make(small);
+    for (int i = 0; i < 60; ++i) ASSERT_TRUE(write(*writer, i, i + 1));
+    const auto verify_all = [&] {
+        Verifier all({}, true);
+        for (const std::string& one : files()) {
+            all.begin_file(one);
+            for (const std::string& line : lines_of(one)) all.take(line, true);
+        }
+        return all.finish();
+    };
+    const Report report = verify_all();
+    EXPECT_FALSE(report.fault) << report.fault->text;
+    EXPECT_GT(report.first, 1U);
+    EXPECT_EQ(report.chain.size(), 16U);
+    fs::remove(files()[0]);
+    const Report less = verify_all();
+    ASSERT_TRUE(less.fault);
+    EXPECT_EQ(less.fault->number, report.first);
+}
+
+TEST_F(AuditWriter, CountsWhatTheDiskHasNotTaken) {
+    Settings nowhere = settings();
+    nowhere.file = (folder.path() / "no" / "audit.jsonl").string();
+    const auto writer = make(nowhere);
+    EXPECT_FALSE(write(*writer, 0, 7));
+    EXPECT_EQ(writer->unwritten(), 7U);
+    fs::create_directory(folder.path() / "no");
+    EXPECT_TRUE(writer->work());
+    EXPECT_EQ(writer->unwritten(), 0U);
 }
 
 TEST_F(AuditWriter, WhatCannotBeContinuedIsKeptUnderAnotherName) {
@@ -227,6 +279,7 @@ TEST_F(AuditWriter, AFullDiskLosesNothingThatWasTaken) {
         EXPECT_FALSE(writer->idle());
         EXPECT_FALSE(writer->work());
         EXPECT_EQ(writer->last().number, 2U);
+        EXPECT_EQ(writer->unwritten(), 49U);
     }
     EXPECT_TRUE(writer->work());
     const Report report = verify({file});

@@ -70,8 +70,12 @@ TEST(AuditTime, IsASpanOrATime) {
     EXPECT_EQ(audit_time("1h", now), "2026-11-25T23:00:00.000000Z");
     EXPECT_EQ(audit_time("7d", now), "2026-11-19T00:00:00.000000Z");
     EXPECT_EQ(audit_time("30min", now), "2026-11-25T23:30:00.000000Z");
-    EXPECT_EQ(audit_time("2026-11-26T08:00:00Z", now), "2026-11-26T08:00:00Z");
-    for (const char* wrong : {"", "h", "1", "1y", "-1h", "yesterday", "99999999999999999999h"})
+    EXPECT_EQ(audit_time("2026-11-26T08:00:00Z", now), "2026-11-26T08:00:00");
+    EXPECT_EQ(audit_time("2026-11-26T08:00:00.25+01:30", now), "2026-11-26T06:30:00.25");
+    EXPECT_EQ(audit_time("2026-11-26", now), "2026-11-26");
+    for (const char* wrong : {"", "h", "1", "1y", "-1h", "yesterday", "99999999999999999999h",
+                              "2026-13-45", "2026-02-30T05:01:01Z", "2026-11-26T25:00:00Z",
+                              "2026-11-26T16:00:00+99:99", "2026-11-26x", "2026-11-26T16"})
         EXPECT_EQ(audit_time(wrong, now), std::nullopt) << wrong;
     EXPECT_TRUE(audit_time("99999999w", now));
 }

@@ -154,6 +154,7 @@ struct Deed {
     std::string_view body;  ///< of the request, at most kMostOfBody bytes
     unsigned status = 0;
     std::string_view answer{};  ///< the reply's body
+    bool shown_token = false;   ///< a right or a wrong one
 
     static constexpr std::size_t kMostOfBody = 1024;
 };

@@ -1,0 +1,113 @@
+// What a listener refuses by itself: whom it lets in, which lines it serves, whether it writes.
+#include "explain_door.hpp"
+
+#include <arpa/inet.h>
+#include <algorithm>
+
+#include "panelgate/base/network.hpp"
+
+namespace panelgate::app {
+
+namespace {
+
+using access::Act;
+
+/// IPv4 is stored as ::ffff:10.0.0.1.
+std::optional<AddressBytes> bytes_of(const std::string& text, unsigned& shift) {
+    constexpr std::size_t kMapped = 12;
+    AddressBytes bytes{};
+    shift = 0;
+    if (::inet_pton(AF_INET6, text.c_str(), bytes.data()) == 1) return bytes;
+    bytes[10] = bytes[11] = 0xFF;
+    shift = kMapped * 8;
+    if (::inet_pton(AF_INET, text.c_str(), bytes.data() + kMapped) == 1) return bytes;
+    return std::nullopt;
+}
+
+bool lets_in(const std::vector<Network>& allow, const std::string& address) {
+    unsigned ignored = 0;
+    const auto client = bytes_of(address, ignored);
+    if (allow.empty() || !client) return true;
+    return std::ranges::any_of(allow, [&](const Network& network) {
+        unsigned shift = 0;
+        const auto base = bytes_of(network.address, shift);
+        return base && same_prefix(*client, *base, std::min(network.prefix + shift, 128U));
+    });
+}
+
+bool serves(const tcp_server::Settings& listener, const AtDoor& request) {
+    const bool by_line =
+        std::ranges::find(listener.lines, request.line.name) != listener.lines.end();
+    return by_line || std::ranges::any_of(listener.units, [&](const auto& unit) {
+               return unit.second.line == request.line.name &&
+                      unit.second.station == request.station.id;
+           });
+}
+
+std::string refused_by(const tcp_server::Settings& listener, const std::string& name,
+                       const AtDoor& request) {
+    if (!lets_in(listener.allow, request.who.address))
+        return name + " does not let " + request.who.address + " in (allow)";
+    if (!serves(listener, request))
+        return name + " does not serve line '" + request.line.name + "'";
+    if (request.writes && listener.read_only) return name + " has access: read_only";
+    if (request.act == Act::broadcast && listener.broadcast == tcp_server::BroadcastMode::deny)
+        return name + " has broadcast: deny";
+    return "";
+}
+
+std::string ended_token(const config::Config& config, const Who& who, WallTime now) {
+    if (who.token.empty() || !config.http) return "";
+    const auto& tokens = config.http->tokens;
+    const auto token = std::ranges::find(tokens, who.token, &web::Token::name);
+    if (token == tokens.end() || !token->expires || *token->expires > now) return "";
+    return "the token '" + who.token + "' ended on " + web::expiry_text(*token->expires);
+}
+
+}  // namespace
+
+std::optional<Face> face_by(const config::Config& config, const std::string& listener) {
+    const auto is_it = [&](const auto& one) { return one.name() == listener; };
+    if (std::ranges::any_of(config.modbus_tcp, is_it)) return Face::modbus_tcp;
+    if (config.http && config.http->name() == listener) return Face::http;
+    if (config.mqtt && config.mqtt->broker() == listener) return Face::mqtt;
+    const bool master = std::ranges::any_of(config.serial_masters,
+                                            [&](const auto& one) { return one.name == listener; });
+    return master ? std::optional(Face::serial_master) : std::nullopt;
+}
+
+std::string listener_names(const config::Config& config) {
+    std::vector<std::string> names;
+    for (const auto& one : config.modbus_tcp) names.push_back(one.name());
+    for (const auto& one : config.serial_masters) names.push_back(one.name);
+    if (config.http) names.push_back(config.http->name());
+    if (config.mqtt) names.push_back(config.mqtt->broker());
+    std::string text;
+    for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+    return text.empty() ? "none" : text;
+}
+
+bool is_address(const std::string& text) {
+    unsigned ignored = 0;
+    return bytes_of(text, ignored).has_value();
+}
+
+std::string refused_at_door(const config::Config& config, const AtDoor& request, WallTime now) {
+    const Who& who = request.who;
+    if (std::string why = ended_token(config, who, now); !why.empty()) return why;
+    if (who.face == Face::http && config.http && !lets_in(config.http->allow, who.address))
+        return "http does not let " + who.address + " in (allow)";
+    if (who.face == Face::mqtt && config.mqtt && request.writes && !config.mqtt->write)
+        return "mqtt has no write: points";
+    for (const tcp_server::Settings& listener : config.modbus_tcp) {
+        if (listener.name() != who.listener) continue;
+        return refused_by(listener, "the listener " + who.listener, request);
+    }
+    for (const serial_server::Settings& master : config.serial_masters) {
+        if (master.name != who.listener) continue;
+        return refused_by(master.access, "the serial master " + who.listener, request);
+    }
+    return "";
+}
+
+}  // namespace panelgate::app
