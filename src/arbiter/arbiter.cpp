@@ -204,9 +204,12 @@ void Arbiter::on_line_down(TimePoint now) {
             stations_.book().on_broadcast(attempt.timing().sent, group.request.pdu());
             rest_ = std::max(rest_, attempt.timing().sent + settings_.broadcast_turnaround);
         } else {
+            // Its computed end may be later than the next connection: it has left over this one.
+            const TimePoint sent = attempt.timing().sent;
+            const TimePoint left = sent <= now ? sent : now - Duration{1};
             stations_.of(group.station)
                 .replies()
-                .on_unanswered(stations_.book(), now, group.request.pdu(), attempt.timing().sent);
+                .on_unanswered(stations_.book(), now, group.request.pdu(), left);
         }
         outbox_.report(attempt, TransactionEnd::line_down);
         for (const Job& job : group.jobs) outbox_.finish(job, Fault::line_lost);

@@ -203,6 +203,7 @@ void Attempt::collect() {
 
 /// The candidate came before our own request.
 void Attempt::on_echo_behind() {
+    own_.came_back = true;
     if (!timing_.echoes) return;
     own_.behind = true;
     if (candidate_) add_unsolicited(*std::exchange(candidate_, std::nullopt));
@@ -279,7 +280,7 @@ void Attempt::teach(EchoMemory& memory) const {
     const bool noisy = noise_in_front_ * 2 >= echo_.frame().size();
     const bool clean = !echo_.mismatch() && !noisy && !frames_in_front_;
     if (!echoed() && (own_.fragment || clean))
-        memory.on_reply_without_echo(group_.request, own_.fragment);
+        memory.on_reply_without_echo(group_.request, own_.fragment, group_.station);
 }
 
 Duration Attempt::waited(TimePoint now) const {

@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::arbiter {
@@ -12,6 +14,43 @@ bool teaches_echo(const modbus::Request& request) {
     if (!request.is_read()) return false;
     const auto reply = request.reply_length();
     return reply && *reply != request.pdu().size() + modbus::kAduOverhead;
+}
+
+bool teaches_echo_of_writes(const modbus::Request& request) {
+    if (request.is_read()) return false;
+    const auto reply = request.reply_length();
+    return reply && *reply != request.pdu().size() + modbus::kAduOverhead;
+}
+
+namespace {
+
+constexpr std::uint8_t kWriteCoil = 5;
+constexpr std::uint8_t kWriteRegister = 6;
+constexpr std::uint8_t kWriteRegisters = 16;
+constexpr std::size_t kSingleWrite = 5;  // bytes: function, address, value
+
+std::uint16_t word_at(ByteView bytes, std::size_t at) {
+    return static_cast<std::uint16_t>(bytes[at] << 8 | bytes[at + 1]);
+}
+
+}  // namespace
+
+std::optional<modbus::Request> read_back(ByteView write) {
+    if (write.size() < kSingleWrite) return std::nullopt;
+    const std::uint32_t first = word_at(write, 1);
+    const std::uint32_t count = write[0] == kWriteRegisters ? word_at(write, 3) : 1;
+    if (write[0] == kWriteCoil) return modbus::Request::read({modbus::Table::coils, first, 1});
+    if (write[0] == kWriteRegister || write[0] == kWriteRegisters)
+        return modbus::Request::read({modbus::Table::holding_registers, first, count});
+    return std::nullopt;
+}
+
+bool holds_written(ByteView write, ByteView reply) {
+    const auto read = read_back(write);
+    if (!read || !modbus::answers(read->pdu(), reply) || modbus::exception_of(reply)) return false;
+    if (write[0] == kWriteCoil) return (reply[2] & 1) == (write[3] != 0 ? 1 : 0);
+    const std::size_t values = write[0] == kWriteRegister ? 3 : kSingleWrite + 1;
+    return std::ranges::equal(write.subspan(values), reply.subspan(2));
 }
 
 bool holds_fragment(ByteView heard, ByteView frame) {
@@ -70,6 +109,10 @@ void EchoMemory::forget() {
     heard_ = false;
     missed_ = echoes_ = 0;
     had_none_ = mode_ == EchoMode::off;
+    writes_echo_.reset();
+    only_ = habit_ = 0;
+    several_ = false;
+    missed_by_others_ = 0;
     begin();
 }
 
@@ -101,8 +144,29 @@ bool EchoMemory::must_be_learned_before(const modbus::Request& request, bool tri
     return open && !request.is_read();
 }
 
-bool EchoMemory::on_echo(const modbus::Request& request, bool expected) {
+/// A request to this station came back.
+void EchoMemory::on_heard_of(std::uint8_t station) {
+    if (several_ || station == 0 || station == only_) return;
+    several_ = only_ != 0;
+    only_ = several_ ? std::uint8_t{0} : station;
+    habit_ = 0;
+    missed_by_others_ = 0;
+}
+
+/// A reply of this station came without.
+void EchoMemory::on_missed_by(std::uint8_t station) {
+    if (only_ == 0 || station == only_ || mode_ == EchoMode::on) return;
+    if (++missed_by_others_ < kNoMore) return;
+    habit_ = only_;
+    state_ = EchoState::absent;
+    heard_ = false;
+    had_none_ = true;
+}
+
+bool EchoMemory::on_echo(const modbus::Request& request, bool expected, std::uint8_t station) {
     if (!teaches_echo(request)) return false;
+    on_heard_of(station);
+    if (habit_ != 0 && !expected) return false;
     if (had_none_ && !expected && state_ != EchoState::present && ++echoes_ < kNow) {
         state_ = EchoState::unknown;
         return false;
@@ -112,7 +176,10 @@ bool EchoMemory::on_echo(const modbus::Request& request, bool expected) {
     return std::exchange(state_, EchoState::present) != EchoState::present;
 }
 
-void EchoMemory::on_reply_without_echo(const modbus::Request& request, bool fragment) {
+void EchoMemory::on_reply_without_echo(const modbus::Request& request, bool fragment,
+                                       std::uint8_t station) {
+    if (!fragment && teaches_echo(request)) on_missed_by(station);
+    if (!fragment && teaches_echo_of_writes(request)) writes_echo_ = false;
     if (state_ == EchoState::present || !teaches_echo(request)) return;
     if (!fragment) {
         echoes_ = 0;

@@ -177,6 +177,16 @@ bool is_search(const Group& group) {
 
 }  // namespace
 
+namespace {
+
+/// False where the normal reply equals the request: what came back may have been that.
+bool is_surely_echoed(const Attempt& attempt) {
+    const modbus::Request& request = attempt.group().request;
+    return attempt.echoed() && (teaches_echo(request) || teaches_echo_of_writes(request));
+}
+
+}  // namespace
+
 void Outbox::on_answered(TimePoint now, const Attempt& attempt, Duration think,
                          const Station::Replied& replied) {
     const std::uint8_t station = attempt.group().station;
@@ -193,7 +203,7 @@ void Outbox::on_answered(TimePoint now, const Attempt& attempt, Duration think,
     ++symptoms.answered_after[pause_class(attempt.timing().pause)];
     if (attempt.reply().size() + modbus::kAduOverhead >= Symptoms::kLongReply)
         ++symptoms.long_answered;
-    if (attempt.echoed()) ++symptoms.echoes;
+    if (is_surely_echoed(attempt)) ++symptoms.echoes;
     if (!attempt.damaged_bytes().empty()) ++symptoms.strays;
     if (replied.trailed) ++symptoms.trailed;
     credit_unanswered(attempt.group());
@@ -205,7 +215,7 @@ void Outbox::on_answered(TimePoint now, const Attempt& attempt, Duration think,
 
 void Outbox::on_failed(const Attempt& attempt, Verdict verdict) {
     Symptoms& symptoms = symptoms_of(attempt.group().station);
-    if (attempt.echoed()) ++symptoms.echoes;
+    if (is_surely_echoed(attempt)) ++symptoms.echoes;
     if (verdict == Verdict::damaged) ++of(attempt.group().station).damaged_frames;
     if (verdict != Verdict::silent) symptoms.mute_in_a_row = 0;
     if (attempt.echo().mismatch()) {

@@ -9,6 +9,12 @@ namespace panelgate::arbiter {
 
 using fact::when;
 
+namespace {
+
+constexpr std::uint8_t kAcknowledge = 5;  // an exception
+
+}  // namespace
+
 modbus::Request ReplyHabits::proof(const OutstandingRequests& book) const {
     modbus::Request read = reads_.probe();
     if (reconnect_.only_known_reads() || !book.is_ambiguous(id_, read)) return read;
@@ -131,7 +137,10 @@ void ReplyHabits::learn_of_duplicates(OutstandingRequests& book, TimePoint now,
         duplicates_.on_confirmed(group.request.pdu(), reply);
     } else if (!group.doubted.empty()) {
         const TimePoint at = group.doubted_at;
-        duplicates_.on_denied(at, given(at, group.doubted, at));
+        const TimePoint repeated = given(at, group.doubted, at);
+        // A value that only came too soon was no repetition.
+        if (repeated != TimePoint{} || !group.is_values(group.doubted))
+            duplicates_.on_denied(at, repeated);
     }
     if (const auto first = attempt.first_reply_at(); first && !book.any(id_))
         duplicates_.on_repeated_reply(now, *first, given(*first, reply));
@@ -153,6 +162,9 @@ void ReplyHabits::settle(OutstandingRequests& book, TimePoint now, const Attempt
         rest(book, now);
     } else if (now < again_until_ && late_.worst() > Duration::zero()) {
         // It may be the damaged reply resent, and the reply to this attempt is late.
+        on_unanswered(book, now, group.request.pdu(), sent);
+    } else if (modbus::exception_of(attempt.reply()) == kAcknowledge) {
+        // It announces the reply, which comes later.
         on_unanswered(book, now, group.request.pdu(), sent);
     } else {
         if (!disordered_at_) book.pass(id_, sent);

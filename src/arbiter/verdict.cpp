@@ -231,7 +231,12 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
         ReplyHabits::is_impossible(attempt, claims, is_early && attempt.replied_too_early());
     const bool overdue = claims.passed && first_sign > station.usual(stations_.slowest());
     const bool like_echo = attempt.may_be_its_echo() && first &&
-                           (is_early || station.is_far_too_quick(first_sign, stations_.quickest()));
+                           (is_early || echo_memory_.echoes_writes() ||
+                            station.is_far_too_quick(first_sign, stations_.quickest()));
+    const bool like_broadcast = first && !refusal && group.doubted.empty() &&
+                                !group.request.is_read() &&
+                                habits.may_answer_broadcast(book.behind_broadcast(now, reply));
+    const bool too_soon = first && group.attempts <= 1 && station.is_far_too_quick(first_sign);
     const bool misnumbered = refusal && group.may_doubt_refusal() && first &&
                              habits.may_refuse_other(book, now, claims, group.request.function());
     const bool repeats = station.may_be_duplicate(now, attempt, claims, is_early);
@@ -239,6 +244,7 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
            when(refuses_other, fact::refuses_other) | when(impossible, fact::impossible) |
            when(overdue, fact::overdue) | when(like_echo, fact::like_echo) |
            when(misnumbered, fact::misnumbered) | when(repeats, fact::repeats) |
+           when(like_broadcast, fact::like_broadcast) | when(too_soon, fact::too_soon) |
            when(group.may_doubt(reply), fact::may_ask) |
            when(first && attempt.precedes_echo(), fact::before_echo);
 }
@@ -288,7 +294,7 @@ void Arbiter::settle(TimePoint now) {
     if (attempt.echo_is_suspected()) echo_memory_.on_suspected();
     const bool refused = modbus::exception_of(reply).has_value();
     outbox_.report(attempt, refused ? TransactionEnd::exception : TransactionEnd::ok);
-    if (!group.confirms.empty()) return confirm(group, !attempt.echoed());
+    if (!group.confirms.empty()) return confirm(group, reply, attempt.echoed());
     if (refused) {
         give_back(group);
     } else {
@@ -298,9 +304,17 @@ void Arbiter::settle(TimePoint now) {
         outbox_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
 }
 
-/// P8: a reply that equals the write came sooner than the station has ever answered, and a read has
-/// now shown whether the line has an echo.
-void Arbiter::confirm(const Group& group, bool is_answer) {
+/// P8: a reply came that may have been the write's echo, or an answer to a broadcast, and a read
+/// has now shown what the station holds. Where that is not what was written, or cannot be read,
+/// only a line on which writes do not come back leaves no doubt: an adapter need not echo reads.
+void Arbiter::confirm(const Group& group, ByteView reply, bool echoed) {
+    const auto broadcast = stations_.book().behind_broadcast(group.doubted_at, group.confirms);
+    const bool holds = holds_written(group.written, reply);
+    const bool is_answer = !echoed && (holds || (echo_memory_.echoes_no_writes() && !broadcast));
+    ReplyHabits& habits = stations_.of(group.station).replies();
+    if (broadcast && holds) habits.on_broadcast_unanswered();
+    if (broadcast && !holds && !modbus::exception_of(reply))
+        habits.on_broadcast_answered(*broadcast, false);
     for (const Job& job : group.jobs) {
         if (is_answer) {
             outbox_.finish(job, group.confirms);
@@ -343,6 +357,9 @@ Group Arbiter::confirming(Group& write, const Station& station) {
     Group read{.jobs = std::move(write.jobs),
                .station = write.station,
                .request = station.replies().reads().probe()};
+    read.written = write.request.pdu();
+    read.doubted_at = write.doubted_at;
+    if (auto back = read_back(read.written)) read.request = std::move(*back);
     if (!teaches_echo(read.request))
         read.request = modbus::Request::read({modbus::Table::holding_registers, 0, 1});
     read.attempts = write.attempts;
@@ -443,8 +460,10 @@ Attempt Arbiter::take_active(TimePoint now) {
     quiet_.take_rested(now);  // the attempt's own time
     outbox_.written(attempt.group(), true);
     const Group& group = attempt.group();
-    if (attempt.echoed() && echo_memory_.on_echo(group.request, !group.confirms.empty()))
+    if (attempt.echoed() &&
+        echo_memory_.on_echo(group.request, !group.confirms.empty(), group.station))
         outbox_.event(Kind::echo, attempt.group().station);
+    if (attempt.heard_itself()) echo_memory_.on_write_echo(group.request);
     // Where a reply may come before the request has left, early bytes prove nothing.
     const bool keeps_pace = settings_.paced || pace_.believed();
     if (const auto noise = attempt.early_noise(); noise && keeps_pace)

@@ -160,6 +160,12 @@ Bytes Panel::serve(ByteView pdu) {
 
 Bytes Panel::read(ByteView pdu) const {
     Writer out;
+    if (pdu[0] <= 2) {
+        const unsigned bytes = (word(pdu, 3) + 7u) / 8;
+        out.u8(pdu[0]).u8(bytes).u8(coils_.contains(word(pdu, 1)) ? 1 : 0);
+        for (unsigned i = 1; i < bytes; ++i) out.u8(0);
+        return out.take();
+    }
     out.u8(pdu[0]).u8(2u * word(pdu, 3));
     for (unsigned i = 0; i < word(pdu, 3); ++i) {
         const auto address = static_cast<std::uint16_t>(word(pdu, 1) + i);
@@ -171,6 +177,8 @@ Bytes Panel::read(ByteView pdu) const {
 
 void Panel::write(ByteView pdu) {
     witness_.on_executed(agenda_.now(), plan_.id, pdu);
+    if (pdu[0] == 5 && pdu[3] != 0) coils_.insert(word(pdu, 1));
+    if (pdu[0] == 5 && pdu[3] == 0) coils_.erase(word(pdu, 1));
     if (pdu[0] == 5) return;
     const unsigned count = pdu[0] == 16 ? word(pdu, 3) : 1;
     for (unsigned i = 0; i < count; ++i)

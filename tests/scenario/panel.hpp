@@ -2,6 +2,7 @@
 
 #include <array>
 #include <deque>
+#include <set>
 #include <vector>
 
 #include "agenda.hpp"
@@ -60,6 +61,7 @@ class Panel {
     Voice voice_;
     std::uint64_t served_ = 0;
     std::array<std::uint16_t, kMemoryCells + 2> cells_{};
+    std::set<std::uint16_t> coils_;  ///< that are on
     std::deque<Request> waiting_;
     bool busy_ = false;
     TimePoint dark_until_{};

@@ -184,7 +184,7 @@ class Arbiter {
     bool takes_reply(TimePoint now, const Station& station, bool early);
     void settle(TimePoint now);
     void ask_again(TimePoint now);
-    void confirm(const Group& group, bool is_answer);
+    void confirm(const Group& group, ByteView reply, bool echoed);
     static Group confirming(Group& write, const Station& station);
     void learn_from_failure(TimePoint now, const Attempt& attempt, Verdict verdict);
     void fail(TimePoint now, Verdict verdict);

@@ -38,9 +38,10 @@ struct Group {
     TimePoint doubted_at{};  ///< time of that reply
     bool probe = false;
     bool distinct_length = false;  ///< its reply's length differs from all outstanding ones
-    /// Set if this read checks whether the reply to a write was that write's echo: the answer for
-    /// the jobs if it was not.
+    /// Set if this read checks whether the reply to a write was that write's echo, or a broadcast's
+    /// answer: the answer for the jobs if it was not.
     Bytes confirms{};
+    Bytes written{};             ///< the request of that write
     bool repeatable = true;      ///< of a write: the station's `retry_writes` when it began
     bool first_silence = false;  ///< its station was healthy when it was first sent
     /// The queued job for which this read only detects the echo.
@@ -250,6 +251,8 @@ class Attempt {
     const EchoFilter& echo() const { return echo_; }
     /// True if the whole echo came back, and no byte of it was needed to complete the reply.
     bool echoed() const { return echo_.complete() && !own_.borrowed; }
+    /// True if our own frame came back, wherever the filter did not take it out.
+    bool heard_itself() const { return own_.came_back; }
     /// Updates what is known of the line's echo from this reply.
     void teach(EchoMemory& memory) const;
     /// True if its own reply came damaged, but with the header intact.

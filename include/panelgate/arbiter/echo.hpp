@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/words.hpp"
@@ -66,16 +67,26 @@ struct OwnFrame {
     /// it. Remembers it.
     bool may_be_echo(const EchoFilter& filter, ByteView pdu);
 
-    bool possible;          ///< the line may have an echo
-    bool seen = false;      ///< after other bytes, where only its echo was expected
-    bool fragment = false;  ///< a part of it came damaged
-    bool behind = false;    ///< after another frame
-    bool borrowed = false;  ///< its last byte was lost, and the reply's first taken for it
+    bool possible;           ///< the line may have an echo
+    bool seen = false;       ///< after other bytes, where only its echo was expected
+    bool fragment = false;   ///< a part of it came damaged
+    bool behind = false;     ///< after another frame
+    bool came_back = false;  ///< as a frame that is no answer
+    bool borrowed = false;   ///< its last byte was lost, and the reply's first taken for it
 };
 
 /// True if the reply to this request can never equal the request: it shows whether there is an
 /// echo.
 bool teaches_echo(const modbus::Request& request);
+
+/// True if this write's normal reply can never equal it: it shows whether writes come back.
+bool teaches_echo_of_writes(const modbus::Request& request);
+
+/// True if this reply to read_back() of the write holds what it wrote. False if that cannot be
+/// told.
+bool holds_written(ByteView write, ByteView reply);
+/// The read of what this write names, for holds_written(); empty: none tells.
+std::optional<modbus::Request> read_back(ByteView write);
 
 /// True if two or more consecutive bytes of `heard` also occur in `frame`: part of its echo.
 bool holds_fragment(ByteView heard, ByteView frame);
@@ -101,10 +112,19 @@ class EchoMemory {
 
     /// The whole echo of this request came back; `expected`: so had that of a write before. Returns
     /// true if the line is now known to have an echo.
-    bool on_echo(const modbus::Request& request, bool expected = false);
+    bool on_echo(const modbus::Request& request, bool expected = false, std::uint8_t station = 0);
     /// A good reply to this request came; `fragment`: preceded by a part of the request. Other
     /// bytes in front or behind say nothing about an echo (FRM-07).
-    void on_reply_without_echo(const modbus::Request& request, bool fragment);
+    void on_reply_without_echo(const modbus::Request& request, bool fragment,
+                               std::uint8_t station = 0);
+    /// A write came back that its reply cannot equal, whatever the reads show.
+    void on_write_echo(const modbus::Request& request) {
+        if (teaches_echo_of_writes(request)) writes_echo_ = true;
+    }
+    /// True if the last such write came back: an adapter may echo long frames only, or writes.
+    bool echoes_writes() const { return writes_echo_ == true; }
+    /// True if the last such write was answered without it.
+    bool echoes_no_writes() const { return writes_echo_ == false; }
     /// The read that was to detect the echo was inconclusive.
     void on_unclear();
     /// Its echo was heard, but no answer: where both are equal, it may have been the answer, and
@@ -119,6 +139,8 @@ class EchoMemory {
 
   private:
     void begin();
+    void on_heard_of(std::uint8_t station);
+    void on_missed_by(std::uint8_t station);
 
     /// Replies in a row without any echo until an echo heard before counts as gone: bytes get lost
     /// now and then, and the next echo would confirm a write.
@@ -133,6 +155,13 @@ class EchoMemory {
     int missed_ = 0;      ///< in a row
     int echoes_ = 0;      ///< in a row, on a line that has had none
     bool had_none_ = false;
+    // An echo is the adapter's, of the requests to all stations. One panel that repeats its own has
+    // a habit.
+    std::uint8_t only_ = 0;     ///< the only station whose requests came back; 0: none or several
+    bool several_ = false;      ///< those of several did
+    int missed_by_others_ = 0;  ///< replies, since it is only_
+    std::uint8_t habit_ = 0;    ///< this station repeats requests, the line has no echo
+    std::optional<bool> writes_echo_;  ///< empty: no write has shown it since the device was opened
 };
 
 }  // namespace panelgate::arbiter

@@ -248,6 +248,11 @@ class ReplyHabits {
     }
     /// True if it has answered one with an exception.
     bool refuses_broadcasts() const { return broadcast_.refused; }
+    /// True if a reply so long after a broadcast that it would fit may be the answer to that: it
+    /// was neither seen to answer one, which is waited for, nor to answer none.
+    bool may_answer_broadcast(std::optional<Duration> behind) const {
+        return behind && !broadcast_.none && !broadcast_.delay && *behind <= latest_reply();
+    }
     /// True if it has answered every request since the line was reopened: then no reply is in
     /// transit, even if outstanding ones look the same.
     bool answered_since_reopen() const { return reconnect_.answered(); }
@@ -343,6 +348,8 @@ class ReplyHabits {
         broadcast_.refused = broadcast_.refused || refused;
         broadcast_.delay = std::max(broadcast_.delay.value_or(delay), delay);
     }
+    /// A broadcast was not answered: what came was the answer to a write.
+    void on_broadcast_unanswered() { broadcast_.none = true; }
     /// The line was reopened, on a transport that may stall. Outstanding requests may be sent, and
     /// answered, only now: the station rests for that. `usual`: its longest usual time.
     void on_opened(const OutstandingRequests& book, TimePoint now, Duration usual);
@@ -375,6 +382,7 @@ class ReplyHabits {
     struct {
         std::optional<Duration> delay;  ///< the longest, of its answers
         bool refused = false;
+        bool none = false;  ///< one had no answer
     } broadcast_;
     TimePoint not_before_{};   ///< duplicates may come, or the line was just opened
     TimePoint until_{};        ///< outstanding replies may come; {}: none are

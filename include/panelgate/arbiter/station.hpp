@@ -123,6 +123,11 @@ class Station {
         return seen.known() && first_sign < *seen.value() * 3 / 4;
     }
 
+    /// ... of its own.
+    bool is_far_too_quick(Duration first_sign) const {
+        return quickest_.known() && first_sign < *quickest_.value() * 3 / 4;
+    }
+
     // How to ask it
 
     const StationSettings& settings() const { return settings_; }

@@ -134,6 +134,68 @@ TEST_F(ArbiterDoubtTest, P1AStationThatRepeatsADoubtfulAnswerSendsTwiceAndRestsF
         << "its duplicate would answer this";
 }
 
+/// A panel that needs 20 ms for each answer.
+class ArbiterOneBehindTest : public ArbiterTest {
+  protected:
+    ArbiterOneBehindTest() {
+        for (unsigned i = 1; i <= Quickest::kEnough; ++i) {
+            ask(i);
+            answer(script, 17, reply_number(i), 20ms);
+        }
+    }
+    /// A request that leaves at once.
+    Ticket ask(unsigned number) {
+        script.run_for(10ms);
+        return script.submit(17, read_at(number), 1);
+    }
+    BusScript script{settings};
+};
+
+TEST_F(ArbiterOneBehindTest, P1AnUnaskedFrameLongBeforeTheAnswerIsDueIsNone) {
+    const Ticket ticket = ask(100);
+    answer(script, 17, reply_number(99), 5ms);
+    EXPECT_FALSE(script.answered(ticket));
+    script.run_for(10ms);
+    script.hear_reply(17, reply_number(100));
+    EXPECT_EQ(script.answer(ticket).pdu.value(), reply_number(100));
+}
+
+TEST_F(ArbiterOneBehindTest, P1AnAnswerThatIsLeftOverIsNotTakenForTheNext) {
+    const Ticket first = ask(100);
+    const Ticket second = script.submit(17, read_at(101), 2);
+    answer(script, 17, reply_number(99), 18ms);
+    ASSERT_TRUE(script.answered(first)) << "nobody can tell";
+    answer_next(script, 17, reply_number(100));
+    EXPECT_FALSE(script.answered(second));
+    script.run_for(10ms);
+    script.hear_reply(17, reply_number(101));
+    EXPECT_EQ(script.answer(second).pdu.value(), reply_number(101));
+}
+
+TEST_F(ArbiterOneBehindTest, P1AnExceptionThatAcknowledgesAnnouncesAReplyToNobodyElse) {
+    const Ticket first = ask(100);
+    answer(script, 17, "83 05"_hex, 20ms);
+    ASSERT_EQ(script.answer(first).pdu.value(), "83 05"_hex);
+    ask(101);
+    ASSERT_EQ(script.sent.back().kind, FrameKind::probe);
+    script.run_to_end_of_request();
+    script.hear_reply(17, reply_number(100));
+    answer(script, 17, "03 02 00 01"_hex, 20ms);
+    EXPECT_EQ(script.next_sent(100ms).value().adu, encode_adu(17, read_at(101)));
+}
+
+TEST_F(ArbiterOneBehindTest, P5AnAnswerThatWasJustQuickIsAskedForOnceMoreAndThenUsual) {
+    const Ticket ticket = ask(100);
+    answer(script, 17, reply_number(100), 5ms);
+    EXPECT_EQ(script.next_sent(100ms).value().kind, FrameKind::retry);
+    answer(script, 17, reply_number(101), 5ms);
+    EXPECT_EQ(script.answer(ticket).pdu.value(), reply_number(101));
+    script.run_for(2s);
+    const Ticket next = ask(102);
+    answer(script, 17, reply_number(102), 5ms);
+    EXPECT_TRUE(script.answered(next));
+}
+
 TEST_F(ArbiterTest, P1AfterAReplyThatCameDamagedAndThenWholeTheNextOneMayComeTwiceToo) {
     bus.submit(17, kRead, 1);
     bus.run_to_end_of_request();
@@ -248,6 +310,31 @@ TEST_F(AfterAReset, P1AfterAProofItRestsUntilOutstandingRepliesCouldHaveCome) {
     ASSERT_TRUE(script->next_sent(500ms));
     EXPECT_TRUE(read_at_2_was_sent());
     EXPECT_GE(script->now() - proved, 900ms) << "the timeout, and as much for being late";
+}
+
+/// A device server drops the connection before the request can have left at the line's rate, and
+/// takes the next one at once.
+TEST_F(ArbiterTest, P1AnAnswerOverTheNextConnectionEndsNoDoubtOfTheOneBefore) {
+    settings.may_stall = true;
+    BusScript script{settings};
+    const auto read = [&](unsigned number) {
+        script.submit(17, read_at(number), 1);
+        answer(script, 17, reply_number(number), 14ms);
+        script.run_for(10ms);
+    };
+    for (unsigned i = 1; i <= Quickest::kEnough; ++i) read(i);
+    script.submit(17, read_at(30), 1);
+    script.run_for(1ms);
+    script.line_down();
+    script.line_up();
+    script.run_for(50ms);
+    const Ticket write = script.submit(17, "10 0B B8 00 01 02 00 15"_hex, 2);
+    answer(script, 17, "10 0B B8 00 01"_hex, 30ms);
+    ASSERT_TRUE(script.answered(write));
+    script.run_for(10ms);
+    script.submit(17, read_at(31), 1);
+    script.run_for(500ms);
+    EXPECT_NE(script.sent.back().adu, encode_adu(17, read_at(31))) << "the first reply may come";
 }
 
 TEST_F(AfterAReset, P1AnExceptionMayAnswerAnOutstandingRequest) {

@@ -246,6 +246,34 @@ TEST_F(ArbiterBehindABroadcast, WhatItsReplyCannotConfirmGoesAtTheTurnaround) {
     }
 }
 
+/// A panel that executes a broadcast for 150 ms, is deaf meanwhile, and answers it then.
+TEST_F(ArbiterBehindABroadcast,
+       P8WhatMayBeItsAnswerConfirmsAWriteOnlyIfTheStationHoldsWhatWasWritten) {
+    for (const bool holds : {false, true}) {
+        BusScript script{settings};
+        teach(script, 20ms);
+        const TimePoint left = broadcast(script);
+        const Ticket write = script.submit(17, kToOne, 2, PriorityClass::write);
+        ASSERT_TRUE(sent(script, 17, kToOne, left + 150ms));
+        script.hear_reply(17, kConfirmed);
+        EXPECT_FALSE(script.answered(write));
+        ASSERT_TRUE(script.next_sent(400ms));
+        EXPECT_EQ(script.sent.back().adu[1], 3) << "what was written is read";
+        Bytes held = Writer().u8(3).u8(kToOne[5]).take();
+        held.insert(held.end(), kToOne.begin() + 6, kToOne.end());
+        if (!holds) held.back() ^= 1;
+        answer(script, 17, held, 20ms);
+        EXPECT_EQ(script.answer(write).pdu.has_value(), holds);
+        script.run_for(5s);
+        const TimePoint again = broadcast(script);
+        const Ticket next = script.submit(17, kToOne, 2, PriorityClass::write);
+        EXPECT_EQ(sent(script, 17, kToOne, again + 150ms).has_value(), true);
+        if (!holds) continue;
+        script.hear_reply(17, kConfirmed);
+        EXPECT_TRUE(script.answered(next)) << "it answers no broadcasts";
+    }
+}
+
 TEST_F(ArbiterBehindABroadcast, OthersGoMeanwhile) {
     teach(bus, 150ms);
     const TimePoint left = broadcast(bus);

@@ -107,6 +107,20 @@ TEST_F(EchoMemoryTest, P8AFewRepliesWithoutAnEchoDoNotShowThatAKnownEchoIsGone) 
     EXPECT_FALSE(memory.expects_one()) << "another device";
 }
 
+TEST_F(EchoMemoryTest, P5APanelThatRepeatsRequestsMakesNoEchoWhereTheOthersShowNone) {
+    EXPECT_TRUE(memory.on_echo(request_of(kRead), false, 17));
+    for (int i = 0; i < kNoMore; ++i) {
+        memory.on_mismatch();
+        memory.on_reply_without_echo(request_of(kRead), false, 18);
+        if (i + 1 < kNoMore) memory.on_echo(request_of(kRead), false, 17);
+    }
+    EXPECT_FALSE(memory.expects_one());
+    for (int i = 0; i < 5; ++i) EXPECT_FALSE(memory.on_echo(request_of(kRead), false, 17));
+    EXPECT_EQ(memory.state(), EchoState::absent);
+    for (int i = 0; i < 2; ++i) EXPECT_FALSE(memory.on_echo(request_of(kRead), false, 18));
+    EXPECT_TRUE(memory.on_echo(request_of(kRead), false, 17)) << "those of all come back";
+}
+
 class Echo : public testing::Test {
   protected:
     static Settings with(EchoMode mode) {
@@ -387,7 +401,7 @@ TEST_F(EchoInMidLife, P8ConfirmsNoWriteOfAPanelThatIsOff) {
 TEST_F(EchoInMidLife, P8ConfirmsNoWriteWhereTheReadIsAnsweredBehindAnEcho) {
     ask();
     hear_echo(bus);
-    reply(bus, kReply);
+    reply(bus, "03 02 00 03"_hex);
     EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
 }
 
@@ -401,16 +415,59 @@ TEST_F(EchoInMidLife, P8TheReplyBehindItConfirmsTheWrite) {
 
 TEST_F(EchoInMidLife, P2AnAnswerThatWasJustQuickConfirmsTheWriteOnce) {
     ask();
-    answer(bus, 17, kReply, 3ms);
+    EXPECT_EQ(bus.sent.back().adu, encode_adu(17, "03 00 01 00 01"_hex)) << "what was written";
+    answer(bus, 17, "03 02 00 03"_hex, 3ms);
     EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
     EXPECT_EQ(std::ranges::count(bus.sent, encode_adu(17, kWrite), &BusScript::Sent::adu), 1);
 }
 
-TEST_F(EchoInMidLife, P2ARefusedReadDecidesAsWellAndTheWriteIsNotRepeated) {
+TEST_F(EchoInMidLife, P8WhereTheReadShowsAnotherValueOrNoneTheWriteIsNotConfirmed) {
+    ask();
+    answer(bus, 17, "03 02 00 04"_hex, 3ms);
+    EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
+    EXPECT_TRUE(bus.answer(write).transmitted);
+    bus.run_for(100ms);
+    EXPECT_EQ(bus.sent.back().kind, FrameKind::learn_echo) << "P2: the write is not repeated";
+    const Ticket other = bus.submit(17, kWrite);
+    hear_echo(bus);
     ask();
     answer(bus, 17, "83 02"_hex, 3ms);
-    EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
-    EXPECT_FALSE(bus.next_sent(1s));
+    EXPECT_EQ(bus.answer(other).pdu.error(), Fault::timeout);
+}
+
+inline const Bytes kLongWrite = "10 00 01 00 01 02 00 03"_hex;
+
+TEST_F(EchoInMidLife, P2WhereLongWritesAreAnsweredWithoutTheirEchoAReadThatTellsNothingConfirms) {
+    ask();
+    answer(bus, 17, "83 02"_hex, 3ms);
+    bus.run_for(100ms);
+    const Ticket longer = bus.submit(17, kLongWrite);
+    answer(bus, 17, "10 00 01 00 01"_hex, 3ms);
+    ASSERT_TRUE(bus.answer(longer).pdu);
+    bus.run_for(100ms);
+    const Ticket quick = bus.submit(17, kWrite);
+    hear_echo(bus);
+    ask();
+    answer(bus, 17, "83 02"_hex, 3ms);
+    EXPECT_EQ(bus.answer(quick).pdu.value(), kWrite);
+}
+
+/// An adapter that echoes writes alone, as long after them as the panel takes to answer.
+TEST_F(LearnedEcho, P8WhereALongWriteHasComeBackOneFrameConfirmsNoShortOne) {
+    for (int i = 0; i < Quickest::kEnough; ++i) read_once(bus, false);
+    const Ticket longer = bus.submit(17, kLongWrite);
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear(bus.sent.back().adu);
+    bus.run_for(2s);
+    ASSERT_EQ(bus.answer(longer).pdu.error(), Fault::timeout);
+    read_once(bus, false);
+    const Ticket write = bus.submit(17, kWrite);
+    answer(bus, 17, kWrite, 3ms);
+    EXPECT_FALSE(bus.answered(write));
+    ASSERT_TRUE(bus.next_sent(600ms));
+    answer(bus, 17, "03 02 00 00"_hex, 3ms);
+    EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
 }
 
 }  // namespace

@@ -132,6 +132,16 @@ TEST_F(SymptomsTest, AnotherMastersRequestIsDistinguishedFromNoiseAlsoWhenItsRep
     EXPECT_EQ(of(17).strays, 1u);
 }
 
+TEST_F(SymptomsTest, WhatMayHaveBeenTheReplyIsNoEchoForCertain) {
+    Settings settings = bus.settings();
+    settings.echo = EchoMode::on;  // there is none
+    BusScript script{settings};
+    script.submit(17, kWrite);
+    answer(script, 17, kWrite, 3ms);
+    script.run_for(3s);
+    EXPECT_EQ(script.arbiter().station_counters().at(17).symptoms.echoes, 0u);
+}
+
 TEST_F(SymptomsTest, TheEchoIsCountedAndIsNoTrouble) {
     for (int i = 0; i < 3; ++i) {
         bus.submit(17, kRead);
