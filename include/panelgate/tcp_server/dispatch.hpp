@@ -80,9 +80,7 @@ class Caller {
     void certify(std::string subject, std::optional<std::string> role,
                  std::span<const OwnRole> own_roles = {});
     /// By its certificate: only operators and above write, and own roles with that right.
-    bool reads_only() const {
-        return by_certificate_ && !who_->standing.may(Right::write);
-    }
+    bool reads_only() const { return by_certificate_ && !who_->standing.may(Right::write); }
     /// Passes the request to a bus for one of its stations; station 0: broadcast.
     void transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,
                   bus::AnswerHandler handler);

@@ -19,7 +19,6 @@ using modbus::Span;
 
 /// Stands for stations that nobody has listed.
 constexpr std::uint8_t kUnlisted = 0;
-constexpr const char* kHidden = "hidden";
 constexpr std::string_view kRelay = "relay ";
 
 /// The name of a relay tells which other station it writes to.

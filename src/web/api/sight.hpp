@@ -18,6 +18,9 @@
 
 namespace panelgate::web {
 
+/// What stands in place of what may not be seen.
+inline constexpr std::string_view kHidden = "hidden";
+
 /// What a client may see of the plant: what the rules of `access` let it read. What is asked of a
 /// panel is judged by its bus; this is for what the gateway knows itself. The directory must
 /// outlive it.

@@ -113,8 +113,6 @@ namespace asio = boost::asio;
 namespace json = boost::json;
 namespace {
 
-constexpr std::string_view kHidden = "hidden";
-
 std::string_view note_of(const bus::TraceFrame& frame) {
     return frame.hidden ? kHidden : label(frame.kind);
 }
