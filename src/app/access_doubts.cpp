@@ -118,7 +118,7 @@ std::vector<std::string> access_doubts(const config::Config& config, WallTime no
     }
     if (config.http) {
         for (const web::Token& token : config.http->tokens) {
-            if (!token.expires || *token.expires > now) continue;
+            if (!token.has_expired(now)) continue;
             doubts.push_back("the token '" + token.name + "' ended on " +
                              web::expiry_text(*token.expires) + ": it is answered 401");
         }

@@ -5,12 +5,11 @@
 #include <boost/json/object.hpp>
 #include <boost/json/parse.hpp>
 #include <boost/json/value.hpp>
-#include <charconv>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "panelgate/audit/record.hpp"
+#include "panelgate/base/text.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/profile/notation.hpp"
 
@@ -32,22 +31,13 @@ std::vector<std::string_view> segments_of(std::string_view path) {
     return segments;
 }
 
-std::optional<std::uint16_t> number_of(std::string_view text) {
-    std::uint16_t value = 0;
-    const char* last = text.data() + text.size();
-    const auto [end, wrong] = std::from_chars(text.data(), last, value);
-    if (wrong != std::errc{} || end != last) return std::nullopt;
-    return value;
-}
-
 /// By name, or by LINE:ID.
 const Station* station_of(const Plant& plant, std::string_view text) {
     if (const Station* named = plant.find(text)) return named;
     const auto colon = text.rfind(':');
     if (colon == text.npos) return nullptr;
-    const auto id = number_of(text.substr(colon + 1));
-    if (!id || *id > 255) return nullptr;
-    return plant.find(text.substr(0, colon), static_cast<std::uint8_t>(*id));
+    const auto id = to_number<std::uint8_t>(text.substr(colon + 1));
+    return id ? plant.find(text.substr(0, colon), *id) : nullptr;
 }
 
 /// "points/speed", "holding-registers/5" or "devices/UW102" of a station.
@@ -60,7 +50,7 @@ std::string place_of(const Station& station, std::string_view kind, std::string_
         return profile::format_notation(profile, point->table, point->address);
     }
     for (const modbus::Table table : modbus::kTables) {
-        const auto address = number_of(which);
+        const auto address = to_number<std::uint16_t>(which);
         if (kind == label(table) && address)
             return profile::format_notation(profile, table, *address);
     }
@@ -128,14 +118,12 @@ AskedPlace asked_place(const Plant& plant, std::string_view path, std::string_vi
 }
 
 std::string members_of(const AskedPlace& place) {
-    audit::Composer record;
-    record.begin({}, audit::Kind::refusal);
-    const std::size_t begin = record.body().size();
-    record.text("line", place.line);
-    if (place.station != nullptr)
-        record.text("station", place.station->name).number("id", place.station->id);
-    record.text("at", place.at);
-    return std::string(record.body().substr(begin));
+    return audit::members_by([&](audit::Composer& record) {
+        record.text("line", place.line);
+        if (place.station != nullptr)
+            record.text("station", place.station->name).number("id", place.station->id);
+        record.text("at", place.at);
+    });
 }
 
 }  // namespace panelgate::app

@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "asked_place.hpp"
 #include "build_info.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/profile/notation.hpp"
@@ -23,24 +24,13 @@ using audit::member;
 
 /// Who it is, as members of a record.
 std::string who_members(const Who& who) {
-    Composer record;
-    record.begin({}, Kind::write);
-    const std::size_t begin = record.body().size();
-    record.text("client", who.name).text("face", label(who.face));
-    record.text("listener", who.listener).text("token", who.token);
-    if (who.standing.role != Role::none) record.text("role", who.standing.name());
-    record.text("certificate", who.certificate).text("certificate_role", who.certificate_role);
-    record.text("user", who.user);
-    return std::string(record.body().substr(begin));
-}
-
-/// Where it is, as members of a record.
-std::string place_members(const Station& station) {
-    Composer record;
-    record.begin({}, Kind::write);
-    const std::size_t begin = record.body().size();
-    record.text("line", station.line).text("station", station.name).number("id", station.id);
-    return std::string(record.body().substr(begin));
+    return audit::members_by([&](Composer& record) {
+        record.text("client", who.name).text("face", label(who.face));
+        record.text("listener", who.listener).text("token", who.token);
+        if (who.standing.role != Role::none) record.text("role", who.standing.name());
+        record.text("certificate", who.certificate).text("certificate_role", who.certificate_role);
+        record.text("user", who.user);
+    });
 }
 
 /// How a write ended, for somebody who asks whether the panel has changed.
@@ -115,15 +105,12 @@ void make_client_key(std::string& key, const WhoRef& who) {
 
 /// A client without the port, which each of its connections has anew.
 std::string client_members(const WhoRef& who) {
-    Composer members;
-    members.begin({}, Kind::repeats);
-    const std::size_t begin = members.body().size();
-    if (who) {
+    return audit::members_by([&](Composer& members) {
+        if (!who) return;
         members.text("address", who->address).text("face", label(who->face));
         if (who->address.empty()) members.text("client", who->name);
         members.text("token", who->token).text("user", who->user);
-    }
-    return std::string(members.body().substr(begin));
+    });
 }
 
 void log_anchor(const audit::Position& at, const std::string& chain) {
@@ -217,7 +204,7 @@ void AuditBook::show(std::shared_ptr<const Snapshot> snapshot) {
     for (const Station& station : snapshot->plant.stations()) {
         Known& known = next[station.line][station.id];
         known.station = &station;
-        known.members = place_members(station);
+        known.members = members_of(AskedPlace{station.line, &station});
         if (const Known* before = find(station.line, station.id)) known.written = before->written;
     }
     known_ = std::move(next);

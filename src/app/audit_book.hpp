@@ -105,6 +105,7 @@ class AuditBook {
     bool is_vain_repeat(const std::string& line, const bus::WriteEnd& end, Known* known);
     void refusal(const web::Deed& deed);
     void record_refusal(const Refused& refused);
+    void record_token(const web::Token& token, std::string_view event);
     std::string place_of(const web::Deed& deed) const;
     void record() { trail_->add(composer_.body()); }
     void record_repeats(bool all);

@@ -136,32 +136,30 @@ void AuditBook::reload(const web::ReloadVerdict& verdict) {
 
 void AuditBook::tokens(const std::vector<web::Token>& before, const std::vector<web::Token>& now) {
     if (!trail_) return;
-    const auto tell_of = [this](const web::Token& token, std::string_view event) {
-        begin(Kind::token).text("token", token.name).text("role", token.standing.name());
-        composer_.text("event", event);
-        if (token.expires) composer_.text("expires", web::expiry_text(*token.expires));
-        record();
-    };
     for (const web::Token& token : now) {
         const auto old = std::ranges::find(before, token.name, &web::Token::name);
         if (old == before.end()) {
-            tell_of(token, "added");
+            record_token(token, "added");
         } else if (*old != token) {
             const bool other = old->hash != token.hash;
-            tell_of(token, old->standing != token.standing ? "role changed"
-                           : other                         ? "replaced"
-                                                           : "changed");
+            record_token(token, old->standing != token.standing ? "role changed"
+                                : other                         ? "replaced"
+                                                                : "changed");
         }
     }
     for (const web::Token& token : before)
         if (std::ranges::find(now, token.name, &web::Token::name) == now.end())
-            tell_of(token, "removed");
+            record_token(token, "removed");
 }
 
 void AuditBook::expired(const web::Token& token) {
-    if (!trail_) return;
+    if (trail_) record_token(token, "expired");
+}
+
+void AuditBook::record_token(const web::Token& token, std::string_view event) {
     begin(Kind::token).text("token", token.name).text("role", token.standing.name());
-    composer_.text("event", "expired").text("expires", web::expiry_text(*token.expires));
+    composer_.text("event", event);
+    if (token.expires) composer_.text("expires", web::expiry_text(*token.expires));
     record();
 }
 

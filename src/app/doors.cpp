@@ -7,20 +7,13 @@
 #include <utility>
 #include <vector>
 
-#include "panelgate/rt/acceptor.hpp"
+#include "panelgate/base/role.hpp"
 
 namespace panelgate::app {
 
 namespace {
 
 using bus::Admission;
-
-bool is_allowed(const std::vector<Network>& allow, const std::string& address) {
-    if (allow.empty() || address.empty()) return true;
-    boost::system::error_code none;
-    const auto peer = boost::asio::ip::make_address(address, none);
-    return !none && rt::AccessList(allow).allows(peer);
-}
 
 Admission out(const WhoRef& who, std::string_view rule, std::string_view why) {
     return {.who = who, .rule = rule, .why = why};
@@ -51,16 +44,33 @@ Admission only_reads(const WhoRef& who, std::string_view rule, std::string_view 
 
 /// As web::standing_of(): by the certificate where the listener goes by that.
 Standing standing_without_token(const Who& who, const web::Settings& http) {
-    const bool by_certificate =
-        !who.certificate.empty() && http.tls && http.tls->role_from_certificate;
-    if (!by_certificate) return http.anonymous;
+    if (who.certificate.empty() || !tls::goes_by_certificates(http.tls)) return http.anonymous;
     Standing named = standing_named(who.certificate_role, http.tls->own_roles);
-    if (named != Standing{}) return named;
-    if (!http.anonymous.may(Right::read)) return {};
-    return http.anonymous.exceeds(Role::viewer) ? Standing(Role::viewer) : http.anonymous;
+    return named == Standing{} ? only_reading(http.anonymous) : named;
 }
 
 }  // namespace
+
+bool lets_in(const rt::AccessList& allow, const std::string& address) {
+    boost::system::error_code none;
+    const auto peer = boost::asio::ip::make_address(address, none);
+    return address.empty() || (!none && allow.allows(peer));
+}
+
+void Doors::open(std::shared_ptr<const config::Config> config) {
+    config_ = std::move(config);
+    allow_.clear();
+    const auto add = [this](const auto& listener) {
+        if (!listener.allow.empty()) allow_.emplace(listener.name(), listener.allow);
+    };
+    if (config_->http) add(*config_->http);
+    for (const tcp_server::Settings& listener : config_->modbus_tcp) add(listener);
+}
+
+bool Doors::is_allowed(const std::string& listener, const std::string& address) const {
+    const auto known = allow_.find(listener);
+    return known == allow_.end() || lets_in(known->second, address);
+}
 
 void Doors::change(std::shared_ptr<const config::Config> config) {
     if (config_ && config_->http && config->http) {
@@ -71,7 +81,7 @@ void Doors::change(std::shared_ptr<const config::Config> config) {
                 renewed_.insert(token.name);
         }
     }
-    config_ = std::move(config);
+    open(std::move(config));
 }
 
 std::optional<Admission> Doors::admit(const WhoRef& who, WallTime at) const {
@@ -95,7 +105,7 @@ std::optional<Admission> Doors::admit(const WhoRef& who, WallTime at) const {
 std::optional<Admission> Doors::by_http(const WhoRef& who, WallTime at) const {
     if (!config_->http) return std::nullopt;
     const web::Settings& http = *config_->http;
-    if (!is_allowed(http.allow, who->address)) return not_allowed(who);
+    if (!is_allowed(http.name(), who->address)) return not_allowed(who);
     if (who->token.empty()) {
         const Standing now = standing_without_token(*who, http);
         if (now == who->standing) return std::nullopt;
@@ -104,7 +114,7 @@ std::optional<Admission> Doors::by_http(const WhoRef& who, WallTime at) const {
     const auto token = std::ranges::find(http.tokens, who->token, &web::Token::name);
     if (token == http.tokens.end() || renewed_.contains(who->token))
         return out(who, "token", "the token that it was sent with is not known any more");
-    if (token->expires && *token->expires <= at)
+    if (token->has_expired(at))
         return out(who, "token", "the token that it was sent with has expired");
     if (token->standing == who->standing) return std::nullopt;
     return with(who, token->standing);
@@ -114,7 +124,7 @@ std::optional<Admission> Doors::by_modbus(const WhoRef& who) const {
     const auto listener = std::ranges::find_if(
         config_->modbus_tcp, [&](const auto& one) { return one.name() == who->listener; });
     if (listener == config_->modbus_tcp.end()) return std::nullopt;
-    if (!is_allowed(listener->allow, who->address)) return not_allowed(who);
+    if (!is_allowed(who->listener, who->address)) return not_allowed(who);
     if (listener->read_only) return only_reads(who, "access", "its listener is read-only now");
     if (listener->broadcast == tcp_server::BroadcastMode::deny)
         return Admission{.who = who,

@@ -1,10 +1,11 @@
 // What a listener refuses by itself: whom it lets in, which lines it serves, whether it writes.
 #include "explain_door.hpp"
 
-#include <arpa/inet.h>
 #include <algorithm>
 
-#include "panelgate/base/network.hpp"
+#include "doors.hpp"
+#include "panelgate/config/endpoint.hpp"
+#include "panelgate/rt/acceptor.hpp"
 
 namespace panelgate::app {
 
@@ -12,27 +13,8 @@ namespace {
 
 using access::Act;
 
-/// IPv4 is stored as ::ffff:10.0.0.1.
-std::optional<AddressBytes> bytes_of(const std::string& text, unsigned& shift) {
-    constexpr std::size_t kMapped = 12;
-    AddressBytes bytes{};
-    shift = 0;
-    if (::inet_pton(AF_INET6, text.c_str(), bytes.data()) == 1) return bytes;
-    bytes[10] = bytes[11] = 0xFF;
-    shift = kMapped * 8;
-    if (::inet_pton(AF_INET, text.c_str(), bytes.data() + kMapped) == 1) return bytes;
-    return std::nullopt;
-}
-
-bool lets_in(const std::vector<Network>& allow, const std::string& address) {
-    unsigned ignored = 0;
-    const auto client = bytes_of(address, ignored);
-    if (allow.empty() || !client) return true;
-    return std::ranges::any_of(allow, [&](const Network& network) {
-        unsigned shift = 0;
-        const auto base = bytes_of(network.address, shift);
-        return base && same_prefix(*client, *base, std::min(network.prefix + shift, 128U));
-    });
+bool may_come(const std::vector<Network>& allow, const std::string& address) {
+    return allow.empty() || lets_in(rt::AccessList(allow), address);
 }
 
 bool serves(const tcp_server::Settings& listener, const AtDoor& request) {
@@ -46,7 +28,7 @@ bool serves(const tcp_server::Settings& listener, const AtDoor& request) {
 
 std::string refused_by(const tcp_server::Settings& listener, const std::string& name,
                        const AtDoor& request) {
-    if (!lets_in(listener.allow, request.who.address))
+    if (!may_come(listener.allow, request.who.address))
         return name + " does not let " + request.who.address + " in (allow)";
     if (!serves(listener, request))
         return name + " does not serve line '" + request.line.name + "'";
@@ -60,7 +42,7 @@ std::string ended_token(const config::Config& config, const Who& who, WallTime n
     if (who.token.empty() || !config.http) return "";
     const auto& tokens = config.http->tokens;
     const auto token = std::ranges::find(tokens, who.token, &web::Token::name);
-    if (token == tokens.end() || !token->expires || *token->expires > now) return "";
+    if (token == tokens.end() || !token->has_expired(now)) return "";
     return "the token '" + who.token + "' ended on " + web::expiry_text(*token->expires);
 }
 
@@ -88,14 +70,13 @@ std::string listener_names(const config::Config& config) {
 }
 
 bool is_address(const std::string& text) {
-    unsigned ignored = 0;
-    return bytes_of(text, ignored).has_value();
+    return text.find('/') == text.npos && config::parse_cidr(text).has_value();
 }
 
 std::string refused_at_door(const config::Config& config, const AtDoor& request, WallTime now) {
     const Who& who = request.who;
     if (std::string why = ended_token(config, who, now); !why.empty()) return why;
-    if (who.face == Face::http && config.http && !lets_in(config.http->allow, who.address))
+    if (who.face == Face::http && config.http && !may_come(config.http->allow, who.address))
         return "http does not let " + who.address + " in (allow)";
     if (who.face == Face::mqtt && config.mqtt && request.writes && !config.mqtt->write)
         return "mqtt has no write: points";

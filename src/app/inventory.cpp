@@ -134,13 +134,12 @@ Heading heading_of(const config::Station& station, const arbiter::StationSetting
 
 /// Whom `allow` and `tls` let in.
 std::string guests_of(const std::vector<Network>& allow, const std::optional<tls::Settings>& tls) {
-    const bool shown = tls && tls->client == tls::ClientCertificate::required;
-    return text_of(allow) + (shown ? " with a certificate" : "");
+    return text_of(allow) + (tls::wants_certificate(tls) ? " with a certificate" : "");
 }
 
 std::string rights_of(const tcp_server::Settings& listener) {
-    const bool by_role = listener.tls && listener.tls->role_from_certificate;
-    if (listener.read_only || !by_role) return rights(listener.read_only);
+    if (listener.read_only || !tls::goes_by_certificates(listener.tls))
+        return rights(listener.read_only);
     return "read, and write where the role in the client's certificate may";
 }
 

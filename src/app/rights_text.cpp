@@ -22,14 +22,6 @@ struct Door {
     bool is_open = false;  ///< whoever reaches it comes in
 };
 
-bool wants_certificate(const std::optional<tls::Settings>& tls) {
-    return tls && tls->client == tls::ClientCertificate::required;
-}
-
-bool goes_by_certificates(const std::optional<tls::Settings>& tls) {
-    return tls && tls->role_from_certificate;
-}
-
 Door door(std::string name, Who who) {
     const bool writes = who.standing.may(Right::write);
     const bool is_open = who.token.empty();
@@ -40,7 +32,7 @@ void add_http(const web::Settings& http, std::vector<Door>& doors) {
     Who who{.face = Face::http, .listener = http.name(), .standing = http.anonymous};
     if (http.anonymous.role != Role::none) {
         doors.push_back(door("http " + http.name(), who));
-        doors.back().is_open = !wants_certificate(http.tls);
+        doors.back().is_open = !tls::wants_certificate(http.tls);
     }
     for (const web::Token& token : http.tokens) {
         who.token = token.name;
@@ -65,12 +57,12 @@ std::vector<Door> doors_of(const config::Config& config) {
     const std::vector<Network> networks = networks_of(config.access);
     for (const tcp_server::Settings& listener : config.modbus_tcp) {
         Who who{.face = Face::modbus_tcp, .listener = listener.name(), .standing = Role::operator_};
-        const bool by_role = goes_by_certificates(listener.tls);
+        const bool by_role = tls::goes_by_certificates(listener.tls);
         const std::string name =
             "modbus_tcp " + listener.name() + (by_role ? " with a certificate of an operator" : "");
         doors.push_back(door(name, who));
         doors.back().read_only = listener.read_only;
-        doors.back().is_open = !by_role && !wants_certificate(listener.tls);
+        doors.back().is_open = !by_role && !tls::wants_certificate(listener.tls);
         for (const Network& network : networks) {
             who.address = network.address;
             doors.push_back(door(

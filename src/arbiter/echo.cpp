@@ -10,23 +10,14 @@
 
 namespace panelgate::arbiter {
 
-bool teaches_echo(const modbus::Request& request) {
-    if (!request.is_read()) return false;
-    const auto reply = request.reply_length();
-    return reply && *reply != request.pdu().size() + modbus::kAduOverhead;
-}
-
-bool teaches_echo_of_writes(const modbus::Request& request) {
-    if (request.is_read()) return false;
-    const auto reply = request.reply_length();
-    return reply && *reply != request.pdu().size() + modbus::kAduOverhead;
-}
-
 namespace {
 
-constexpr std::uint8_t kWriteCoil = 5;
-constexpr std::uint8_t kWriteRegister = 6;
-constexpr std::uint8_t kWriteRegisters = 16;
+/// True if its normal reply can never equal it.
+bool differs_from_reply(const modbus::Request& request) {
+    const auto reply = request.reply_length();
+    return reply && *reply != request.pdu().size() + modbus::kAduOverhead;
+}
+
 constexpr std::size_t kSingleWrite = 5;  // bytes: function, address, value
 
 std::uint16_t word_at(ByteView bytes, std::size_t at) {
@@ -35,12 +26,21 @@ std::uint16_t word_at(ByteView bytes, std::size_t at) {
 
 }  // namespace
 
+bool teaches_echo(const modbus::Request& request) {
+    return request.is_read() && differs_from_reply(request);
+}
+
+bool teaches_echo_of_writes(const modbus::Request& request) {
+    return !request.is_read() && differs_from_reply(request);
+}
+
 std::optional<modbus::Request> read_back(ByteView write) {
     if (write.size() < kSingleWrite) return std::nullopt;
     const std::uint32_t first = word_at(write, 1);
-    const std::uint32_t count = write[0] == kWriteRegisters ? word_at(write, 3) : 1;
-    if (write[0] == kWriteCoil) return modbus::Request::read({modbus::Table::coils, first, 1});
-    if (write[0] == kWriteRegister || write[0] == kWriteRegisters)
+    const std::uint32_t count = write[0] == modbus::kWriteMultipleRegisters ? word_at(write, 3) : 1;
+    if (write[0] == modbus::kWriteSingleCoil)
+        return modbus::Request::read({modbus::Table::coils, first, 1});
+    if (write[0] == modbus::kWriteSingleRegister || write[0] == modbus::kWriteMultipleRegisters)
         return modbus::Request::read({modbus::Table::holding_registers, first, count});
     return std::nullopt;
 }
@@ -48,8 +48,8 @@ std::optional<modbus::Request> read_back(ByteView write) {
 bool holds_written(ByteView write, ByteView reply) {
     const auto read = read_back(write);
     if (!read || !modbus::answers(read->pdu(), reply) || modbus::exception_of(reply)) return false;
-    if (write[0] == kWriteCoil) return (reply[2] & 1) == (write[3] != 0 ? 1 : 0);
-    const std::size_t values = write[0] == kWriteRegister ? 3 : kSingleWrite + 1;
+    if (write[0] == modbus::kWriteSingleCoil) return (reply[2] & 1) == (write[3] != 0 ? 1 : 0);
+    const std::size_t values = write[0] == modbus::kWriteSingleRegister ? 3 : kSingleWrite + 1;
     return std::ranges::equal(write.subspan(values), reply.subspan(2));
 }
 

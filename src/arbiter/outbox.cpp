@@ -175,10 +175,6 @@ bool is_search(const Group& group) {
     return !group.jobs.empty() && std::ranges::all_of(group.jobs, &Job::search);
 }
 
-}  // namespace
-
-namespace {
-
 /// False where the normal reply equals the request: what came back may have been that.
 bool is_surely_echoed(const Attempt& attempt) {
     const modbus::Request& request = attempt.group().request;

@@ -9,12 +9,6 @@ namespace panelgate::arbiter {
 
 using fact::when;
 
-namespace {
-
-constexpr std::uint8_t kAcknowledge = 5;  // an exception
-
-}  // namespace
-
 modbus::Request ReplyHabits::proof(const OutstandingRequests& book) const {
     modbus::Request read = reads_.probe();
     if (reconnect_.only_known_reads() || !book.is_ambiguous(id_, read)) return read;
@@ -150,6 +144,7 @@ void ReplyHabits::learn_of_duplicates(OutstandingRequests& book, TimePoint now,
 
 /// Updates what is outstanding after this reply.
 void ReplyHabits::settle(OutstandingRequests& book, TimePoint now, const Attempt& attempt) {
+    constexpr auto kAcknowledge = static_cast<std::uint8_t>(modbus::ExceptionCode::acknowledge);
     const Group& group = attempt.group();
     const TimePoint sent = attempt.timing().sent;
     if (attempt.reply() == group.doubted && book.count(id_) <= 1) {

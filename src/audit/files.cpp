@@ -4,10 +4,11 @@
 #include <unistd.h>
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <system_error>
+
+#include "panelgate/base/text.hpp"
 
 namespace panelgate::audit {
 
@@ -29,11 +30,8 @@ std::optional<std::uint64_t> number_in(const std::string& name, const std::strin
     const std::string start = fs::path(file).filename().string() + '.';
     const std::string own = fs::path(name).filename().string();
     if (!own.starts_with(start)) return std::nullopt;
-    std::uint64_t number = 0;
-    const auto [end, wrong] =
-        std::from_chars(own.data() + start.size(), own.data() + own.size(), number);
-    if (wrong != std::errc{} || number == 0) return std::nullopt;
-    return number;
+    const auto number = to_number<std::uint64_t>(std::string_view(own).substr(start.size()));
+    return number && *number > 0 ? number : std::nullopt;
 }
 
 /// Their numbers have leading zeros: the order of names is that of records.

@@ -1,9 +1,10 @@
 #include "panelgate/audit/verify.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <utility>
+
+#include "panelgate/base/text.hpp"
 
 namespace panelgate::audit {
 
@@ -78,11 +79,8 @@ std::optional<Fields> fields_of(std::string_view line, std::string_view level,
 
 std::optional<std::uint64_t> number_of(std::optional<std::string_view> text) {
     if (!text) return std::nullopt;
-    std::uint64_t value = 0;
-    const char* last = text->data() + text->size();
-    const auto [end, wrong] = std::from_chars(text->data(), last, value);
-    if (wrong != std::errc{} || end != last || value == 0) return std::nullopt;
-    return value;
+    const auto value = to_number<std::uint64_t>(*text);
+    return value && *value > 0 ? value : std::nullopt;
 }
 
 bool is_hex(std::string_view text) {

@@ -87,6 +87,11 @@ bool Standing::exceeds(const Standing& other) const {
                                [&](Right right) { return may(right) && !other.may(right); });
 }
 
+Standing only_reading(const Standing& anonymous) {
+    if (!anonymous.may(Right::read)) return {};
+    return anonymous.exceeds(Role::viewer) ? Standing(Role::viewer) : anonymous;
+}
+
 bool Standing::may(Right right) const {
     return own ? own->rights.has(right) : least_with(right) <= role;
 }

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "panelgate/base/time.hpp"
 #include "panelgate/cli/answers.hpp"
 #include "panelgate/cli/table.hpp"
 
@@ -116,14 +117,13 @@ std::string audit_line(const json::object& record) {
 
 namespace {
 
-/// Takes a number of two digits, from `least` to `most`, behind `separator` off.
-bool take_two(std::string_view& text, char separator, int least, int most, int& value) {
-    if (!text.starts_with(separator) || text.size() < 3) return false;
+/// Takes a number of two digits, up to `most`, behind `separator` off.
+bool take_two(std::string_view& text, char separator, int most, int& value) {
+    if (!text.starts_with(separator)) return false;
     text.remove_prefix(1);
-    const auto [end, wrong] = std::from_chars(text.data(), text.data() + 2, value);
-    if (wrong != std::errc{} || end != text.data() + 2) return false;
-    text.remove_prefix(2);
-    return value >= least && value <= most;
+    const auto number = take_number(text, 2);
+    value = number.value_or(0);
+    return number && value <= most;
 }
 
 /// "Z", "+01:00", or nothing for UTC; its minutes.
@@ -132,27 +132,10 @@ std::optional<int> zone_of(std::string_view text) {
     const bool before = text.front() == '-';
     int hours = 0;
     int minutes = 0;
-    if (!take_two(text, before ? '-' : '+', 0, 14, hours) || !take_two(text, ':', 0, 59, minutes))
+    if (!take_two(text, before ? '-' : '+', 14, hours) || !take_two(text, ':', 59, minutes))
         return std::nullopt;
     if (!text.empty()) return std::nullopt;
     return (before ? -1 : 1) * (hours * 60 + minutes);
-}
-
-/// Takes "2026-11-26" off.
-std::optional<std::chrono::sys_days> take_day(std::string_view& text) {
-    int year = 0;
-    int month = 0;
-    int day = 0;
-    const auto [end, wrong] = std::from_chars(text.data(), text.data() + 4, year);
-    const bool digits = wrong == std::errc{} && end == text.data() + 4;
-    text.remove_prefix(4);
-    if (!digits || !take_two(text, '-', 1, 12, month) || !take_two(text, '-', 1, 31, day))
-        return std::nullopt;
-    const std::chrono::year_month_day date(std::chrono::year(year),
-                                           std::chrono::month(static_cast<unsigned>(month)),
-                                           std::chrono::day(static_cast<unsigned>(day)));
-    if (!date.ok()) return std::nullopt;
-    return std::chrono::sys_days(date);
 }
 
 /// Takes ".25" off; nullopt if no digit follows the point.
@@ -176,9 +159,9 @@ std::optional<std::string> point_in_time(std::string_view typed) {
     int minute = 0;
     int second = 0;
     if (std::string_view("Tt ").find(rest.front()) == rest.npos) return std::nullopt;
-    if (!take_two(rest, rest.front(), 0, 23, hour) || !take_two(rest, ':', 0, 59, minute))
+    if (!take_two(rest, rest.front(), 23, hour) || !take_two(rest, ':', 59, minute))
         return std::nullopt;
-    if (rest.starts_with(':') && !take_two(rest, ':', 0, 60, second)) return std::nullopt;
+    if (rest.starts_with(':') && !take_two(rest, ':', 60, second)) return std::nullopt;
     const auto fraction = take_fraction(rest);
     const auto zone = fraction ? zone_of(rest) : std::nullopt;
     if (!zone) return std::nullopt;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <charconv>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -70,11 +69,9 @@ std::optional<std::string> origin_of(std::string text) {
     const auto colon = text.find(':', std::max(host, text.find(']', host) + 1));
     if (!is_host(without_brackets(text.substr(host, colon - host)))) return std::nullopt;
     if (colon == text.npos) return text;
-    std::uint16_t port = 0;
-    const char* const end = text.data() + text.size();
-    const auto [stop, wrong] = std::from_chars(text.data() + colon + 1, end, port);
-    if (wrong != std::errc{} || stop != end || port == 0) return std::nullopt;
-    if (port == (secure ? 443 : 80)) text.erase(colon);
+    const auto port = to_number<std::uint16_t>(std::string_view(text).substr(colon + 1));
+    if (!port || *port == 0) return std::nullopt;
+    if (*port == (secure ? 443 : 80)) text.erase(colon);
     return text;
 }
 

@@ -131,11 +131,12 @@ Refuse deny(std::vector<Target> unwilling, const std::vector<bus::Refusal>& refu
     return Refuse{refusals.front().code, std::move(unwilling)};
 }
 
-/// Refuses if one of the targets refuses every write: one refusal denies the whole broadcast.
-std::optional<Refuse> refused_write(std::vector<Target> targets) {
+/// Refuses if `refusal_of` one of the targets is there: one refusal denies the whole broadcast.
+template <class RefusalOf>
+std::optional<Refuse> refused_by(std::vector<Target> targets, const RefusalOf& refusal_of) {
     std::vector<bus::Refusal> refusals;
     std::erase_if(targets, [&](const Target& target) {
-        auto refusal = target.bus->write_refusal(target.station);
+        auto refusal = refusal_of(target);
         if (refusal) refusals.push_back(std::move(*refusal));
         return !refusal;
     });
@@ -143,18 +144,19 @@ std::optional<Refuse> refused_write(std::vector<Target> targets) {
     return deny(std::move(targets), refusals);
 }
 
+/// Refuses if one of the targets refuses every write.
+std::optional<Refuse> refused_write(std::vector<Target> targets) {
+    return refused_by(std::move(targets), [](const Target& target) {
+        return target.bus->write_refusal(target.station);
+    });
+}
+
 /// Refuses if one of the lines would refuse this broadcast.
 std::optional<Refuse> refused_broadcast(std::vector<Target> lines, const modbus::Request& request,
                                         const WhoRef& who) {
     const bus::Request broadcast{.station = 0, .request = request, .who = who};
-    std::vector<bus::Refusal> refusals;
-    std::erase_if(lines, [&](const Target& line) {
-        auto refusal = line.bus->refusal_of(broadcast);
-        if (refusal) refusals.push_back(std::move(*refusal));
-        return !refusal;
-    });
-    if (lines.empty()) return std::nullopt;
-    return deny(std::move(lines), refusals);
+    return refused_by(std::move(lines),
+                      [&](const Target& line) { return line.bus->refusal_of(broadcast); });
 }
 
 Decision decide_broadcast(std::uint8_t function, Result<modbus::Request> request,

@@ -73,9 +73,7 @@ class Connecting : public std::enable_shared_from_this<Connecting> {
   private:
     void expect(const std::string& server) {
         SSL* const tls = engine_->native();
-        if (X509_VERIFY_PARAM_set1_ip_asc(SSL_get0_param(tls), server.c_str()) == 1) return;
-        SSL_set1_host(tls, server.c_str());
-        SSL_set_tlsext_host_name(tls, server.c_str());
+        if (expect_peer(SSL_get0_param(tls), server)) SSL_set_tlsext_host_name(tls, server.c_str());
     }
     void listen() {
         stream_.socket().async_read_some(

@@ -45,12 +45,8 @@ void trust(SSL_CTX* context, const Settings& settings) {
         SSL_CTX_load_verify_dir(context, kSystemTrust);
         return;
     }
-    const auto trusted = certificates_of(settings.material.ca);
-    if (trusted.empty())
-        throw Unusable("ca", settings.ca +
-                                 " holds no certificate; give that of the CA that signs the "
-                                 "server's, in PEM form");
-    check_whole("ca", settings.ca, settings.material.ca, "CERTIFICATE", trusted.size());
+    const auto trusted =
+        trusted_authorities(settings, "that of the CA that signs the server's, in PEM form");
     for (const auto& one : trusted) X509_STORE_add_cert(SSL_CTX_get_cert_store(context), one.get());
 }
 
@@ -64,9 +60,7 @@ ClientContext::ClientContext(const Settings& settings, const std::string& server
     SSL_CTX_set_mode(context, SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER);
     trust(context, settings);
     if (!settings.certificate.empty()) use_pair(context, settings);
-    X509_VERIFY_PARAM* const how = SSL_CTX_get0_param(context);
-    if (X509_VERIFY_PARAM_set1_ip_asc(how, server.c_str()) != 1)
-        X509_VERIFY_PARAM_set1_host(how, server.data(), server.size());
+    expect_peer(SSL_CTX_get0_param(context), server);
     ERR_clear_error();
     SSL_CTX_set_app_data(context, &refusal_);
     SSL_CTX_set_verify(context, SSL_VERIFY_PEER, judge_server);

@@ -105,12 +105,8 @@ Context::Context(const Settings& settings)
 /// Browsers choose among their certificates by the names that are sent to them.
 void Context::use_ca(const Settings& settings) {
     if (settings.ca.empty()) return;
-    const auto trusted = certificates_of(settings.material.ca);
-    if (trusted.empty())
-        throw Unusable("ca", settings.ca +
-                                 " holds no certificate; give the certificate of the CA that signs "
-                                 "those of clients, in PEM form");
-    check_whole("ca", settings.ca, settings.material.ca, "CERTIFICATE", trusted.size());
+    const auto trusted = trusted_authorities(
+        settings, "the certificate of the CA that signs those of clients, in PEM form");
     X509_STORE* const store = SSL_CTX_get_cert_store(context_.get());
     for (const auto& one : trusted) {
         X509_STORE_add_cert(store, one.get());

@@ -62,6 +62,12 @@ std::vector<X509*> without_list(const std::vector<Owned<X509>>& authorities,
     return found;
 }
 
+bool expect_peer(X509_VERIFY_PARAM* verification, const std::string& server) {
+    if (X509_VERIFY_PARAM_set1_ip_asc(verification, server.c_str()) == 1) return false;
+    X509_VERIFY_PARAM_set1_host(verification, server.data(), server.size());
+    return true;
+}
+
 Owned<EVP_PKEY> key_of(std::string_view pem) {
     const Owned<BIO> in = reader_of(pem);
     Owned<EVP_PKEY> key(PEM_read_bio_PrivateKey(in.get(), nullptr, no_password, nullptr));

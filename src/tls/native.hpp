@@ -36,6 +36,8 @@ std::vector<X509*> without_list(const std::vector<Owned<X509>>& authorities,
                                 const std::vector<Owned<X509_CRL>>& lists);
 /// CAs may have the same name, but not the same key.
 bool has_signed(const X509* authority, X509_CRL* list);
+/// Wants the other side's certificate to be of this address or name. True if it is a name.
+bool expect_peer(X509_VERIFY_PARAM* verification, const std::string& server);
 /// Null if there is none, or it is encrypted: nobody is asked for a password.
 Owned<EVP_PKEY> key_of(std::string_view pem);
 /// Seconds since 1970.

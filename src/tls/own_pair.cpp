@@ -97,4 +97,12 @@ std::int64_t use_pair(SSL_CTX* context, const Settings& settings) {
     return end;
 }
 
+std::vector<Owned<X509>> trusted_authorities(const Settings& settings, const char* advice) {
+    auto trusted = certificates_of(settings.material.ca);
+    if (trusted.empty())
+        throw Unusable("ca", settings.ca + " holds no certificate; give " + advice);
+    check_whole("ca", settings.ca, settings.material.ca, "CERTIFICATE", trusted.size());
+    return trusted;
+}
+
 }  // namespace panelgate::tls

@@ -3,14 +3,6 @@
 #include <algorithm>
 
 namespace panelgate::tls {
-namespace {
-
-bool goes_by_certificates(const std::optional<Settings>& tls) {
-    return tls && tls->role_from_certificate;
-}
-
-}  // namespace
-
 std::optional<CertifiedRole> certified_role(const std::optional<Settings>& tls, const Peer& peer) {
     if (!goes_by_certificates(tls)) return std::nullopt;
     CertifiedRole role;

@@ -237,14 +237,18 @@ class Configuration(unittest.TestCase):
                 self.connects(broker, f", tls: {{ca: {here}/right.pem}}, username: box, password_file: "
                               f"{here}/password", "mqtt connected broker=mqtts://localhost")
 
+    def mutual(self, here):
+        """What a broker has that knows its clients by their certificates; makes a right and a wrong one."""
+        for name in ("right", "wrong"):
+            self.certify(here, name)
+        return (f"certfile {here}/right.pem\nkeyfile {here}/right.key\ncafile {here}/right.pem\n"
+                "require_certificate true\nallow_anonymous true\n")
+
     @unittest.skipUnless(shutil.which("openssl"), "needs openssl")
     def test_the_broker_knows_the_gateway_by_its_certificate(self):
         with tempfile.TemporaryDirectory() as folder:
             here = pathlib.Path(folder)
-            for name in ("right", "wrong"):
-                self.certify(here, name)
-            mutual = (f"certfile {here}/right.pem\nkeyfile {here}/right.key\ncafile {here}/right.pem\n"
-                      "require_certificate true\nallow_anonymous true\n")
+            mutual = self.mutual(here)
             with Broker(mutual) as broker:
                 for name, said in (("right", "mqtt connected"), ("wrong", "mqtt not connected")):
                     self.connects(broker, f", tls: {{ca: {here}/right.pem, certificate: {here}/{name}.pem, "
@@ -253,10 +257,7 @@ class Configuration(unittest.TestCase):
     def test_its_new_certificate_is_for_the_next_connection_and_a_bad_one_is_kept_back(self):
         with tempfile.TemporaryDirectory() as folder:
             here = pathlib.Path(folder)
-            for name in ("right", "wrong"):
-                self.certify(here, name)
-            mutual = (f"certfile {here}/right.pem\nkeyfile {here}/right.key\ncafile {here}/right.pem\n"
-                      "require_certificate true\nallow_anonymous true\n")
+            mutual = self.mutual(here)
             for end in ("pem", "key"):
                 shutil.copy(here / f"wrong.{end}", here / f"own.{end}")
             with Broker(mutual) as broker:

@@ -6,7 +6,7 @@ import unittest
 
 import harness
 from harness import read_registers
-from tls_plant import SecureClient, plant, served
+from tls_plant import SecureClient, plant, served, status_of
 
 READ = read_registers(0)
 
@@ -67,18 +67,12 @@ class Silent(unittest.TestCase):
                     for _ in range(32)]  # max_connections_per_address
             for one in made:
                 stack.callback(one.close)
-                self.assertEqual(self.ask(one), 200)
+                self.assertEqual(status_of(one, "/api/v1/lines"), 200)
             for raw in self.silent(stack, port, 20, "127.0.0.1")[:4]:
                 self.assertEqual(raw.recv(1), b"", "it gave way to the next")
             for one in made:
                 one.auto_open = False  # not by another connection
-                self.assertEqual(self.ask(one), 200)
-
-    def ask(self, connection):
-        connection.request("GET", "/api/v1/lines")
-        answer = connection.getresponse()
-        answer.read()
-        return answer.status
+                self.assertEqual(status_of(one, "/api/v1/lines"), 200)
 
 
 if __name__ == "__main__":

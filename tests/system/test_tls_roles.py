@@ -14,7 +14,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 import harness
 from harness import read_registers, write_register
 from test_tls import get
-from tls_plant import ROLE, SecureClient, plant, refused, served
+from tls_plant import ROLE, SecureClient, plant, refused, served, status_of
 
 READ = read_registers(0)
 WRITE = write_register(0x64, 7)
@@ -144,21 +144,15 @@ class Roles(unittest.TestCase):
                 "localhost", program.http_port(), timeout=harness.PATIENCE,
                 context=self.made.context("panel"))
             self.addCleanup(connection.close)
-            self.assertEqual(self.status(connection), 200)
+            self.assertEqual(status_of(connection, "/readyz"), 200)
             file = self.made.folder / "panelgate.yaml"
             file.write_text(re.sub(", role_from: certificate", "", file.read_text()))
             program.process.send_signal(signal.SIGHUP)
             program.log.wait_for(" reload .*applied")
             own = connection.sock.getsockname()
-            self.assertEqual(self.status(connection), 200)
+            self.assertEqual(status_of(connection, "/readyz"), 200)
             self.assertEqual(connection.sock.getsockname(), own)
             self.assertNotIn("connection closed", program.log.text())
-
-    def status(self, connection):
-        connection.request("GET", "/readyz")
-        answer = connection.getresponse()
-        answer.read()
-        return answer.status
 
 
 if __name__ == "__main__":

@@ -12,6 +12,14 @@ from config import FREE_PORT, gateway, line
 ROLE = "1.3.6.1.4.1.50316.802.1"
 
 
+def status_of(connection, path):
+    """Of a GET over this http.client connection, which stays open."""
+    connection.request("GET", path)
+    answer = connection.getresponse()
+    answer.read()
+    return answer.status
+
+
 class Plant:
     def __init__(self, folder):
         self.folder = pathlib.Path(folder)

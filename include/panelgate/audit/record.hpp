@@ -64,4 +64,12 @@ class Composer {
     void append_time(WallTime time);
 };
 
+/// Members of a record, composed apart, for Composer::members(): `,"client":"..."`.
+template <class Add>
+std::string members_by(const Add& add) {
+    Composer part;
+    add(part);
+    return std::string(part.body());
+}
+
 }  // namespace panelgate::audit

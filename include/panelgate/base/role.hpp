@@ -73,6 +73,9 @@ struct Standing {
     std::string_view name() const { return own ? std::string_view(own->name) : label(role); }
     friend bool operator==(const Standing&, const Standing&) = default;
 };
+/// As much of it as is reading: of what others may without a role, what counts for a certificate
+/// whose own does not.
+Standing only_reading(const Standing& anonymous);
 /// A default role, or one of these; `none`, the least, for every other word.
 Standing standing_named(std::string_view word, std::span<const OwnRole> own);
 /// The least default role that has all of these rights.

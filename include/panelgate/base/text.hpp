@@ -1,9 +1,12 @@
 #pragma once
 
+#include <charconv>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 namespace panelgate {
 
@@ -16,6 +19,15 @@ std::string number_text(float value);
 
 /// Returns the double nearest to the float's shortest decimal: 0.1 for 0.1F.
 double as_printed(float value);
+
+/// Parses the whole text as an unsigned number of this base; nullopt on failure.
+template <class Number = unsigned>
+std::optional<Number> to_number(std::string_view text, int base = 10) {
+    Number number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, base);
+    if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+    return number;
+}
 
 /// Length in bytes of the UTF-8 sequence at the start of `text`; 0 if there is none (RFC 3629, 4).
 std::size_t utf8_sequence(std::string_view text);

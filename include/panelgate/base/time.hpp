@@ -1,7 +1,9 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
+#include <string_view>
 
 namespace panelgate {
 
@@ -22,6 +24,10 @@ using WallTime = std::chrono::sys_time<std::chrono::microseconds>;
 
 /// Formats RFC 3339 in UTC: "2026-11-22T07:15:19.000250Z".
 std::string rfc3339(WallTime time);
+/// Takes a number of `width` digits off the front of the text; nothing if it does not begin so.
+std::optional<int> take_number(std::string_view& text, std::size_t width);
+/// Takes a day, "2026-11-22", off; nothing if the text begins with none.
+std::optional<std::chrono::sys_days> take_day(std::string_view& text);
 
 /// Converts `then` to wall-clock time, where `wall` is the wall-clock time at `now`.
 inline WallTime wall_time_of(TimePoint then, TimePoint now, WallTime wall) {

@@ -61,4 +61,13 @@ struct Settings {
     }
 };
 
+/// True if every client has to show a certificate; without TLS none has.
+inline bool wants_certificate(const std::optional<Settings>& tls) {
+    return tls && tls->client == ClientCertificate::required;
+}
+/// True if the role in a client's certificate decides what it may.
+inline bool goes_by_certificates(const std::optional<Settings>& tls) {
+    return tls && tls->role_from_certificate;
+}
+
 }  // namespace panelgate::tls

@@ -28,11 +28,11 @@ Parsed<PointOfStation> point_of(const boost::json::object& entry, const Director
 /// The one item that {"station", "device"} or {"station", "table", "address"} names.
 Parsed<Items> item_of(const boost::json::object& entry, const Directory& directory);
 
-/// Prefixes the problem with "items[2]: ". A malformed entry fails the whole list, and nothing of
-/// it is done.
 /// What is wrong with an entry, or in its place that it is denied: as instead_of_telling().
 Problem told_of(const boost::json::object& entry, Problem why, const WhoRef& who,
                 const Directory& directory);
+/// Prefixes the problem with "items[2]: ". A malformed entry fails the whole list, and nothing of
+/// it is done.
 Problem in_entry(std::size_t index, Problem problem);
 
 /// Groups entries by line, in their order. `line_of` returns a line's name; null: skip the entry.

@@ -117,12 +117,7 @@ bool Sight::point(const StationEntry& station, const points::Point& point) const
 bool Sight::concerns(const StationEntry& one, std::string_view name) const {
     const LineEntry* on = directory_.find_line(one.line);
     if (on == nullptr || !on->access) return true;
-    const points::Point* named = nullptr;
-    if (one.points != nullptr && !name.empty()) {
-        const auto& all = one.points->points();
-        const auto found = std::ranges::find(all, name, &points::Point::name);
-        if (found != all.end()) named = &*found;
-    }
+    const points::Point* const named = one.points != nullptr ? one.points->find(name) : nullptr;
     if (named == nullptr)
         return station(*on, one.id) || on->access->may_some(who_, one.id, Act::write);
     const Span items{named->table, named->address, named->count()};
@@ -152,9 +147,8 @@ bool Sight::named(std::string_view line_name, std::string_view station_name,
     if (one == nullptr)
         return station(*on, to_number<std::uint8_t>(station_name).value_or(kUnlisted));
     if (point_name.empty() || one->points == nullptr) return station(*one);
-    const auto& all = one->points->points();
-    const auto at = std::ranges::find(all, point_name, &points::Point::name);
-    return at == all.end() ? whole(*on, one->id) : point(*one, *at);
+    const points::Point* const named = one->points->find(point_name);
+    return named == nullptr ? whole(*on, one->id) : point(*one, *named);
 }
 
 bool Sight::event(const EventTopic& topic) const {
@@ -234,9 +228,8 @@ std::optional<Problem> check_station(const HttpRequest& request, const Directory
     if (request.path.size() > 5 && !is_plan && !has_points) return std::nullopt;
     bool seen = sight.station(line, station->id);
     if (has_points && request.path.size() > 5 && station->points != nullptr) {
-        const auto& all = station->points->points();
-        const auto point = std::ranges::find(all, request.path[5], &points::Point::name);
-        if (point != all.end()) seen = sight.point(*station, *point);
+        const points::Point* const point = station->points->find(request.path[5]);
+        if (point != nullptr) seen = sight.point(*station, *point);
     }
     if (seen) return std::nullopt;
     return denied(line, sight.who(), station->id, station->name);

@@ -7,7 +7,6 @@
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/system/error_code.hpp>
-#include <charconv>
 #include <chrono>
 #include <map>
 #include <optional>
@@ -29,28 +28,18 @@ namespace {
 
 constexpr std::string_view kHashOf = "sha256:";
 
-/// Takes a number of `width` digits off; nullopt if it is none.
-std::optional<int> take_number(std::string_view& text, std::size_t width) {
-    if (text.size() < width) return std::nullopt;
-    int number = 0;
-    const auto [end, wrong] = std::from_chars(text.data(), text.data() + width, number);
-    if (wrong != std::errc{} || end != text.data() + width || number < 0) return std::nullopt;
-    text.remove_prefix(width);
-    return number;
-}
-
-/// The same for numbers between which `between` stands.
-std::optional<std::array<int, 3>> take_three(std::string_view& text, std::size_t first,
-                                             char between) {
-    std::array<int, 3> numbers{};
-    for (std::size_t i = 0; i < numbers.size(); ++i) {
-        if (i > 0 && !text.starts_with(between)) return std::nullopt;
+/// Takes "18:30:00" off; nullopt if it is none.
+std::optional<std::chrono::seconds> take_clock(std::string_view& text) {
+    constexpr std::array<int, 3> kMost{23, 59, 59};
+    std::chrono::seconds seconds{};
+    for (std::size_t i = 0; i < kMost.size(); ++i) {
+        if (i > 0 && !text.starts_with(':')) return std::nullopt;
         if (i > 0) text.remove_prefix(1);
-        const auto number = take_number(text, i == 0 ? first : 2);
-        if (!number) return std::nullopt;
-        numbers[i] = *number;
+        const auto number = take_number(text, 2);
+        if (!number || *number > kMost[i]) return std::nullopt;
+        seconds = seconds * 60 + std::chrono::seconds(*number);
     }
-    return numbers;
+    return seconds;
 }
 
 }  // namespace
@@ -69,20 +58,14 @@ bool is_token_hash(std::string_view text) {
 }
 
 std::optional<WallTime> parse_expiry(std::string_view text) {
-    using namespace std::chrono;
-    const auto date = take_three(text, 4, '-');
-    if (!date) return std::nullopt;
-    const year_month_day day{year((*date)[0]), month(static_cast<unsigned>((*date)[1])),
-                             std::chrono::day(static_cast<unsigned>((*date)[2]))};
-    if (!day.ok()) return std::nullopt;
-    if (text.empty()) return WallTime(sys_days(day) + days(1));
-    if (!text.starts_with('T') || !text.ends_with('Z')) return std::nullopt;
+    const auto day = take_day(text);
+    if (!day) return std::nullopt;
+    if (text.empty()) return WallTime(*day + std::chrono::days(1));
+    if (!text.starts_with('T')) return std::nullopt;
     text.remove_prefix(1);
-    const auto time = take_three(text, 2, ':');
+    const auto time = take_clock(text);
     if (!time || text != "Z") return std::nullopt;
-    const auto [hour, minute, second] = *time;
-    if (hour > 23 || minute > 59 || second > 59) return std::nullopt;
-    return WallTime(sys_days(day) + hours(hour) + minutes(minute) + seconds(second));
+    return WallTime(*day + *time);
 }
 
 std::string expiry_text(WallTime expires) {
@@ -129,14 +112,10 @@ const Token* token_of(const HttpRequest& request, const Settings& settings) {
     return found;
 }
 
-bool has_expired(const Token& token, const HttpRequest& request) {
-    return token.expires && *token.expires <= request.at;
-}
-
 /// The same; null too if it has expired.
 const Token* valid_token_of(const HttpRequest& request, const Settings& settings) {
     const Token* token = token_of(request, settings);
-    return token == nullptr || has_expired(*token, request) ? nullptr : token;
+    return token == nullptr || token->has_expired(request.at) ? nullptr : token;
 }
 
 Problem unauthorized(std::string detail) {
@@ -205,7 +184,7 @@ std::optional<Problem> check_access(const HttpRequest& request, Role needed,
         return unauthorized("this gateway knows tokens only; send 'Authorization: Bearer TOKEN'");
     const Token* token = token_of(request, settings);
     if (token == nullptr) return unauthorized("this token is not known");
-    if (has_expired(*token, request))
+    if (token->has_expired(request.at))
         return unauthorized("this token has expired, on " + rfc3339(*token->expires));
     if (!suffices(token->standing, needed, right, or_right))
         return insufficient(token->standing, needed, right);
@@ -223,13 +202,6 @@ std::optional<Problem> check_encoding(const HttpRequest& request) {
     Problem made = problem(415, "send the body as it is, without a Content-Encoding");
     made.headers.emplace_back("Accept-Encoding", "identity");  // RFC 9110 15.5.16
     return made;
-}
-
-Standing only_reading(const Standing& anonymous) {
-    if (!anonymous.may(Right::read)) return {};
-    const auto may_more = [&](Right right) { return right != Right::read && anonymous.may(right); };
-    if (std::ranges::none_of(kAllRights, may_more)) return anonymous;
-    return {Role::viewer, std::nullopt};
 }
 
 Standing standing_of(const HttpRequest& request, const Settings& settings) {

@@ -28,9 +28,6 @@ std::optional<Problem> check_encoding(const HttpRequest& request);
 /// that; else the anonymous one. None for an unknown token.
 Standing standing_of(const HttpRequest& request, const Settings& settings);
 
-/// What a certificate without a role that counts may: no more than to read.
-Standing only_reading(const Standing& anonymous);
-
 /// Returns the name of its token, "" without a known one.
 std::string token_name(const HttpRequest& request, const Settings& settings);
 

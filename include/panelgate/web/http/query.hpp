@@ -1,25 +1,14 @@
 #pragma once
 
-#include <charconv>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
-#include <system_error>
 
+#include "panelgate/base/text.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::web {
-
-/// Parses the whole text as an unsigned number of this base; nullopt on failure.
-template <class Number = unsigned>
-std::optional<Number> to_number(std::string_view text, int base = 10) {
-    Number number = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, base);
-    if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-    return number;
-}
 
 /// Returns 400 for an unknown or repeated query.
 std::optional<Problem> check_queries(const HttpRequest& request,

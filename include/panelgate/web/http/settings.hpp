@@ -21,6 +21,8 @@ struct Token {
     std::string file{};
     std::size_t characters = 0;         ///< of the token; 0: its file holds the hash
     std::optional<WallTime> expires{};  ///< from then on it is not known any more
+
+    bool has_expired(WallTime now) const { return expires && *expires <= now; }
     friend bool operator==(const Token&, const Token&) = default;
 };
 
