@@ -37,9 +37,9 @@ struct TopicRefusal;
 /// `audit:` it records nothing. One thread.
 class AuditBook {
   public:
-    static constexpr std::size_t kNotations = 4096;  ///< of a station, kept
-    static constexpr std::size_t kClients = 1024;    ///< whose members are kept
-    static constexpr std::size_t kChanges = 200;     ///< of a reload, told
+    static constexpr std::size_t kPlaces = 4096;   ///< of a station, whose members are kept
+    static constexpr std::size_t kClients = 1024;  ///< whose members are kept
+    static constexpr std::size_t kChanges = 200;   ///< of a reload, told
     static constexpr unsigned kNotSent = 3;  ///< writes to one place that were not sent, in full
 
     /// The clock outlives it.
@@ -129,12 +129,11 @@ class AuditBook {
     struct Known {
         const Station* station = nullptr;
         std::string members{};  ///< of a record, that tell where it is
-        std::unordered_map<std::uint32_t, std::string> notations{};  ///< by table and address
+        std::unordered_map<std::uint64_t, std::string> places{};  ///< members that tell what
         std::optional<TimePoint> written{};  ///< the last write that may have had an effect
     };
     Known* find(const std::string& line, std::uint8_t id);
-    std::string place_of(Known* known, const modbus::Span& items);
-    const std::string& notation_of(Known& known, const modbus::Span& items);
+    void add_place(Known* known, std::uint8_t function, const modbus::Span& items);
 
     std::shared_ptr<const Snapshot> snapshot_;
     std::map<std::string, std::map<std::uint8_t, Known>, std::less<>> known_;

@@ -130,6 +130,14 @@ Composer& Composer::text(std::string_view name, std::string_view value) {
     return *this;
 }
 
+Composer& Composer::word(std::string_view name, std::string_view value) {
+    key(name);
+    body_ += '"';
+    body_ += value;
+    body_ += '"';
+    return *this;
+}
+
 Composer& Composer::number(std::string_view name, std::uint64_t value) {
     key(name);
     append_number(body_, value);

@@ -43,6 +43,8 @@ class Composer {
     Composer& begin(WallTime time, Kind kind);
     /// An empty text is left out.
     Composer& text(std::string_view key, std::string_view value);
+    /// A text of ours, in which nothing needs to be escaped: an identifier.
+    Composer& word(std::string_view key, std::string_view value);
     Composer& number(std::string_view key, std::uint64_t value);
     Composer& flag(std::string_view key, bool value);
     Composer& time(std::string_view key, WallTime value);
