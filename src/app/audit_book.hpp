@@ -68,6 +68,8 @@ class AuditBook {
     void deed(const web::Deed& deed);
     /// A client of what MQTT refuses before it comes to a bus; it may outlive this.
     std::function<void(const TopicRefusal&)> topic_refusals();
+    /// A client of the writes over Modbus/TCP that come to no line; it may outlive this.
+    std::function<void(const WhoRef&, std::uint8_t unit, ByteView pdu)> stray_writes();
     /// A reload or a rollback, and what it changed.
     void reload(const web::ReloadVerdict& verdict);
     /// Tokens that came, went or changed.

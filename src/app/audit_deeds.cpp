@@ -121,6 +121,23 @@ std::function<void(const TopicRefusal&)> AuditBook::topic_refusals() {
     };
 }
 
+std::function<void(const WhoRef&, std::uint8_t, ByteView)> AuditBook::stray_writes() {
+    return [this, life = std::weak_ptr(alive_)](const WhoRef& who, std::uint8_t unit,
+                                                ByteView pdu) {
+        if (life.expired() || !trail_ || pdu.empty()) return;
+        what_ = "unit\t" + std::to_string(unit) + '\t' + std::to_string(pdu[0]);
+        const auto members = [&](audit::Composer& record) {
+            record.number("unit", unit).number("function", pdu[0]).word("outcome", "refused");
+        };
+        if (is_repeat(who, what_, 1, [&] { return audit::members_by(members); })) return;
+        begin(Kind::refusal);
+        add_who(who);
+        members(composer_);
+        composer_.hex("pdu", pdu).text("why", "the unit leads to no station that can be written");
+        record();
+    };
+}
+
 void AuditBook::reload(const web::ReloadVerdict& verdict) {
     if (!trail_) return;
     begin(Kind::reload).text("cause", verdict.cause).flag("rollback", verdict.rollback);

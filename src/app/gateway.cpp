@@ -79,7 +79,7 @@ Gateway::Gateway(boost::asio::any_io_executor executor,
       simulate_(simulate),
       reloads_(reloads),
       events_(new_epoch()),
-      servers_(executor_, clock_),
+      servers_(executor_, clock_, audit_.stray_writes()),
       northbound_(executor_, clock_, audit_.topic_refusals()) {
     Lines lines = lines_of(*config);
     for (std::size_t i = 0; i < lines.size(); ++i)

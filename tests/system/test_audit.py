@@ -386,6 +386,20 @@ class Refusing(Case):
         self.assertEqual((of_meter[-1]["count"], of_meter[-1]["at"], of_meter[-1]["rule"]), (100, of_meter[7]["at"], "access"))
         self.assertEqual([one["count"] for one in kept if one.get("at") == "other places"], [136])
 
+    def test_a_write_that_leads_to_no_station_is_recorded_once(self):
+        self.write_config()
+        self.folder.mkdir()
+        with self.gateway() as program, program.client() as client:
+            for unit, code in ((250, 0x0A), (255, 0x01)):
+                for _ in range(3):
+                    self.assertEqual(client.ask(unit, write_register(4, 5)), bytes([0x86, code]))
+                client.ask(unit, read_registers(1))
+        stray = [(one["kind"], one["unit"], one["function"], one.get("pdu"), one.get("count"), one["outcome"])
+                 for one in records(self.folder) if "unit" in one]
+        self.assertEqual(sorted(stray, key=str), sorted(
+            (row for unit in (250, 255) for row in (("refusal", unit, 6, "0600040005", None, "refused"),
+                                                   ("repeats", unit, 6, None, 2, "refused"))), key=str))
+
     def test_reload_tells_who_changed_what_and_goes_on_in_another_file(self):
         self.write_config(anonymous="admin")
         self.folder.mkdir()
