@@ -338,22 +338,29 @@ bool Writer::rotate() {
         return fail("cannot rename " + settings_.file);
     close();
     ++rotations_;
-    drop_oldest();
+    const std::vector<std::string> oldest = find_oldest();
     if (!open() || !resume()) {
         close();
         return false;
     }
+    // The new file says which ones are kept before the others go: a crash between leaves too many.
+    errno = 0;
+    const bool begun = flush() && sync();
+    if (begun || errno == ENOSPC)
+        for (const std::string& name : oldest) std::remove(name.c_str());
     sync_folder(settings_.file);
-    return true;
+    return begun;
 }
 
-void Writer::drop_oldest() {
-    const auto older = rotated_files(settings_.file);
-    if (older.size() <= settings_.keep) return;
-    const std::size_t count = older.size() - settings_.keep;
-    for (std::size_t i = 0; i < count; ++i) std::remove(older[i].c_str());
+/// The files that are too many; what is kept begins behind them.
+std::vector<std::string> Writer::find_oldest() {
+    std::vector<std::string> oldest = rotated_files(settings_.file);
+    if (oldest.size() <= settings_.keep) return {};
+    const std::size_t count = oldest.size() - settings_.keep;
     from_ = chain_.last().number + 1;
-    if (settings_.keep > 0) from_ = number_in(older[count], settings_.file).value_or(from_);
+    if (settings_.keep > 0) from_ = number_in(oldest[count], settings_.file).value_or(from_);
+    oldest.resize(count);
+    return oldest;
 }
 
 }  // namespace panelgate::audit

@@ -57,7 +57,7 @@ class Writer {
     void read_head(std::string_view head);
     void resume_after_older();
     bool rotate();
-    void drop_oldest();
+    std::vector<std::string> find_oldest();
     void begin_file();
     void begin_run();
     void seal();

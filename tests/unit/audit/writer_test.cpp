@@ -306,6 +306,35 @@ TEST_F(AuditWriter, WhatAFullDiskDidNotTakeIsWrittenToAnotherFile) {
     EXPECT_FALSE(verify({other.file}).fault);
 }
 
+TEST_F(AuditWriter, ARotationThatIsCutOffHasDroppedNothingYet) {
+    Settings small = settings();
+    small.rotate = 1000;
+    small.keep = 1;
+    const auto writer = make(small);
+    for (int i = 0; writer->rotations() < 2 || fs::file_size(file) < small.rotate; ++i)
+        ASSERT_TRUE(write(*writer, i, i + 1));
+    const auto verify_all = [&] {
+        Verifier all({}, true);
+        auto names = rotated_files(file);
+        names.push_back(file);
+        for (const std::string& one : names) {
+            all.begin_file(one);
+            for (const std::string& line : lines_of(one)) all.take(line, true);
+        }
+        return all.finish();
+    };
+    {
+        const FullDisk full(0);  // the new file stays empty, as it does where the power is cut
+        EXPECT_FALSE(write(*writer, 200, 201));
+    }
+    ASSERT_EQ(writer->rotations(), 3U);
+    ASSERT_EQ(fs::file_size(file), 0U);
+    const Report cut = verify_all();
+    EXPECT_FALSE(cut.fault) << cut.fault->text;
+    ASSERT_TRUE(writer->work());
+    EXPECT_FALSE(verify_all().fault);
+}
+
 TEST_F(AuditWriter, SaysWhyAFileCannotBeOpened) {
     Settings nowhere = settings();
     nowhere.file = (folder.path() / "no" / "audit.jsonl").string();
