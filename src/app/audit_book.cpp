@@ -365,14 +365,15 @@ bool AuditBook::is_vain_repeat(const std::string& line, const bus::WriteEnd& end
 }
 
 bool AuditBook::is_repeat(const WhoRef& who, std::string_view what, unsigned in_full,
-                          const std::function<std::string()>& more) {
+                          const std::function<std::string()>& more, bool shares) {
     make_client_key(key_, who);
     const std::size_t client = key_.size();
     key_ += what;
     const auto members = [&] { return client_members(who); };
-    const bool is_new = repeats_.is_new(clock_.now(), rt::wall_now(), key_, in_full,
-                                        [&] { return members() + more(); },
-                                        {std::string_view(key_).substr(0, client), members});
+    const audit::Repeats::Client one{std::string_view(key_).substr(0, shares ? client : 0),
+                                     members};
+    const bool is_new = repeats_.is_new(
+        clock_.now(), rt::wall_now(), key_, in_full, [&] { return members() + more(); }, one);
     if (!waits_) wait_for_repeats();
     return !is_new;
 }

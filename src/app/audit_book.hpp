@@ -101,9 +101,10 @@ class AuditBook {
     void add_write(const std::string& line, const bus::WriteEnd& end, Known* known);
     void add_values(ByteView pdu, const modbus::Span& items);
     void add_before(const Known& known, const modbus::Span& items);
-    /// True if it was counted. `more`: members that tell what is repeated, besides the client.
+    /// True if it was counted. `more`: members that tell what is repeated, besides the client;
+    /// `shares`: where the client repeats many things, it is counted with the others.
     bool is_repeat(const WhoRef& who, std::string_view what, unsigned in_full,
-                   const std::function<std::string()>& more);
+                   const std::function<std::string()>& more, bool shares = true);
     bool is_vain_repeat(const std::string& line, const bus::WriteEnd& end, Known* known);
     void refusal(const web::Deed& deed);
     void record_refusal(const Refused& refused);

@@ -44,7 +44,9 @@ void AuditBook::deed(const web::Deed& deed) {
     const bool discovers = deed.path.ends_with("/discover");
     const bool simulates = deed.path.find("/simulator/") != deed.path.npos;
     if (deed.status == 401 && deed.shown_token) {
-        if (is_repeat(deed.who, "login", 1, [&] { return member("outcome", "log-in failed"); }))
+        // One key a client: it always has a place of its own.
+        if (is_repeat(
+                deed.who, "login", 1, [&] { return member("outcome", "log-in failed"); }, false))
             return;
         begin(Kind::login);
         add_who(deed.who);

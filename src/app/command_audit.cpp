@@ -13,8 +13,11 @@
 #include "commands.hpp"
 #include "load.hpp"
 #include "panelgate/audit/files.hpp"
+#include "panelgate/audit/record.hpp"
 #include "panelgate/audit/verify.hpp"
 #include "panelgate/cli/audit_text.hpp"
+#include "panelgate/cli/place.hpp"
+#include "panelgate/config/config.hpp"
 #include "panelgate/rt/clock.hpp"
 
 namespace panelgate::app {
@@ -40,7 +43,8 @@ std::string head_of(const std::string& file) {
 /// Which files are meant: these, or all of the chain that is written to one.
 struct Named {
     Files files;
-    std::string chain;  ///< the file that is written; empty: `files` were named
+    std::string chain{};                   ///< the file that is written; empty: `files` were named
+    std::vector<cli::Station> stations{};  ///< of the configuration, if that names the files
 
     /// The files there are now, oldest first. A rotation while they are read makes others of them.
     Files now() const {
@@ -55,7 +59,7 @@ struct Named {
 
 /// The files that were named, or those of the configuration.
 std::optional<Named> named_by(const AuditOptions& options, ExitCode& code) {
-    Named named{options.files, {}};
+    Named named{options.files};
     if (named.files.empty()) {
         Loaded loaded = load_file(options.config);
         code = loaded.code;
@@ -67,6 +71,9 @@ std::optional<Named> named_by(const AuditOptions& options, ExitCode& code) {
             return std::nullopt;
         }
         named.chain = loaded.config->audit->file;
+        for (const config::Line& line : loaded.config->lines)
+            for (const config::Station& station : line.stations)
+                named.stations.push_back({station.name, line.name, station.id});
     }
     std::error_code unknown;
     for (const std::string& file : named.now()) {
@@ -178,8 +185,35 @@ ExitCode audit_verify(const AuditOptions& options) {
 
 namespace {
 
+/// Which station is meant. What only an earlier configuration had is looked for by its name;
+/// `doubt`: what to say if nothing is found.
+void set_station(cli::AuditFilter& filter, const std::string& typed, const Named& named,
+                 std::string& doubt) {
+    if (typed.empty()) return;
+    cli::FoundStation found = cli::station_of(named.stations, typed);
+    if (!found.wrong.empty()) {
+        const std::size_t slash = std::min(typed.find_first_of("/:"), typed.size());
+        filter.station = typed;
+        filter.line = slash < typed.size() ? typed.substr(0, slash) : "";
+        filter.id = slash < typed.size() ? typed.substr(slash + 1) : "";
+        if (!named.chain.empty()) doubt = std::move(found.wrong);
+        return;
+    }
+    filter.station = found.station.name;
+    filter.line = found.station.line;
+    filter.id = std::to_string(found.station.id);
+}
+
 std::optional<cli::AuditFilter> filter_of(const AuditOptions& options) {
-    cli::AuditFilter filter{options.station, options.kind, options.client, {}, {}};
+    cli::AuditFilter filter;
+    filter.kind = options.kind;
+    filter.client = options.client;
+    const std::vector<std::string> kinds = audit::kind_labels();
+    if (!filter.kind.empty() && std::ranges::find(kinds, filter.kind) == kinds.end()) {
+        std::cerr << "panelgate: audit: there is no kind '" << filter.kind << '\''
+                  << cli::suggestion(filter.kind, kinds) << '\n';
+        return std::nullopt;
+    }
     for (const auto& [typed, option, into] :
          {std::tuple{&options.since, "--since", &filter.since},
           std::tuple{&options.until, "--until", &filter.until}}) {
@@ -208,10 +242,12 @@ bool print_record(std::string_view line, const cli::AuditFilter& filter, bool as
 
 ExitCode audit_show(const AuditOptions& options) {
     ExitCode code = kFine;
-    const auto filter = filter_of(options);
+    auto filter = filter_of(options);
     if (!filter) return kUsage;
     const auto named = named_by(options, code);
     if (!named) return code;
+    std::string doubt;
+    set_station(*filter, options.station, *named, doubt);
     bool any = false;
     const Files files = named->now();
     for (const std::string& file : files) {
@@ -223,6 +259,8 @@ ExitCode audit_show(const AuditOptions& options) {
         const bool has_rotated = !named->chain.empty() && named->now() != files;
         if (!why.empty() && !has_rotated) return cannot_read(file, why);
     }
+    if (!any && !doubt.empty())
+        std::cerr << "panelgate: audit: " << doubt << ", and no record names it\n";
     return any ? kFine : kNo;
 }
 
