@@ -130,11 +130,12 @@ std::string client_members(const WhoRef& who) {
     });
 }
 
-void log_anchor(const audit::Position& at, const std::string& chain) {
+void log_anchor(const audit::Position& at, const std::string& chain, const std::string& file) {
     rt::log(rt::LogLevel::info, "audit anchor",
             {{"number", std::to_string(at.number)},
              {"hash", std::string(text_of(at.hash))},
-             {"chain", chain}});
+             {"chain", chain},
+             {"file", file}});
 }
 
 /// What the disk has not taken is gone: the log is the only place that can say so.
@@ -142,7 +143,7 @@ void tell_of_end(const audit::Trail::End& end, const std::string& file) {
     if (end.unwritten > 0)
         rt::log(rt::LogLevel::error, "audit records lost",
                 {{"count", std::to_string(end.unwritten)}, {"file", file}});
-    if (end.last.number > 0) log_anchor(end.last, end.chain);
+    if (end.last.number > 0) log_anchor(end.last, end.chain, file);
 }
 
 }  // namespace
@@ -195,7 +196,7 @@ void AuditBook::tell(const audit::Notice& notice) {
             return rt::log(rt::LogLevel::info, "audit recovered",
                            {{"file", file_}, {"lost", std::to_string(counters().lost)}});
         case Notice::anchor:
-            return log_anchor(notice.at, notice.text);
+            return log_anchor(notice.at, notice.text, file_);
         case Notice::remark:
             return rt::log(rt::LogLevel::warn, "audit file",
                            {{"file", file_}, {"why", notice.text}});

@@ -172,7 +172,7 @@ ExitCode audit_verify(const AuditOptions& options) {
     for (int tries = 1;; ++tries) {
         const Files files = named->now();
         const auto before = identities(files);
-        audit::Verifier verifier(*anchors, options.files.empty());
+        audit::Verifier verifier(*anchors, named->chain);
         const auto unread = read_into(verifier, files);
         const audit::Report report = verifier.finish();
         // A rotation meanwhile looks as if records were removed, or added.

@@ -112,7 +112,9 @@ LineWatch Gateway::watch() {
         audit_.write(line, end);
     };
     watch.refuses_writes = [this] { return audit_.refuses_writes(); };
-    watch.admit = [this](const WhoRef& who) { return doors_.admit(who, rt::wall_now()); };
+    watch.admit = [this](const WhoRef& who, const std::string& line, std::uint8_t station) {
+        return doors_.admit(who, line, station, rt::wall_now());
+    };
     return watch;
 }
 
