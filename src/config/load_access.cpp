@@ -79,7 +79,7 @@ std::optional<std::string> origin_of(std::string text) {
 
 void load_cors(Loading& loading, yaml::MapReader& in, std::vector<std::string>& origins) {
     const yaml::Node* list = in.sequence("cors");
-    in.looks_like("cors", "^[Hh][Tt][Tt][Pp][Ss]?://\\[?[A-Za-z0-9._:-]+\\]?(:[0-9]{1,5})?$", true);
+    in.looks_like("cors", "^[Hh][Tt][Tt][Pp][Ss]?://\\[?[A-Za-z0-9._:-]+\\]?(:[0-9]{1,5})?$");
     if (list == nullptr) return;
     for (const yaml::Node& item : list->items) {
         if (auto origin = origin_of(item.scalar)) {

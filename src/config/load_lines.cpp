@@ -165,9 +165,6 @@ constexpr std::string_view kRs485Example = "{mode: off}";
 constexpr std::string_view kLineExample = "{name: floor1, device: /dev/ttyUSB0}";
 constexpr std::string_view kLineListExample = "[{name: floor1, device: /dev/ttyUSB0}]";
 
-constexpr std::string_view kAtTheTop =
-    "it belongs at the top level of the file, in the column of 'lines', not inside a line";
-
 /// Keys that users write beside `device`.
 std::vector<yaml::Elsewhere> keys_elsewhere() {
     static constexpr std::array<std::string_view, 3> kParities{"none", "even", "odd"};
@@ -189,8 +186,6 @@ std::vector<yaml::Elsewhere> keys_elsewhere() {
     add(line_timing_keys().names(), "timing");
     add(queue_keys().names(), "queue");
     add(offline_keys().names(), "offline");
-    for (const std::string_view key : root_keys().names())
-        if (key != "lines") all.push_back({key, {}, {}, kAtTheTop});
     return all;
 }
 
@@ -207,6 +202,7 @@ Line load_line(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a line", kLineExample);
     static const std::vector<yaml::Elsewhere> kElsewhere = keys_elsewhere();
     in.elsewhere(kElsewhere);
+    in.elsewhere(loading.top_keys);
     Line line;
     line.name = load_name(in, true).value_or("");
     if (!line.name.empty()) {

@@ -34,8 +34,10 @@ void load_rights(Loading& loading, MapReader& in, OwnRole& role) {
         pattern += (pattern.empty() ? "^(" : "|") + std::string(word);
     in.looks_like("rights", pattern + ")$");
     const Node* list = in.sequence("rights", "[read, write]");
-    in.schema("rights").fewest = 1;
-    in.schema("rights").required = true;
+    yaml::KeyShape& schema = in.schema("rights");
+    schema.fewest = 1;
+    schema.required = true;
+    schema.may_be_null = false;
     if (list == nullptr || list->items.empty()) {
         in.problem(list == nullptr ? "name" : "rights",
                    "a role needs rights, such as rights: [read, write]");

@@ -158,7 +158,10 @@ void load_stations(Loading& loading, MapReader& in, Rule& rule) {
 
 void load_functions(Loading& loading, MapReader& in, Rule& rule) {
     constexpr std::int64_t kLast = 127;
-    in.schema("functions").holds_integers = true;
+    yaml::KeyShape& schema = in.schema("functions");
+    schema.holds_integers = true;
+    schema.min = 1;
+    schema.max = kLast;
     for (const Node* item : in.items("functions", "[16, 23]", kAny)) {
         const auto code = yaml::parse_integer(item->scalar);
         if (code && *code >= 1 && *code <= kLast) {
@@ -297,18 +300,19 @@ void warn_of_rules(Loading& loading) {
 }  // namespace
 
 void load_rules(Loading& loading, MapReader& root) {
-    const Node* node = root.map("access", "{default: allow, rules: [{name: a, deny: [write]}]}");
+    load_section(
+        loading, root, "access", "{default: allow, rules: [{name: a, deny: [write]}]}",
+        [&](MapReader& in) {
+            rules_keys().read(in, loading.config.access);
+            // load_own_roles() reads them
+            in.sequence("roles", "[{name: setter, rights: [read, write]}]");
+            in.at_most("roles", access::Settings::kMaxRoles, "roles");
+            const Node* list = in.sequence("rules", "[" + std::string(kRuleExample) + "]");
+            if (!in.at_most("rules", access::Settings::kMaxRules, "rules") || list == nullptr)
+                return;
+            for (const Node& item : list->items) load_rule(loading, item);
+        });
     root.refuse_empty("access", "leave it out for no rules");
-    if (node == nullptr) return;
-    MapReader in(*node, loading.problems, "access");
-    rules_keys().read(in, loading.config.access);
-    in.sequence("roles", "[{name: setter, rights: [read, write]}]");  // load_own_roles() reads them
-    in.at_most("roles", access::Settings::kMaxRoles, "roles");
-    const Node* list = in.sequence("rules", "[" + std::string(kRuleExample) + "]");
-    if (in.at_most("rules", access::Settings::kMaxRules, "rules") && list != nullptr) {
-        for (const Node& item : list->items) load_rule(loading, item);
-    }
-    in.finish();
     if (loading.problems.empty()) warn_of_rules(loading);
 }
 

@@ -365,24 +365,21 @@ void load_modbus_tcp(Loading& loading, MapReader& root) {
 }
 
 void load_http(Loading& loading, MapReader& root) {
-    const Node* node = root.map("http", "{listen: 127.0.0.1:8080}");
-    if (node == nullptr) return;
-    MapReader in(*node, loading.problems, "http");
-    web::Settings settings;
-    load_listen(in, settings);
-    if (auto standing = load_role(loading, in, "anonymous", true))
-        settings.anonymous = std::move(*standing);
-    http_keys().read(in, settings);
-    load_hosts(loading, in, settings);
-    load_cors(loading, in, settings.cors);
-    load_networks(loading, in, "allow", settings.allow);
-    load_tokens(loading, in, settings.tokens);
-    settings.tls = load_tls(loading, in);
-    in.finish();
-    if (settings.port != 0)
-        loading.firsts.once(in, "listen", "listener " + settings.name(),
-                            settings.name() + " is a modbus_tcp listener already");
-    loading.config.http = std::move(settings);
+    load_section(loading, root, "http", "{listen: 127.0.0.1:8080}", [&](MapReader& in) {
+        web::Settings& settings = loading.config.http.emplace();
+        load_listen(in, settings);
+        if (auto standing = load_role(loading, in, "anonymous", true))
+            settings.anonymous = std::move(*standing);
+        http_keys().read(in, settings);
+        load_hosts(loading, in, settings);
+        load_cors(loading, in, settings.cors);
+        load_networks(loading, in, "allow", settings.allow);
+        load_tokens(loading, in, settings.tokens);
+        settings.tls = load_tls(loading, in);
+        if (settings.port != 0)
+            loading.firsts.once(in, "listen", "listener " + settings.name(),
+                                settings.name() + " is a modbus_tcp listener already");
+    });
 }
 
 }  // namespace panelgate::config

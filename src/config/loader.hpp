@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/describe.hpp"
@@ -43,7 +44,8 @@ struct Loading {
     std::set<std::string> station_names;
     /// `lines`, or a line's `stations`, was no list: names that are not known may be right.
     bool names_missing = false;
-    Firsts firsts{};  ///< "line floor1", "device /dev/ttyS1"
+    Firsts firsts{};                          ///< "line floor1", "device /dev/ttyS1"
+    std::vector<yaml::Elsewhere> top_keys{};  ///< of the file, for maps that may end unnoticed
 
     /// The file that a text of the configuration names.
     std::string path_of(const std::string& typed) const { return beside(problems.file(), typed); }
@@ -65,6 +67,16 @@ void load_map(yaml::MapReader& in, std::string_view key, std::string_view exampl
     yaml::MapReader inside(*node, in.problems(), std::string(key));
     load(inside);
     inside.finish();
+}
+
+/// The same for a map at the top level: a key that belongs beside it is told so.
+template <class Load>
+void load_section(Loading& loading, yaml::MapReader& root, std::string_view key,
+                  std::string_view example, const Load& load) {
+    load_map(root, key, example, [&](yaml::MapReader& in) {
+        in.elsewhere(loading.top_keys);
+        load(in);
+    });
 }
 
 /// Line and station names: [a-z0-9-]+.

@@ -204,21 +204,33 @@ std::string MapReader::unknown(std::size_t entry) const {
 }
 
 std::string MapReader::place_of(const Entry& entry, bool exactly) const {
-    for (const Elsewhere& place : elsewhere_) {
-        const bool near = !exactly && nearest(entry.key, std::span(&place.key, 1)) == place.key;
-        if (entry.key != place.key && !near) continue;
-        const std::string key(place.key);
-        if (!place.instead.empty()) return "; " + std::string(place.instead);
-        if (place.map.empty())
-            return (near ? "; did you mean '" + key + "', a key of " : "; it is a key of ") +
-                   std::string(place.owner) + (near ? "?" : "");
-        const Node& value = entry.value;
-        std::string shown = nearest(value.scalar, place.words);
-        if (shown.empty())
-            shown = value.kind == Node::Kind::scalar ? std::string(clip(value.scalar, 40)) : "...";
-        return "; write " + std::string(place.map) + ": {" + key + ": " + shown + '}';
+    for (const std::span<const Elsewhere> keys : elsewhere_) {
+        for (const Elsewhere& place : keys) {
+            const bool near = !exactly && nearest(entry.key, std::span(&place.key, 1)) == place.key;
+            if (entry.key == place.key || near) return told(place, entry, near);
+        }
     }
     return "";
+}
+
+std::string MapReader::told(const Elsewhere& place, const Entry& entry, bool near) const {
+    const std::string key(place.key);
+    const Mark first = node_->entries.front().mark;
+    // The first key may be behind a dash; those in { } have no line of their own.
+    const bool in_column = &entry != &node_->entries.front() && node_->mark.line == first.line &&
+                           node_->mark.column == first.column;
+    if (!place.instead.empty()) return "; " + std::string(place.instead);
+    if (place.top_column > 0 && !near && in_column)
+        return "; it belongs at the top level of the file; take away " +
+               std::to_string(entry.mark.column - place.top_column) + " blanks";
+    if (place.map.empty())
+        return (near ? "; did you mean '" + key + "', a key of " : "; it is a key of ") +
+               std::string(place.owner) + (near ? "?" : "");
+    const Node& value = entry.value;
+    std::string shown = nearest(value.scalar, place.words);
+    if (shown.empty())
+        shown = value.kind == Node::Kind::scalar ? std::string(clip(value.scalar, 40)) : "...";
+    return "; write " + std::string(place.map) + ": {" + key + ": " + shown + '}';
 }
 
 bool MapReader::refuse(std::string_view key, const std::string& why) {

@@ -22,6 +22,7 @@ struct Elsewhere {
     std::string_view owner;         ///< what has it: "a station"
     std::string_view instead = {};  ///< if nothing has it: what to do, "remove it: ..."
     std::span<const std::string_view> words = {};  ///< its possible values, if it has such
+    int top_column = 0;  ///< the column of the top level, if it is a key of that; else 0
 };
 
 /// Reads the keys of one map with types and ranges. Every getter returns nothing if the key is
@@ -112,8 +113,8 @@ class MapReader {
     void belongs(std::string_view key, std::string_view other,
                  std::span<const std::string_view> words, bool absent = false);
 
-    /// Sets keys that belong in another map, which finish() then names. Must outlive this.
-    void elsewhere(std::span<const Elsewhere> keys) { elsewhere_ = keys; }
+    /// Adds keys that belong in another map, which finish() then names. Must outlive this.
+    void elsewhere(std::span<const Elsewhere> keys) { elsewhere_.push_back(keys); }
 
     /// Returns the place of the key's value (of the map if the key is absent), for later problems.
     Mark mark(std::string_view key) const;
@@ -150,6 +151,7 @@ class MapReader {
     std::string is_unknown(std::string_view key) const;
     std::string unknown(std::size_t entry) const;
     std::string place_of(const Entry& entry, bool exactly) const;
+    std::string told(const Elsewhere& place, const Entry& entry, bool near) const;
 
     const Node* node_;
     Problems* problems_;
@@ -159,7 +161,7 @@ class MapReader {
     std::vector<std::string> excused_;  ///< required, absent, and probably mistyped
     std::vector<std::string> parents_;  ///< known keys with a map or a list
     std::vector<std::pair<std::string_view, std::string>> not_empty_;
-    std::span<const Elsewhere> elsewhere_;
+    std::vector<std::span<const Elsewhere>> elsewhere_;
     int order_ = 0;  ///< of about()
 };
 
