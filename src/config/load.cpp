@@ -380,19 +380,6 @@ std::string name_hint(std::string_view typed) {
     return name.empty() ? "" : "; write " + name;
 }
 
-std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
-                         std::string_view noun) {
-    const std::string near = nearest(typed, known);
-    if (!near.empty()) return "; did you mean '" + near + "'?";
-    if (known.empty()) return "; there are none";
-    std::string list;
-    constexpr std::size_t kMost = 30;
-    for (const std::string_view word : known.first(std::min(kMost, known.size())))
-        list += (list.empty() ? "" : ", ") + std::string(word);
-    if (known.size() > kMost) list += " and " + std::to_string(known.size() - kMost) + " more";
-    return "; known " + std::string(noun) + " are " + list;
-}
-
 std::optional<bool> load_read_only(MapReader& in) {
     const yaml::Node* access = in.child("access");
     if (access != nullptr && access->kind != yaml::Node::Kind::scalar) {

@@ -91,8 +91,6 @@ using serial_server::Settings;
 using tcp_server::BroadcastMode;
 
 constexpr std::string_view kMasterExample = "{name: plc, device: /dev/ttyUSB1, lines: [floor1]}";
-constexpr std::string_view kMasterListExample =
-    "[{name: plc, device: /dev/ttyUSB1, lines: [floor1]}]";
 
 void check_name(Loading& loading, MapReader& in, const Settings& settings) {
     if (settings.name.empty()) return;
@@ -222,9 +220,7 @@ Settings load_master(Loading& loading, const Node& node) {
 }  // namespace
 
 void load_serial_masters(Loading& loading, MapReader& root) {
-    const Node* list = root.sequence("serial_masters", kMasterListExample);
-    if (list == nullptr) return;
-    for (const Node& node : list->items)
+    for (const Node& node : root.entries("serial_masters", "[" + std::string(kMasterExample) + "]"))
         loading.config.serial_masters.push_back(load_master(loading, node));
 }
 

@@ -128,8 +128,8 @@ const Line* find_line(Loading& loading, yaml::Mark mark, const std::string& name
     names.reserve(loading.config.lines.size());
     for (const Line& line : loading.config.lines) names.push_back(line.name);
     const std::string commas = missing_commas(name);
-    loading.problems.add(mark, "there is no line " + yaml::quote(name) +
-                                   (commas.empty() ? did_you_mean(name, names, "lines") : commas));
+    loading.problems.add(mark, commas.empty() ? yaml::no_such("line", name, names)
+                                              : "there is no line " + yaml::quote(name) + commas);
     return nullptr;
 }
 
@@ -352,9 +352,7 @@ void load_access(Loading& loading, MapReader& in, tcp_server::Settings& settings
 }
 
 void load_modbus_tcp(Loading& loading, MapReader& root) {
-    const Node* list = root.sequence("modbus_tcp", "[{listen: 127.0.0.1:502}]");
-    if (list == nullptr) return;
-    for (const Node& node : list->items) {
+    for (const Node& node : root.entries("modbus_tcp", "[{listen: 127.0.0.1:502}]")) {
         tcp_server::Settings settings = load_listener(loading, node);
         const std::string name = settings.name();
         const std::string first = loading.firsts.again("listener " + name, node.mark);

@@ -17,6 +17,8 @@
 
 namespace panelgate::config {
 
+using yaml::did_you_mean;
+
 /// Where what may be there once was written first.
 class Firsts {
   public:
@@ -91,9 +93,6 @@ std::optional<std::string> load_name(yaml::MapReader& in, bool required,
 std::string name_hint(std::string_view typed);
 /// Reads the key `access`: true for read_only.
 std::optional<bool> load_read_only(yaml::MapReader& in);
-/// Returns "; did you mean 'x'?" if one of `known` is near, else "; known NOUN are a, b, c".
-std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
-                         std::string_view noun);
 
 /// Reports missing lines, unless a key is probably a mistyped `lines`: then call refuse_no_lines()
 /// if finish() accepted that key.
