@@ -11,6 +11,9 @@
 namespace panelgate::mbusd::conf_test {
 namespace {
 
+using config::Config;
+using config::Line;
+using config::load_valid;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
