@@ -105,7 +105,7 @@ std::string load_password(Loading& loading, MapReader& in, std::string& file) {
     const auto typed = in.text("password_file");
     if (!typed) return "";
     file = loading.path_of(*typed);
-    auto text = loading.files.is_special(file) ? std::nullopt : loading.files.read(file);
+    auto text = loading.content_of(file);
     if (!text) {
         in.problem("password_file",
                    "cannot read the password file; give the path of a file that holds the password "
@@ -127,8 +127,7 @@ void load_file(Loading& loading, MapReader& in, std::string_view key, bool tls, 
     path = loading.path_of(*text);
     if (!tls)
         in.problem(key, std::string(key) + " needs TLS; write broker: mqtts://HOST:8883");
-    else if (const auto file =
-                 loading.files.is_special(path) ? std::nullopt : loading.files.read(path))
+    else if (const auto file = loading.content_of(path))
         content = *file;
     else
         in.problem(key, "cannot read " + path +
@@ -220,18 +219,15 @@ void warn_of_broker(Loading& loading, MapReader& in, const mqtt::Settings& setti
 }  // namespace
 
 void load_mqtt(Loading& loading, MapReader& root) {
-    const yaml::Node* node = root.map("mqtt", kMqttExample);
-    if (node == nullptr) return;
-    MapReader in(*node, loading.problems, "mqtt", kMqttExample);
-    in.elsewhere(kMqttKeysElsewhere);
-    mqtt::Settings settings;
-    load_broker(in, settings);
-    load_format(in, settings);
-    load_session(loading, in, settings);
-    load_tls(loading, in, settings);
-    in.finish();
-    warn_of_broker(loading, in, settings);
-    loading.config.mqtt = std::move(settings);
+    load_section(loading, root, "mqtt", kMqttExample, [&](MapReader& in) {
+        in.elsewhere(kMqttKeysElsewhere);
+        mqtt::Settings& settings = loading.config.mqtt.emplace();
+        load_broker(in, settings);
+        load_format(in, settings);
+        load_session(loading, in, settings);
+        load_tls(loading, in, settings);
+        warn_of_broker(loading, in, settings);
+    });
 }
 
 }  // namespace panelgate::config
