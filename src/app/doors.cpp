@@ -88,6 +88,11 @@ void Doors::open(std::shared_ptr<const config::Config> config) {
     };
     if (config_->http) add(*config_->http);
     doors_.clear();
+    plant_.clear();
+    for (const config::Line& line : config_->lines) {
+        plant_[line.name].set(0);
+        for (const config::Station& station : line.stations) plant_[line.name].set(station.id);
+    }
     for (const tcp_server::Settings& listener : config_->modbus_tcp) {
         add(listener);
         doors_[listener.name()] = {&listener, destinations_of(listener, *config_)};
@@ -154,7 +159,8 @@ std::optional<Admission> Doors::by_unit(const WhoRef& who, std::string_view line
     const auto door = doors_.find(who->listener);
     if (door == doors_.end()) return std::nullopt;
     if (!is_allowed(who->listener, who->address)) return not_allowed(who);
-    if (!leads_to(door->second.reach, line, station))
+    // What the plant has no more is its line's to say.
+    if (leads_to(plant_, line, station) && !leads_to(door->second.reach, line, station))
         return out(who, "access", "its listener does not lead there any more");
     const tcp_server::Settings& listener = *door->second.listener;
     if (listener.read_only) return only_reads(who, "access", "its listener is read-only now");

@@ -56,6 +56,7 @@ class Doors {
         Destinations reach;
     };
     std::map<std::string, Door> doors_;  ///< by listener's or serial master's name
+    Destinations plant_;                 ///< what there is; of unlisted stations nothing is known
     std::set<std::string> renewed_;      ///< tokens by name
 };
 

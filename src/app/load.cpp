@@ -69,7 +69,7 @@ Loaded read_text(std::string_view text, const std::string& name) {
     loaded.config = config::load(text, config::RealFiles(), problems, environment);
     if (!loaded.config) {
         loaded.code = kBadConfig;
-        loaded.problems = problems.list();
+        loaded.problems = problems.shown();
         loaded.error_text = problems.text();
     }
     return loaded;

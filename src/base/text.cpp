@@ -269,6 +269,14 @@ std::string nearest(std::string_view typed, std::span<const std::string_view> ca
     return std::string(best);
 }
 
+std::string to_lower(std::string_view text) {
+    std::string lower(text);
+    for (char& c : lower) {
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    }
+    return lower;
+}
+
 std::string_view trimmed(std::string_view text) {
     constexpr std::string_view kBlank = " \t";
     const std::size_t begin = std::min(text.find_first_not_of(kBlank), text.size());

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "panelgate/base/text.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/yaml/document.hpp"
@@ -123,6 +124,10 @@ std::string listen_hint(std::string_view typed) {
 
 std::string network_hint(std::string_view typed, std::string_view key) {
     std::string text(typed);
+    if (const std::size_t blank = text.find(' '); blank != text.npos)
+        if (const auto prefix = prefix_of_mask(text.substr(text.find_last_of(' ') + 1));
+            prefix.value_or(0) > 0 && parse_cidr(text.substr(0, blank)))
+            return write(text.substr(0, blank) + '/' + std::to_string(*prefix));
     if (text.find(' ') != text.npos && is_several(text)) return missing_commas(text);
     std::erase(text, ' ');
     if (text == "*" || text == "all" || text == "any")
@@ -155,13 +160,6 @@ namespace {
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; }
 
-std::string lower(std::string_view text) {
-    std::string all(text);
-    std::ranges::transform(all, all.begin(),
-                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return all;
-}
-
 /// Returns the words and numbers of a text, in order: 9600, 8, n and 1 of "9600-8N1".
 std::vector<std::string> pieces(std::string_view text) {
     std::vector<std::string> all;
@@ -171,7 +169,7 @@ std::vector<std::string> pieces(std::string_view text) {
         if (end == at) {
             while (end < text.size() && is_letter(text[end])) ++end;
         }
-        if (end > at) all.push_back(lower(text.substr(at, end - at)));
+        if (end > at) all.push_back(to_lower(text.substr(at, end - at)));
         at = std::max(end, at + 1);
     }
     return all;
@@ -256,7 +254,7 @@ std::string serial_example(const yaml::Node* typed) {
 
 std::string device_hint(std::string_view typed) {
     if (typed.starts_with("tcp://")) return tcp_hint(typed.substr(6));
-    const std::string text = lower(typed);
+    const std::string text = to_lower(typed);
     const std::size_t scheme = text.find("://");
     if (scheme != text.npos)
         return "; write tcp://" + std::string(typed.substr(scheme + 3)) + " for RTU over TCP";

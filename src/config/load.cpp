@@ -21,6 +21,7 @@
 #include "panelgate/config/describe.hpp"
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/yaml/document.hpp"
+#include "panelgate/yaml/secrets.hpp"
 #include "panelgate/yaml/variables.hpp"
 #include "tables.hpp"
 
@@ -402,8 +403,10 @@ std::optional<bool> load_read_only(MapReader& in) {
     return *chosen == 1;
 }
 
-std::optional<Config> load(std::string_view text, const Files& files, yaml::Problems& problems,
-                           const yaml::Environment& environment) {
+namespace {
+
+std::optional<Config> load_text(std::string_view text, const Files& files, yaml::Problems& problems,
+                                const yaml::Environment& environment) {
     yaml::Node tree = yaml::parse(text, problems);
     if (tree.kind == yaml::Node::Kind::null) {
         if (problems.empty())
@@ -423,6 +426,15 @@ std::optional<Config> load(std::string_view text, const Files& files, yaml::Prob
     tell(unset, found, problems);
     if (!problems.empty()) return std::nullopt;
     apply_rules(config);
+    return config;
+}
+
+}  // namespace
+
+std::optional<Config> load(std::string_view text, const Files& files, yaml::Problems& problems,
+                           const yaml::Environment& environment) {
+    auto config = load_text(text, files, problems, environment);
+    if (!config) yaml::conceal_secrets(text, problems);
     return config;
 }
 

@@ -81,6 +81,7 @@ void load_audit(Loading& loading, MapReader& root) {
                      load_rotation(in, settings);
                      audit_keys().read(in, settings);
                  });
+    root.refuse_empty("audit", "give file, or leave it out");
 }
 
 }  // namespace panelgate::config

@@ -42,6 +42,9 @@ constexpr Words<Face, 4> kFaces{{{"modbus_tcp", Face::modbus_tcp},
                                  {"mqtt", Face::mqtt},
                                  {"serial_master", Face::serial_master}}};
 
+/// Words that other programs have for reading and writing.
+constexpr std::array<std::string_view, 5> kBoth{"rw", "read_write", "readwrite", "all", "true"};
+
 template <class T, std::size_t N>
 std::vector<T> words(Loading& loading, MapReader& in, std::string_view key,
                      std::string_view example, const Words<T, N>& known) {
@@ -53,8 +56,13 @@ std::vector<T> words(Loading& loading, MapReader& in, std::string_view key,
         if (found != known.end()) {
             all.push_back(found->second);
         } else {
-            loading.problems.add(
-                item->mark, yaml::no_such(key == "faces" ? "face" : "act", item->scalar, names));
+            const std::string wrong =
+                yaml::no_such(key == "faces" ? "face" : "act", item->scalar, names);
+            const std::string_view typed = item->scalar;
+            const bool both = std::ranges::find(kBoth, typed) != kBoth.end() && key != "faces";
+            loading.problems.add(item->mark, both ? "there is no act '" + item->scalar +
+                                                        "'; write [read, write], or write alone"
+                                                  : wrong);
         }
     }
     in.looks_like_one_of(key, names);
@@ -297,6 +305,8 @@ void load_rules(Loading& loading, MapReader& root) {
             for (const Node& item : in.entries("rules", "[" + std::string(kRuleExample) + "]",
                                                access::Settings::kMaxRules, "rules"))
                 load_rule(loading, item);
+            in.refuse_empty("rules", "give at least one rule, or leave it out");
+            in.refuse_empty("roles", "give at least one role, or leave it out");
         });
     root.refuse_empty("access", "leave it out for no rules");
     if (loading.problems.empty()) warn_of_rules(loading);

@@ -464,7 +464,7 @@ std::string format(const Problem& problem) {
            std::to_string(problem.mark.column) + ": " + problem.message;
 }
 
-std::string Problems::text() const {
+std::vector<Problem> Problems::shown() const {
     std::vector<const Problem*> sorted;
     sorted.reserve(list_.size());
     for (const Problem& problem : list_) sorted.push_back(&problem);
@@ -474,13 +474,19 @@ std::string Problems::text() const {
     };
     std::ranges::sort(sorted, {}, place);  // at one place: in the order found
     const std::size_t shown = sorted.size() > kMaxShown + 1 ? kMaxShown : sorted.size();
-    std::string all;
-    for (std::size_t i = 0; i < shown; ++i) all += format(*sorted[i]) + '\n' + sorted[i]->excerpt;
+    std::vector<Problem> all;
+    for (std::size_t i = 0; i < shown; ++i) all.push_back(*sorted[i]);
     if (shown == sorted.size()) return all;
-    Problem rest = *sorted[shown];
-    rest.message = std::to_string(sorted.size() - shown) +
-                   " more faults from here on; mend those above and check again";
-    return all + format(rest) + '\n';
+    all.push_back({sorted[shown]->file, sorted[shown]->mark,
+                   std::to_string(sorted.size() - shown) +
+                       " more faults from here on; mend those above and check again"});
+    return all;
+}
+
+std::string Problems::text() const {
+    std::string all;
+    for (const Problem& problem : shown()) all += format(problem) + '\n' + problem.excerpt;
+    return all;
 }
 
 }  // namespace panelgate::yaml

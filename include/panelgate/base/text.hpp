@@ -37,6 +37,9 @@ std::size_t byte_order_mark(std::string_view text);
 /// Replaces every byte that belongs to no character with U+FFFD.
 std::string as_utf8(std::string_view bytes);
 
+/// With small ASCII letters.
+std::string to_lower(std::string_view text);
+
 /// Without the spaces and tabs at both ends (OWS, RFC 9110, 5.6.3).
 std::string_view trimmed(std::string_view text);
 

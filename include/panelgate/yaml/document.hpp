@@ -48,13 +48,16 @@ class Problems {
     }
     bool empty() const { return list_.empty(); }
     const std::vector<Problem>& list() const { return list_; }
+    std::vector<Problem>& list() { return list_; }
+    /// Returns this file's problems first, then those of other files, by line and column; of many
+    /// the first kMaxShown, and how many others there are as the last one.
+    std::vector<Problem> shown() const;
     const std::string& file() const { return file_; }
     /// Sets where readers record the keys that they ask for; nullptr (the default): nowhere. Must
     /// outlive this.
     void describe(Description* description) { description_ = description; }
     Description* description() const { return description_; }
-    /// Returns this file's problems first, then those of other files, by line and column, one line
-    /// each followed by its excerpt; at most kMaxShown, then the number of the others.
+    /// Returns shown(), one line each followed by its excerpt.
     std::string text() const;
 
   private:

@@ -10,21 +10,13 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/base/text.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/problem.hpp"
 #include "panelgate/web/http/settings.hpp"
 
 namespace panelgate::web {
-
-/// ASCII only, as is all that HTTP compares case-insensitively.
-inline std::string to_lower(std::string_view text) {
-    std::string lower(text);
-    for (char& c : lower) {
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    }
-    return lower;
-}
 
 /// Returns the host of "NAME", "NAME:PORT", "[ADDRESS]:PORT" in lower case, without brackets or a
 /// trailing dot; nullopt if malformed.
