@@ -298,9 +298,8 @@ void Schedule::take_turn(const Job& job) {
 bool Schedule::others_go_first(TimePoint now, const Stations& stations, const Quiet& quiet) const {
     if (turns_ == 0 || now >= others_until_) return false;
     const JobQueue::Test may = runnable(now, stations, quiet);
-    return backlog_.queue().peek([&](const Job& job) {
-        return has_turn(job) && may(job) && stations.may_spend(now, job);
-    }) != nullptr;
+    return backlog_.queue().any_first(
+        [&](const Job& job) { return has_turn(job) && may(job) && stations.may_spend(now, job); });
 }
 
 std::optional<Group> Schedule::next_probe(TimePoint now, Stations& stations, Quiet& quiet) const {
