@@ -232,7 +232,7 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
     const bool overdue = claims.passed && first_sign > station.usual(stations_.slowest());
     const bool like_echo = attempt.may_be_its_echo() && first &&
                            (is_early || echo_memory_.echoes_writes() ||
-                            station.is_far_too_quick(first_sign, stations_.quickest()));
+                            station.is_far_too_quick(first_sign, stations_.times()));
     const bool like_broadcast = first && !refusal && group.doubted.empty() &&
                                 !group.request.is_read() &&
                                 habits.may_answer_broadcast(book.behind_broadcast(now, reply));

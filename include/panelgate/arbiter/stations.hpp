@@ -31,7 +31,7 @@ class Stations {
     /// Silence required before a request to this station and after its reply.
     Duration gap(std::uint8_t id) const;
     /// Longest recent time that any station of the line has needed.
-    std::optional<Duration> slowest() const { return slowest_.value(); }
+    std::optional<Duration> slowest() const { return times_.longest(); }
     /// Unsolicited bytes followed this station's reply.
     void on_trail(TimePoint now, std::uint8_t id) {
         const auto found = stations_.find(id);
@@ -74,12 +74,10 @@ class Stations {
     /// `waited`: from request to first sign of the reply; empty: unknown.
     void on_reply(TimePoint now, std::optional<Duration> waited) {
         heard_ = now;
-        if (!waited) return;
-        slowest_.add(*waited);
-        quickest_.add(*waited);
+        if (waited) times_.add(*waited);
     }
-    /// Shortest recent time that any station of the line has needed.
-    const Quickest& quickest() const { return quickest_; }
+    /// Recent times that the stations of the line have needed.
+    const RecentTimes& times() const { return times_; }
 
     /// Time from which no outstanding reply can still come; `may_stall`: on a transport that may
     /// stall, counted from now.
@@ -162,8 +160,7 @@ class Stations {
     ProbeBudget unheard_{ProbeBudget::kFailing};        ///< all attempts at unheard stations
     ProbeBudget asked_unheard_{ProbeBudget::kUnheard};  ///< except the first at each
     OutstandingRequests book_;
-    Slowest slowest_;
-    Quickest quickest_;
+    RecentTimes times_;
     TimePoint heard_{};         ///< any of them
     TimePoint urgent_until_{};  ///< one just timed out: shorter waits for others
 };
