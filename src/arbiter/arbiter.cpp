@@ -131,7 +131,8 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
 }
 
 void Arbiter::deny(TimePoint now, const JobQueue::Test& match) {
-    for (const Job& job : schedule_.backlog().remove_if(match)) outbox_.finish(job, Fault::denied);
+    for (const Job& job : schedule_.backlog().queue().remove_if(match))
+        outbox_.finish(job, Fault::denied);
     // What became of these nobody knows: they were sent.
     for (const Job& job : schedule_.backlog().remove_retries(match))
         outbox_.finish(job, Fault::timeout);
@@ -410,11 +411,11 @@ void Arbiter::check_invariants() const {
     must(up_ || !active_, "a line that is down carries nothing");
     must(up_ || backlog.empty(), "a line that is down has nothing waiting");
     must(up_ || !resetting_, "a line that is down is not to be reset");
-    backlog.each_retry([&](const Group& group) {
+    for (const Group& group : backlog.retries()) {
         must(!group.abandoned(), "a request waits for each retry");
         must(group.attempts > 0, "what is repeated was sent before");
         must(stations_.find(group.station) != nullptr, "its station is known");
-    });
+    }
     if (active_) {
         const Group& group = active_->group();
         must(group.attempts > 0, "what is on the wire was sent");

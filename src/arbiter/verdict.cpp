@@ -439,7 +439,7 @@ void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
     if (group.learns_for != 0 && fault != Fault::damaged) {
         // P8: the write never left, and its station is silent.
         const auto asked = [&](const Job& job) { return job.ticket == group.learns_for; };
-        for (const Job& job : backlog.remove_if(asked)) outbox_.finish(job, fault);
+        for (const Job& job : backlog.queue().remove_if(asked)) outbox_.finish(job, fault);
     }
     Station& station = stations_.of(group.station);
     if (group.probe) station.replies().on_probe_unanswered(group.distinct_length);
@@ -447,7 +447,7 @@ void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
     if (!station.on_given_up(now, fault, group.request.is_read())) return;
     if (!station.speculative()) outbox_.event(Kind::offline, group.station);
     const auto theirs = [&](const Job& job) { return job.station == group.station; };
-    for (const Job& job : backlog.remove_if(theirs)) outbox_.finish(job, Fault::offline);
+    for (const Job& job : backlog.queue().remove_if(theirs)) outbox_.finish(job, Fault::offline);
 }
 
 /// Ends the attempt: accounts for its time, and passes on what the echo filter buffered.

@@ -380,7 +380,7 @@ TEST_F(BacklogTest, P3WhatWasSentExpiresOnlyAtItsDeadlineEachJobAtItsOwn) {
 TEST_F(BacklogTest, OnlyWhatWaitsForItsFirstTurnIsRemoved) {
     const Ticket waits = wait(read(1, 17));
     retry({read(1, 17)});
-    EXPECT_EQ(tickets(backlog_.remove_if(test::any)), std::vector<Ticket>{waits});
+    EXPECT_EQ(tickets(backlog_.queue().remove_if(test::any)), std::vector<Ticket>{waits});
     EXPECT_TRUE(backlog_.has_retry(17));
 }
 
