@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 
@@ -53,6 +52,24 @@ Settings completed(Settings settings) {
 
 Quiet quiet_of(const Settings& settings) {
     return Quiet(frame_time(settings.serial, modbus::kMaxRtuAdu), silent_interval(settings.serial));
+}
+
+/// Why this group is sent now.
+Reason reason_of(TimePoint now, const Group& group, const JobQueue& queue) {
+    if (group.probe) return {.kind = Reason::Kind::probe};
+    if (group.learns_for != 0 || !group.confirms.empty())
+        return {.kind = Reason::Kind::learns_echo};
+    const Job& leader = group.jobs.front();
+    return {.kind = group.attempts > 1 ? Reason::Kind::again : Reason::Kind::turn,
+            .priority = leader.priority,
+            .station = leader.station,
+            .asked_function = leader.asked_function,
+            .passed_over = queue.last_was_passed_over(),
+            .attempt = group.attempts,
+            .answers = static_cast<std::uint32_t>(group.jobs.size()),
+            .waited = now - leader.arrived,
+            .waiting = queue.waiting(),
+            .client = leader.client};
 }
 
 }  // namespace
@@ -101,8 +118,9 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
         return known->ticket;
     }
     if (stations_.refuses(now, job)) {
-        outbox_.decide(now,
-                       [&] { return explain::offline(now, job, health(job.station), names_); });
+        const StationHealth is = health(job.station);
+        outbox_.decide(now, Decision::Kind::offline, job, is.next_probe() - now,
+                       static_cast<std::size_t>(is.silent_in_a_row()));
         return Fault::offline;
     }
     admission_.stamp(now, job);
@@ -117,13 +135,12 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     }
     const JobQueue::PushResult pushed = schedule_.backlog().queue().push(job);
     for (const Job& shed : pushed.shed) {
-        outbox_.decide(now, [&] { return explain::shed(shed, names_); });
+        outbox_.decide(now, Decision::Kind::shed, shed);
         const bool sent = shed.attempts > 0;  // in a joined read that failed
         outbox_.finish(shed, sent ? Fault::timeout : Fault::busy);
     }
     if (!pushed.taken) {
-        outbox_.decide(now,
-                       [&] { return explain::full(job, settings_.queue, queue_depth(), names_); });
+        outbox_.decide(now, Decision::Kind::full, job, {}, queue_depth());
         return Fault::busy;
     }
     step(now);
@@ -143,7 +160,6 @@ void Arbiter::deny(TimePoint now, const JobQueue::Test& match) {
 
 void Arbiter::cancel(TimePoint now, Client client) {
     outbox_.on_client_gone(client);
-    names_.forget(client);
     for (const Job& job : schedule_.backlog().cancel(client)) outbox_.finish(job, Fault::cancelled);
     if (active_) active_->group().on_client_gone(client);
     step(now);
@@ -285,7 +301,8 @@ void Arbiter::expire(TimePoint now) {
     expire_active(now);
     for (const Job& job : schedule_.backlog().expire(now)) {
         const bool sent = job.attempts > 0;
-        outbox_.decide(now, [&] { return explain::expired(now, job, sent, names_); });
+        outbox_.decide(now, sent ? Decision::Kind::unanswered : Decision::Kind::expired, job,
+                       now - job.arrived);
         outbox_.finish(job, sent ? Fault::timeout : Fault::expired);
     }
     for (const Group& group : schedule_.backlog().take_dropped()) {
@@ -369,7 +386,7 @@ void Arbiter::start(TimePoint now, Group group) {
     if (!group.request.is_read()) admission_.memory().on_write(now, group.station, group.request);
     outbox_.written(group, false);
     Reason why;
-    if (outbox_.explains()) why = explain::start(now, group, schedule_.backlog().queue(), names_);
+    if (outbox_.explains()) why = reason_of(now, group, schedule_.backlog().queue());
     quiet_.on_sent(timing.sent, group.station);
     unsolicited_.on_sent(adu);
     EchoFilter echo(adu, echo_memory_.expect(group.request));

@@ -8,7 +8,6 @@
 #include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 
@@ -50,8 +49,10 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo,
 
 bool Attempt::can_join(TimePoint now, const Job& job) const {
     const bool leaving = timing_.tolerance && now < earliest_end();
+    const auto& items = job.request.span();
     return leaving && !group_.probe && group_.attempts == 1 && job.station == group_.station &&
-           contained_in(group_.span, job) && group_.jobs.size() < JobQueue::kMost;
+           group_.span && items && !job.alone && group_.span->contains(*items) &&
+           group_.jobs.size() < JobQueue::kMost;
 }
 
 Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {

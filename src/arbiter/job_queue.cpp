@@ -5,8 +5,6 @@
 #include <ranges>
 #include <utility>
 
-#include "verdict.hpp"
-
 namespace panelgate::arbiter {
 
 namespace {

@@ -10,11 +10,12 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 
 namespace {
+
+constexpr std::uint8_t kUnlisted = 0;  // key of the counters
 
 /// How a frame is shown and counted that answers no open request.
 struct Shown {

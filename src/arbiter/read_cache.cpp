@@ -8,7 +8,6 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "panelgate/modbus/function.hpp"
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 

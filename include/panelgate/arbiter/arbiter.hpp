@@ -114,9 +114,6 @@ class Arbiter {
     /// The client is gone: its queued jobs are finished as cancelled, without being sent; a request
     /// on the wire is not repeated for it.
     void cancel(TimePoint now, Client client);
-    /// Sets the client's name in explained decisions, until cancel().
-    void name_client(Client client, std::string name) { names_.set(client, std::move(name)); }
-    const ClientNames& client_names() const { return names_; }
     void on_rx(TimePoint now, ByteView bytes);
     void on_deadline(TimePoint now) { step(now); }
     void on_line_up(TimePoint now);
@@ -215,7 +212,6 @@ class Arbiter {
     Admission admission_;
     EchoMemory echo_memory_;
     Outbox outbox_;
-    ClientNames names_;
     std::optional<Attempt> active_;
     TimePoint rest_{};  ///< of the wire; kept when the line is reopened
     bool up_ = false;

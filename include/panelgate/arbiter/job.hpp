@@ -3,8 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <memory>
-#include <string>
 #include <utility>
 
 #include "panelgate/base/fault.hpp"
@@ -42,6 +40,8 @@ class TransactionNumbers {
 
 /// Identifies one accepted job; never reused.
 using Ticket = std::uint64_t;
+/// The station id of requests to all.
+inline constexpr std::uint8_t kBroadcast = 0;
 using Client = std::uint64_t;
 /// Where a client comes from: the same for all connections from one address.
 using Host = std::uint64_t;
@@ -74,35 +74,6 @@ struct Job {
     bool barred = false;                ///< forbidden since it was sent: no retry
 };
 using Jobs = PoolVector<Job>;
-
-/// Null: a client without a name.
-using ClientName = std::shared_ptr<const std::string>;
-
-/// Names of clients for messages. Bounded; a client that has gone is forgotten. Pure.
-class ClientNames {
-  public:
-    static constexpr std::size_t kClients = 8192;
-
-    /// Replaces an earlier name.
-    void set(Client client, std::string name) {
-        const auto known = names_.find(client);
-        if (known == names_.end() && names_.size() >= kClients) return;
-        names_.insert_or_assign(client, std::make_shared<const std::string>(std::move(name)));
-    }
-    void forget(Client client) { names_.erase(client); }
-    /// Returns a name that stays valid after the client has gone.
-    ClientName name(Client client) const {
-        const auto known = names_.find(client);
-        return known == names_.end() ? nullptr : known->second;
-    }
-    std::string of(Client client) const { return words(name(client)); }
-    static std::string words(const ClientName& name) {
-        return name ? *name : "a client without a name";
-    }
-
-  private:
-    std::map<Client, ClientName> names_;
-};
 
 /// How much of the line's time each client has used (P9). A shared transaction is split equally.
 /// Bounded; a client that has gone is forgotten. Pure.

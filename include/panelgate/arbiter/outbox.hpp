@@ -39,10 +39,14 @@ class Outbox {
     /// Adds a Written if the group is a write.
     void written(const Group& group, bool ended);
     void reset(std::string_view why) { actions_.push_back(Reset{why}); }
-    /// Adds one line; `text` is called only with Settings::explain.
-    template <class Text>
-    void decide(TimePoint now, const Text& text) {
-        if (explain_) actions_.push_back(Decision{now, text()});
+    /// Adds a decision, with Settings::explain.
+    void decide(const Decision& decision) {
+        if (explain_) actions_.push_back(decision);
+    }
+    /// ... about this request.
+    void decide(TimePoint now, Decision::Kind kind, const Job& job, Duration time = {},
+                std::size_t count = 0) {
+        decide({now, kind, job.station, job.client, job.priority, time, count});
     }
     bool explains() const { return explain_; }
 
