@@ -10,32 +10,14 @@
 
 namespace panelgate::arbiter {
 
-void Admission::stamp(TimePoint now, Job& job) {
+TimePoint latest_start(const SerialFormat& serial, const Job& job) {
     const std::size_t request = job.request.pdu().size() + modbus::kAduOverhead;
     const std::size_t reply =
         std::max(job.request.reply_length().value_or(0), modbus::kExceptionAdu);
-    const Duration needed = job.station == kBroadcast ? frame_time(serial_, request)
-                                                      : frame_time(serial_, request + reply, 2) +
-                                                            silent_interval(serial_);
-    job.ticket = ++last_ticket_;
-    job.arrived = now;
-    job.deadline = now + std::min(deadline_, job.within);
-    job.start_by = job.deadline - needed;
-}
-
-std::optional<Admission::FromMemory> Admission::from_memory(TimePoint now, const Job& job,
-                                                            Duration max_age) {
-    if (max_age <= Duration::zero() || job.priority == PriorityClass::poll) return std::nullopt;
-    const auto& span = job.request.span();
-    if (!span) return std::nullopt;
-    auto hit = memory_.find({job.station, *span}, now, max_age);
-    if (!hit) return std::nullopt;
-    return FromMemory{++last_ticket_, std::move(*hit)};
-}
-
-void Admission::on_read(const Group& group, const Bytes& reply, Duration max_age) {
-    if (group.span && max_age > Duration::zero())
-        memory_.store({group.station, *group.span}, reply, group.started);
+    const Duration needed = job.station == kBroadcast
+                                ? frame_time(serial, request)
+                                : frame_time(serial, request + reply, 2) + silent_interval(serial);
+    return job.deadline - needed;
 }
 
 namespace {
@@ -81,7 +63,6 @@ Arbiter::Arbiter(Settings settings)
       schedule_(settings_),
       quiet_(quiet_of(settings_)),
       unsolicited_(settings_.serial, orders_),
-      admission_(settings_),
       echo_memory_(settings_.echo),
       outbox_(settings_) {
     if (settings_.serial.mode == SerialMode::ascii)
@@ -94,7 +75,6 @@ void Arbiter::apply(Settings settings) {
     settings_ = std::move(settings);
     stations_.apply(settings_);
     schedule_.apply(settings_);
-    admission_.apply(settings_);
     outbox_.apply(settings_);
     if (same_wire) return;
     orders_ = crc_orders(settings_);
@@ -108,14 +88,9 @@ void Arbiter::apply(Settings settings) {
 
 Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     if ((!up_ && !suspended_) || resetting_) return Fault::line_down;
-    // Not while the client has a request open there: it must not read values older than its own
-    // write.
-    const bool waits = schedule_.backlog().has(job.client, job.station);
-    const bool open = waits || (active_ && active_->group().has(job.client, job.station));
-    const Duration max_age = open ? Duration::zero() : stations_.settings(job.station).max_age;
-    if (auto known = admission_.from_memory(now, job, max_age)) {
-        outbox_.finish_from_memory(known->ticket, std::move(known->hit.pdu), known->hit.age);
-        return known->ticket;
+    if (auto known = from_memory(now, job)) {
+        outbox_.finish_from_memory(++last_ticket_, std::move(known->pdu), known->age);
+        return last_ticket_;
     }
     if (stations_.refuses(now, job)) {
         const StationHealth is = health(job.station);
@@ -123,10 +98,14 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
                        static_cast<std::size_t>(is.silent_in_a_row()));
         return Fault::offline;
     }
-    admission_.stamp(now, job);
+    job.ticket = ++last_ticket_;
+    job.arrived = now;
+    job.deadline = now + std::min(settings_.queue.deadline, job.within);
+    job.start_by = latest_start(settings_.serial, job);
     job.alone = job.alone || !settings_.share_reads;
     const Ticket ticket = job.ticket;
-    if (active_ && !waits && active_->can_join(now, job)) {
+    if (active_ && active_->can_join(now, job) &&
+        !schedule_.backlog().has(job.client, job.station)) {
         job.attempts = 1;
         job.transactions.add(active_->group().transaction);
         outbox_.on_started(now, job);
@@ -145,6 +124,20 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     }
     step(now);
     return ticket;
+}
+
+/// A recently read value, where the station's max_age allows it. Never for polls, which must read
+/// new values, nor while the client has a request open there: it must not read values older than
+/// its own write.
+std::optional<ReadCache::Hit> Arbiter::from_memory(TimePoint now, const Job& job) const {
+    const Duration max_age = stations_.settings(job.station).max_age;
+    const auto& span = job.request.span();
+    if (max_age <= Duration::zero() || job.priority == PriorityClass::poll || !span)
+        return std::nullopt;
+    if (schedule_.backlog().has(job.client, job.station) ||
+        (active_ && active_->group().has(job.client, job.station)))
+        return std::nullopt;
+    return memory_.find({job.station, *span}, now, max_age);
 }
 
 void Arbiter::deny(TimePoint now, const JobQueue::Test& match) {
@@ -187,7 +180,7 @@ void Arbiter::on_line_left() {
     stations_.on_line_down();
     unsolicited_.forget();
     stations_.book().forget_foreign();
-    admission_.memory().clear();
+    memory_.clear();
 }
 
 void Arbiter::on_line_up(TimePoint now) {
@@ -212,7 +205,7 @@ void Arbiter::on_line_down(TimePoint now) {
     stations_.on_line_down();
     unsolicited_.forget();
     stations_.book().forget_foreign();
-    admission_.memory().clear();
+    memory_.clear();
     if (active_) {
         note(now, active_->take_unsolicited());
         const Attempt attempt = take_active(now);
@@ -383,7 +376,7 @@ void Arbiter::start(TimePoint now, Group group) {
         timing.echoes = echo_memory_.expects_one();
         timing.as_asked = unusual_ == 0 && station.answers_as_asked() && echo_memory_.known();
     }
-    if (!group.request.is_read()) admission_.memory().on_write(now, group.station, group.request);
+    if (!group.request.is_read()) memory_.on_write(now, group.station, group.request);
     outbox_.written(group, false);
     Reason why;
     if (outbox_.explains()) why = reason_of(now, group, schedule_.backlog().queue());

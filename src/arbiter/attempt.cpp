@@ -235,7 +235,7 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
         judge_unsolicited(before, ends);
     }
     const bool usual_is_over = now >= timing_.sent + timing_.usual;
-    if (candidate_ && usual_is_over && kept_ == Candidate::doubted) return Verdict::doubtful;
+    if (candidate_ && usual_is_over && is_doubted()) return Verdict::doubtful;
     if (candidate_ && usual_is_over) {
         reply_ = std::exchange(candidate_, std::nullopt);
         return Verdict::replied;
@@ -322,7 +322,7 @@ void Attempt::keep_candidate(Duration needed, Candidate kind) {
     kept_ = kind;
     timing_.usual = std::min(timing_.usual, needed);
     // The reply that the duplicate has delayed comes after it.
-    if (kind == Candidate::doubted)
+    if (is_doubted())
         timing_.usual = std::min(last_byte_ - timing_.sent + needed, timing_.patience);
     candidate_ = std::exchange(reply_, std::nullopt);
     candidate_at_ = last_byte_;

@@ -17,22 +17,10 @@ using Kind = StationEvent::Kind;
 
 namespace {
 
+/// How a failed attempt ended.
 TransactionEnd end_of(Verdict verdict) {
-    switch (verdict) {
-        case Verdict::open:
-            return TransactionEnd::open;
-        case Verdict::replied:
-            return TransactionEnd::ok;
-        case Verdict::silent:
-            return TransactionEnd::timeout;
-        case Verdict::damaged:
-            return TransactionEnd::damaged;
-        case Verdict::wrong:
-            return TransactionEnd::wrong;
-        case Verdict::doubtful:
-            return TransactionEnd::doubtful;
-    }
-    std::abort();
+    if (verdict == Verdict::silent) return TransactionEnd::timeout;
+    return verdict == Verdict::wrong ? TransactionEnd::wrong : TransactionEnd::damaged;
 }
 
 /// True if another attempt could still answer one of the jobs in time.
@@ -119,10 +107,10 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     const Done done = judge(facts_of_reply(now, station, early));
     if (done == Done::contested) attempt.reject_contested();
     if (done == Done::reject) attempt.reject_reply();
-    if (done == Done::keep) attempt.keep_candidate(station.needed(), Attempt::Candidate::believed);
-    if (done == Done::ask_again || done == Done::suspect_echo)
-        attempt.keep_candidate(station.needed(), Attempt::Candidate::doubted);
-    if (done == Done::suspect_echo) attempt.suspect_echo();
+    const auto keep = [&](Attempt::Candidate as) { attempt.keep_candidate(station.needed(), as); };
+    if (done == Done::keep) keep(Attempt::Candidate::believed);
+    if (done == Done::ask_again) keep(Attempt::Candidate::doubted);
+    if (done == Done::suspect_echo) keep(Attempt::Candidate::echo);
     return done == Done::accept;
 }
 
@@ -155,14 +143,14 @@ void Arbiter::settle(TimePoint now) {
     quiet_.rest_until(station.trail_until());
     outbox_.on_answered(now, attempt, think, replied);
     attempt.teach(echo_memory_);
-    if (attempt.echo_is_suspected()) echo_memory_.on_suspected();
+    if (attempt.may_be_echo()) echo_memory_.on_suspected();
     const bool refused = modbus::exception_of(reply).has_value();
     outbox_.report(attempt, refused ? TransactionEnd::exception : TransactionEnd::ok);
     if (!group.confirms.empty()) return confirm(group, reply, attempt.echoed());
     if (refused) {
         give_back(group);
-    } else {
-        admission_.on_read(group, reply, station.settings().max_age);
+    } else if (group.span && station.settings().max_age > Duration::zero()) {
+        memory_.store({group.station, *group.span}, reply, group.started);
     }
     for (const Job& job : group.jobs)
         outbox_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
@@ -193,7 +181,7 @@ void Arbiter::confirm(const Group& group, ByteView reply, bool echoed) {
 void Arbiter::ask_again(TimePoint now) {
     active_->remember_doubt();
     Attempt attempt = take_active(now);
-    outbox_.report(attempt, end_of(Verdict::doubtful));
+    outbox_.report(attempt, TransactionEnd::doubtful);
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
     station.replies().on_doubted(stations_.book(), now, group, attempt.timing().sent);
@@ -250,6 +238,7 @@ void Arbiter::learn_from_failure(TimePoint now, const Attempt& attempt, Verdict 
 void Arbiter::fail(TimePoint now, Verdict verdict) {
     Attempt attempt = take_active(now);
     outbox_.on_failed(attempt, verdict);
+    const bool silent = verdict == Verdict::silent;
     outbox_.report(attempt, end_of(verdict));
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
@@ -268,21 +257,19 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
                         .station = group.station,
                         .time = *until - now});
     }
-    group.silent_after = verdict == Verdict::silent
-                             ? std::min(now - sent, attempt.timing().patience) - latency_
-                             : Duration::zero();
+    group.silent_after =
+        silent ? std::min(now - sent, attempt.timing().patience) - latency_ : Duration::zero();
     group.cut_after = cut_off ? now - sent : Duration::zero();
     finish_barred(group);
-    if (!group.confirms.empty()) {
-        give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);
-    } else if (in_time(now, group) && affordable && station.may_retry(group)) {
-        station.on_retry(verdict == Verdict::silent);
+    const bool again = group.confirms.empty() && in_time(now, group) && affordable;
+    if (again && station.may_retry(group)) {
+        station.on_retry(silent);
         schedule_.retry(now, std::move(group), stations_.patience(now, group));
-    } else if (group.joined()) {
-        station.on_retry(verdict == Verdict::silent);
+    } else if (group.confirms.empty() && group.joined()) {
+        station.on_retry(silent);
         give_back(group);  // health unaffected: the panel may only not answer this length
     } else {
-        give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);
+        give_up(now, group, silent ? Fault::timeout : Fault::damaged);
     }
     explain_condition(now, attempt.group().station, before);
 }
