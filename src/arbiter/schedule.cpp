@@ -107,18 +107,13 @@ std::optional<Group> Backlog::take_retry(const InlineFunction<bool(const Group&)
 
 Jobs Backlog::remove_retries(const JobQueue::Test& match) {
     Jobs removed;
-    for (auto group = retries_.begin(); group != retries_.end();) {
-        std::ranges::copy_if(group->jobs, std::back_inserter(removed), match);
-        std::erase_if(group->jobs, match);
-        if (!group->abandoned()) {
-            ++group;
-            continue;
-        }
-        append(removed,
-               std::exchange(group->jobs, {}));  // of clients that left while it was on the wire
-        dropped_.push_back(std::move(*group));
-        group = retries_.erase(group);
+    for (Group& group : retries_) {
+        append(removed, take_if(group.jobs, match));
+        if (!group.abandoned()) continue;
+        append(removed, std::exchange(group.jobs, {}));  // they left while it was on the wire
+        dropped_.push_back(std::move(group));
     }
+    std::erase_if(retries_, [](const Group& group) { return group.abandoned(); });
     return removed;
 }
 
@@ -427,10 +422,7 @@ void Schedule::retry(TimePoint now, Group group, Duration patience) {
 
 Jobs Schedule::give_back(Group& group) {
     for (Job& job : sharing_.split(group)) backlog_.queue().put_back(std::move(job));
-    Jobs gone;
-    std::ranges::copy_if(group.jobs, std::back_inserter(gone), &Job::gone);
-    std::erase_if(group.jobs, [](const Job& job) { return job.gone; });
-    return gone;
+    return take_if(group.jobs, [](const Job& job) { return job.gone; });
 }
 
 }  // namespace panelgate::arbiter

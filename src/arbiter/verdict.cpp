@@ -198,10 +198,8 @@ void Arbiter::ask_again(TimePoint now) {
 
 /// Ends those who may not ask again.
 void Arbiter::finish_barred(Group& group) {
-    for (const Job& job : group.jobs) {
-        if (job.barred) outbox_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
-    }
-    std::erase_if(group.jobs, [](const Job& job) { return job.barred; });
+    for (const Job& job : take_if(group.jobs, [](const Job& one) { return one.barred; }))
+        outbox_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
 }
 
 /// Makes a read for the jobs of this write, whose confirmation may be its echo.

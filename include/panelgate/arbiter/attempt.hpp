@@ -61,11 +61,7 @@ struct Group {
     }
     /// Removes and returns the jobs whose own deadline has passed; the others keep waiting.
     Jobs expire(TimePoint now) {
-        const auto late = [&](const Job& job) { return job.deadline <= now; };
-        Jobs expired;
-        std::ranges::copy_if(jobs, std::back_inserter(expired), late);
-        std::erase_if(jobs, late);
-        return expired;
+        return take_if(jobs, [&](const Job& job) { return job.deadline <= now; });
     }
     /// True if a reply that may be a duplicate must be confirmed by asking again: values, for
     /// clients. Exceptions are not asked for again; they may be gone by then.

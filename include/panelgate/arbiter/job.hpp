@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -74,6 +76,15 @@ struct Job {
     bool barred = false;                ///< forbidden since it was sent: no retry
 };
 using Jobs = PoolVector<Job>;
+
+/// Removes and returns the jobs that match.
+template <class Match>
+Jobs take_if(Jobs& jobs, const Match& match) {
+    Jobs taken;
+    std::ranges::copy_if(jobs, std::back_inserter(taken), match);
+    std::erase_if(jobs, match);
+    return taken;
+}
 
 /// How much of the line's time each client has used (P9). A shared transaction is split equally.
 /// Bounded; a client that has gone is forgotten. Pure.
