@@ -378,13 +378,12 @@ void Arbiter::start(TimePoint now, Group group) {
     }
     if (!group.request.is_read()) memory_.on_write(now, group.station, group.request);
     outbox_.written(group, false);
-    Reason why;
-    if (outbox_.explains()) why = reason_of(now, group, schedule_.backlog().queue());
+    const Reason why = reason_of(now, group, schedule_.backlog().queue());
     quiet_.on_sent(timing.sent, group.station);
     unsolicited_.on_sent(adu);
     EchoFilter echo(adu, echo_memory_.expect(group.request));
     active_.emplace(std::move(group), timing, std::move(echo), orders_);
-    outbox_.transmit(now, *active_, std::move(adu), std::move(wire), std::move(why));
+    outbox_.transmit(now, *active_, std::move(adu), std::move(wire), why);
 }
 
 std::optional<TimePoint> Arbiter::next_deadline() const {

@@ -70,12 +70,13 @@ StationCounters& Outbox::of(std::uint8_t station) {
     return found == stations_.end() ? stations_[kUnlisted] : found->second;
 }
 
-void Outbox::transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire, Reason why) {
+void Outbox::transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire,
+                      const Reason& why) {
     const Group& group = attempt.group();
     if (group.attempts > 1) ++of(group.station).retries;
     if (group.station == kBroadcast) ++line_.broadcasts;
     actions_.push_back(
-        Note{now, kind_of(group), std::move(adu), std::move(why), group.transaction});
+        Note{now, kind_of(group), std::move(adu), explain_ ? why : Reason{}, group.transaction});
     actions_.push_back(Transmit{std::move(wire)});
 }
 

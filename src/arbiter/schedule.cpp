@@ -358,8 +358,9 @@ Schedule::Next Schedule::next_job(const Line& line) {
     if (next.job() == nullptr) next = queue.choose(test);
     if (next.job() == nullptr) return {};
     // P9: in the turn of a station's write its read goes first, and the write is next.
-    if (!next.job()->request.is_read() && line.stations.has_read_turn(next.job()->station)) {
-        wanted.reads_of = next.job()->station;
+    const Station* station = line.stations.find(next.job()->station);
+    if (!next.job()->request.is_read() && station != nullptr && station->has_read_turn()) {
+        wanted.reads_of = station->id();
         if (const auto read = queue.choose(test); read.job() != nullptr) next = read;
     }
     if (!gap_is_over(line, next.job()->station)) return {};
@@ -371,9 +372,9 @@ Schedule::Next Schedule::next_job(const Line& line) {
         group.jobs.push_back(std::move(job));
         return {std::move(group), false};
     }
-    const Station& station = line.stations.of(job.station);
-    return {sharing_.gather(std::move(job), station, line.stations.book(), backlog_.queue()),
-            false};
+    const OutstandingRequests& book = line.stations.book();
+    const Station& asked = line.stations.of(job.station);
+    return {sharing_.gather(std::move(job), asked, book, backlog_.queue()), false};
 }
 
 std::optional<TimePoint> Schedule::next_start(const Stations& stations, const Quiet& quiet) const {

@@ -29,8 +29,8 @@ class Outbox {
     void apply(const Settings& settings);
 
     std::optional<Action> poll();
-    /// `wire`: the bytes that represent `adu` on the line.
-    void transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire, Reason why);
+    /// `wire`: the bytes that represent `adu` on the line; `why` is told with Settings::explain.
+    void transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire, const Reason& why);
     void finish(const Job& job, Result<Bytes> pdu, bool shared = false);
     void finish_from_memory(Ticket ticket, Bytes pdu, Duration age);
     /// Adds the Exchange of this attempt, with Settings::explain.
@@ -48,7 +48,6 @@ class Outbox {
                 std::size_t count = 0) {
         decide({now, kind, job.station, job.client, job.priority, time, count});
     }
-    bool explains() const { return explain_; }
 
     // What happened on the wire
     void on_started(TimePoint now, const Job& job);

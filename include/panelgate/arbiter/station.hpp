@@ -142,9 +142,7 @@ class Station {
         return speculative() && !book.any(id()) && now >= asked_ + timing::kForgetUnheard;
     }
     /// True if it missed its last request, and is not offline yet.
-    bool missed_last() const {
-        return (missed_ || health_.silent_in_a_row() > 0) && !health_.offline();
-    }
+    bool missed_last() const { return !is_answering() && !health_.offline(); }
     /// True if it fails repeatedly without being offline.
     bool failing() const { return failed_in_a_row_ >= kFailing && !health_.offline(); }
     /// True if so many recent attempts failed that another failure is expected.

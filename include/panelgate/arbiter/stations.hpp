@@ -111,11 +111,6 @@ class Stations {
     TimePoint throttled_until(std::uint8_t id) const;
     /// An attempt that occupied the line for `cost` failed.
     void on_failed(TimePoint now, const Group& group, Verdict verdict, Duration cost);
-    /// True if a waiting read of this station goes before its writes.
-    bool has_read_turn(std::uint8_t id) const {
-        const Station* station = find(id);
-        return station != nullptr && station->has_read_turn();
-    }
 
     /// Returns the listed station, offline or not answering writes, whose probe is most overdue;
     /// empty if none is due.
