@@ -73,30 +73,6 @@ TEST_F(ArbiterTest, P3TheDeadlineCountsFromTheArrivalAndIsEarlierForAClientThatW
     }
 }
 
-TEST_F(ArbiterTest, P9WhatHasWaitedLongGoesAheadButAWriteStartsWithinTwoTransactions) {
-    settings.queue.deadline = 60s;
-    BusScript script{settings};
-    script.submit(18, kRead, 99);
-    const Ticket poll = script.submit(17, read_at(1), 1, PriorityClass::poll);
-    for (unsigned i = 0; i < 200 && !script.answered(poll); ++i) {
-        if (i % 2 == 0) script.submit(17, read_at(2 + i), 2);
-        if (script.arbiter().queue_depth() < 8) script.submit(17, kWrite, 3, PriorityClass::write);
-        const Bytes adu = script.sent.back().adu;
-        const Bytes request(adu.begin() + 1, adu.end() - 2);
-        answer(script, adu[0], request[0] == 6 ? request : kReply, 10ms);
-        ASSERT_TRUE(script.next_sent());
-    }
-    EXPECT_TRUE(script.answered(poll));
-}
-
-TEST_F(ArbiterTest, P9WritesGoBeforeReadsOfOtherClients) {
-    bus.submit(17, kRead, 1);
-    bus.submit(17, kRead, 2);
-    bus.submit(18, kWrite, 3, PriorityClass::write);
-    answer(bus, 17, kReply);
-    EXPECT_EQ(bus.next_sent().value().adu[1], 0x06);
-}
-
 TEST_F(ArbiterTest, P9RefusesAtOnceWhenAQueueIsFull) {
     settings.queue.limit = 4;
     settings.queue.per_client = 2;

@@ -229,24 +229,6 @@ TEST_F(JobQueueLimits, P6EqualReadsCountOnce) {
     EXPECT_EQ(queue_.size(), 0u);
 }
 
-TEST_F(JobQueueLimits, P6ContainedReadsCountOnceWhicheverCameFirst) {
-    add(read_of(1, "03 00 12 00 02"_hex));
-    add(read_of(2, "03 00 14 00 02"_hex));
-    EXPECT_EQ(queue_.size(), 2u);
-    const Ticket wide = add(read_of(3, "03 00 10 00 08"_hex));
-    add(read_of(4, "03 00 17 00 01"_hex));
-    EXPECT_EQ(queue_.size(), 1u);
-    add(read_of(5, "03 00 17 00 02"_hex));
-    add(read_of(5, "04 00 12 00 02"_hex));
-    Job alone = read_of(6, "03 00 12 00 02"_hex);
-    alone.alone = true;
-    add(std::move(alone));
-    EXPECT_EQ(queue_.size(), 4u);
-    queue_.remove_if([&](const Job& job) { return job.ticket == wide; });
-    EXPECT_TRUE(queue_.consistent());
-    EXPECT_EQ(queue_.size(), 5u);  // the first two count again; 17 is carried by 17 and 18
-}
-
 TEST_F(JobQueueLimits, P6AReadThatRidesIsTakenWhenTheQueueIsFull) {
     limits(2, 1);
     add(read_of(1, "03 00 10 00 08"_hex));
