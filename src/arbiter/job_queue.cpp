@@ -271,8 +271,7 @@ bool JobQueue::consistent() const {
         if (origin.sources.empty() || of_host != origin.counting) return false;
         counting += of_host;
     }
-    return counting == size_ && waiting == expiries_.size() && clients == home_.size() &&
-           reads_.consistent();
+    return counting == size_ && waiting == expiries_.size() && clients == home_.size();
 }
 
 // Admission to the queue, and dropping jobs for it.

@@ -142,18 +142,4 @@ bool WaitingReads::frees(Ticket ticket, const ReadSpan& span) const {
     return true;
 }
 
-bool WaitingReads::consistent() const {
-    std::size_t widest = 0;
-    for (const auto& [span, equals] : spans_) {
-        const auto table =
-            spans_.lower_bound({span.station, {span.items.table, 0, modbus::kTableItems}});
-        const bool contained = std::any_of(table, spans_.find(span), [&inner = span](auto& wider) {
-            return wider.first.contains(inner);
-        });
-        if (equals.empty() || contained == is_widest(span)) return false;
-        if (!contained) ++widest;
-    }
-    return widest == widest_.size();
-}
-
 }  // namespace panelgate::arbiter
