@@ -32,6 +32,11 @@ Settings completed(Settings settings) {
     return settings;
 }
 
+std::optional<modbus::AsciiTranscript> transcript_of(const Settings& settings) {
+    if (settings.serial.mode != SerialMode::ascii) return std::nullopt;
+    return modbus::AsciiTranscript(settings.ascii_digits, settings.reply_hole);
+}
+
 Quiet quiet_of(const Settings& settings) {
     return Quiet(frame_time(settings.serial, modbus::kMaxRtuAdu), silent_interval(settings.serial));
 }
@@ -59,15 +64,13 @@ Reason reason_of(TimePoint now, const Group& group, const JobQueue& queue) {
 Arbiter::Arbiter(Settings settings)
     : settings_(completed(std::move(settings))),
       orders_(crc_orders(settings_)),
+      ascii_(transcript_of(settings_)),
       stations_(settings_),
       schedule_(settings_),
       quiet_(quiet_of(settings_)),
       unsolicited_(settings_.serial, orders_),
       echo_memory_(settings_.echo),
-      outbox_(settings_) {
-    if (settings_.serial.mode == SerialMode::ascii)
-        ascii_.emplace(settings_.ascii_digits, settings_.reply_hole);
-}
+      outbox_(settings_) {}
 
 void Arbiter::apply(Settings settings) {
     settings = completed(std::move(settings));
@@ -81,9 +84,7 @@ void Arbiter::apply(Settings settings) {
     quiet_ = quiet_of(settings_);
     unsolicited_ = UnsolicitedFrames(settings_.serial, orders_);
     echo_memory_ = EchoMemory(settings_.echo);
-    ascii_.reset();
-    if (settings_.serial.mode == SerialMode::ascii)
-        ascii_.emplace(settings_.ascii_digits, settings_.reply_hole);
+    ascii_ = transcript_of(settings_);
 }
 
 Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
@@ -146,8 +147,8 @@ void Arbiter::deny(TimePoint now, const JobQueue::Test& match) {
     // What became of these nobody knows: they were sent.
     for (const Job& job : schedule_.backlog().remove_retries(match))
         outbox_.finish(job, Fault::timeout);
-    if (!active_) return step(now);
-    for (Job& job : active_->group().jobs) job.barred = job.barred || match(job);
+    if (active_)
+        for (Job& job : active_->group().jobs) job.barred = job.barred || match(job);
     step(now);
 }
 
@@ -174,12 +175,15 @@ void Arbiter::rest_until(TimePoint until) {
 
 void Arbiter::on_line_left() {
     rest_ = std::max(rest_, quiet_.free_at(Duration::zero()));
+    forget_line();
     suspended_ = true;
-    up_ = false;
-    resetting_ = false;
+}
+
+/// What was heard and read over the line is of no use any more.
+void Arbiter::forget_line() {
+    up_ = suspended_ = resetting_ = false;
     stations_.on_line_down();
     unsolicited_.forget();
-    stations_.book().forget_foreign();
     memory_.clear();
 }
 
@@ -199,13 +203,7 @@ void Arbiter::on_line_up(TimePoint now) {
 
 /// A sent request stays outstanding: a device server may hand its reply to the next connection.
 void Arbiter::on_line_down(TimePoint now) {
-    up_ = false;
-    suspended_ = false;
-    resetting_ = false;
-    stations_.on_line_down();
-    unsolicited_.forget();
-    stations_.book().forget_foreign();
-    memory_.clear();
+    forget_line();
     if (active_) {
         note(now, active_->take_unsolicited());
         const Attempt attempt = take_active(now);

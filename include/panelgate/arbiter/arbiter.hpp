@@ -141,6 +141,7 @@ class Arbiter {
 
   private:
     std::optional<ReadCache::Hit> from_memory(TimePoint now, const Job& job) const;
+    void forget_line();
     void step(TimePoint now);
     bool start_next(TimePoint now);
     void start(TimePoint now, Group group);

@@ -56,6 +56,7 @@ class Stations {
             station.replies().on_damaged_bytes(book_, now, bytes, station.settings().crc_order);
     }
     void on_line_down() {
+        book_.forget_foreign();
         for (auto& [id, station] : stations_) station.on_line_down();
     }
     /// The line was opened, on a transport that may stall.
