@@ -287,6 +287,15 @@ class CommandLine {
         keys->add_option("--format", format_, "text or json")
             ->check(CLI::IsMember({"text", "json"}));
         keys->callback([this] { code_ = config_keys(path_, format_ == "json"); });
+        // Asked for by those who know it of other programs; no part of the help.
+        CLI::App* set = command->add_subcommand("set", "")->group("")->allow_extras();
+        set->callback([this] {
+            std::cerr
+                << "panelgate: a setting is changed in the file, with an editor: nothing here "
+                   "would keep its comments; `panelgate check -c NEW --diff OLD` says what a "
+                   "change does\n";
+            code_ = kUsage;
+        });
     }
 
     void add_simulate() {

@@ -62,7 +62,9 @@ std::string duration_name(const KeyShape& shape) {
 
 /// The text schema of the key, or of the entries of its list or map.
 json::object text_of(const KeyShape& shape) {
-    if (shape.holds_integers) return {{"type", "integer"}};
+    if (shape.holds_integers && shape.max == 0) return {{"type", "integer"}};
+    if (shape.holds_integers)
+        return {{"type", "integer"}, {"minimum", shape.min}, {"maximum", shape.max}};
     if (shape.pattern.empty() && shape.longest_text == 0) return reference("text");
     json::object made{{"type", "string"}, {"minLength", 1}};
     if (shape.may_be_number) made["type"] = json::array{"string", "number", "boolean"};

@@ -281,6 +281,18 @@ void keep_profiles(Config& config) {
     }
 }
 
+/// Something must be served, unless a key is probably mistyped.
+void check_servers(Loading& loading, MapReader& root, const yaml::Node& tree) {
+    const bool mistyped = root.is_mistyped("modbus_tcp") || root.is_mistyped("http") ||
+                          std::ranges::any_of(tree.entries, [](const yaml::Entry& entry) {
+                              return is_http(entry.key);
+                          });
+    if (!serves(root) && !mistyped)
+        loading.problems.add({1, 1},
+                             "nothing to serve: add 'modbus_tcp' or 'http', such as modbus_tcp: "
+                             "[{listen: 127.0.0.1:502}]");
+}
+
 void load_tree(Loading& loading, yaml::Node& tree) {
     yaml::resolve_merge_keys(tree, loading.problems);
     drop_extensions(tree);
@@ -288,6 +300,8 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     if (yaml::Description* description = loading.problems.description()) description->begin(tree);
     MapReader root(tree, loading.problems, "the configuration");
     if (tree.kind != yaml::Node::Kind::map) return;
+    for (const std::string_view key : root_keys().names())
+        loading.top_keys.push_back({key, {}, "the top level", {}, {}, tree.mark.column});
     loading.config.profiles = load_profiles(loading, root);
     load_lines(loading, root);
     keep_profiles(loading.config);
@@ -298,20 +312,13 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     load_http(loading, root);
     load_mqtt(loading, root);
     load_rules(loading, root);
-    load_map(root, "log", "{level: info}",
-             [&](MapReader& in) { log_keys().read(in, loading.config.log); });
-    load_map(root, "realtime", "{priority: 20, lock_memory: true}",
-             [&](MapReader& in) { realtime_keys().read(in, loading.config.realtime); });
+    load_section(loading, root, "log", "{level: info}",
+                 [&](MapReader& in) { log_keys().read(in, loading.config.log); });
+    load_section(loading, root, "realtime", "{priority: 20, lock_memory: true}",
+                 [&](MapReader& in) { realtime_keys().read(in, loading.config.realtime); });
     load_audit(loading, root);
     load_relays(loading, root);
-    const bool mistyped = root.is_mistyped("modbus_tcp") || root.is_mistyped("http") ||
-                          std::ranges::any_of(tree.entries, [](const yaml::Entry& entry) {
-                              return is_http(entry.key);
-                          });
-    if (!serves(root) && !mistyped)
-        loading.problems.add({1, 1},
-                             "nothing to serve: add 'modbus_tcp' or 'http', such as modbus_tcp: "
-                             "[{listen: 127.0.0.1:502}]");
+    check_servers(loading, root, tree);
     root.elsewhere(kElsewhere);
     root.has("templates");  // known, though already resolved
     root_keys().read(root, loading.config);
@@ -371,19 +378,6 @@ std::string name_hint(std::string_view typed) {
         if (is_name(one)) name += one;
     }
     return name.empty() ? "" : "; write " + name;
-}
-
-std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
-                         std::string_view noun) {
-    const std::string near = nearest(typed, known);
-    if (!near.empty()) return "; did you mean '" + near + "'?";
-    if (known.empty()) return "; there are none";
-    std::string list;
-    constexpr std::size_t kMost = 30;
-    for (const std::string_view word : known.first(std::min(kMost, known.size())))
-        list += (list.empty() ? "" : ", ") + std::string(word);
-    if (known.size() > kMost) list += " and " + std::to_string(known.size() - kMost) + " more";
-    return "; known " + std::string(noun) + " are " + list;
 }
 
 std::optional<bool> load_read_only(MapReader& in) {

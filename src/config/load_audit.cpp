@@ -74,12 +74,13 @@ std::string size_text(std::size_t bytes) {
 }
 
 void load_audit(Loading& loading, MapReader& root) {
-    load_map(root, "audit", "{file: /var/log/panelgate/audit.jsonl}", [&](MapReader& in) {
-        audit::Settings& settings = loading.config.audit.emplace();
-        load_file(in, settings);
-        load_rotation(in, settings);
-        audit_keys().read(in, settings);
-    });
+    load_section(loading, root, "audit", "{file: /var/log/panelgate/audit.jsonl}",
+                 [&](MapReader& in) {
+                     audit::Settings& settings = loading.config.audit.emplace();
+                     load_file(in, settings);
+                     load_rotation(in, settings);
+                     audit_keys().read(in, settings);
+                 });
 }
 
 }  // namespace panelgate::config

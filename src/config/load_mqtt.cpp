@@ -220,18 +220,15 @@ void warn_of_broker(Loading& loading, MapReader& in, const mqtt::Settings& setti
 }  // namespace
 
 void load_mqtt(Loading& loading, MapReader& root) {
-    const yaml::Node* node = root.map("mqtt", kMqttExample);
-    if (node == nullptr) return;
-    MapReader in(*node, loading.problems, "mqtt", kMqttExample);
-    in.elsewhere(kMqttKeysElsewhere);
-    mqtt::Settings settings;
-    load_broker(in, settings);
-    load_format(in, settings);
-    load_session(loading, in, settings);
-    load_tls(loading, in, settings);
-    in.finish();
-    warn_of_broker(loading, in, settings);
-    loading.config.mqtt = std::move(settings);
+    load_section(loading, root, "mqtt", kMqttExample, [&](MapReader& in) {
+        in.elsewhere(kMqttKeysElsewhere);
+        mqtt::Settings& settings = loading.config.mqtt.emplace();
+        load_broker(in, settings);
+        load_format(in, settings);
+        load_session(loading, in, settings);
+        load_tls(loading, in, settings);
+        warn_of_broker(loading, in, settings);
+    });
 }
 
 }  // namespace panelgate::config

@@ -21,21 +21,15 @@ constexpr std::array<std::string_view, 4> kDefaultRoles{"viewer", "operator", "e
 constexpr std::string_view kRolePattern = "^[a-z0-9-]+$";
 constexpr std::string_view kRoleExample = "{name: setter, rights: [read, write]}";
 
-std::vector<std::string_view> right_words() {
+void load_rights(Loading& loading, MapReader& in, OwnRole& role) {
     std::vector<std::string_view> words;
     for (const Right right : kAllRights) words.push_back(label(right));
-    return words;
-}
-
-void load_rights(Loading& loading, MapReader& in, OwnRole& role) {
-    const std::vector<std::string_view> words = right_words();
-    std::string pattern;
-    for (const std::string_view word : words)
-        pattern += (pattern.empty() ? "^(" : "|") + std::string(word);
-    in.looks_like("rights", pattern + ")$");
     const Node* list = in.sequence("rights", "[read, write]");
-    in.schema("rights").fewest = 1;
-    in.schema("rights").required = true;
+    in.looks_like_one_of("rights", words);
+    yaml::KeyShape& schema = in.schema("rights");
+    schema.fewest = 1;
+    schema.required = true;
+    schema.may_be_null = false;
     if (list == nullptr || list->items.empty()) {
         in.problem(list == nullptr ? "name" : "rights",
                    "a role needs rights, such as rights: [read, write]");
@@ -47,8 +41,7 @@ void load_rights(Loading& loading, MapReader& in, OwnRole& role) {
         if (item.kind == Node::Kind::scalar && known != kAllRights.end()) {
             role.rights.add(*known);
         } else {
-            loading.problems.add(item.mark, "there is no right " + yaml::quote(item.scalar) +
-                                                did_you_mean(item.scalar, words, "rights"));
+            loading.problems.add(item.mark, yaml::no_such("right", item.scalar, words));
         }
     }
 }

@@ -128,8 +128,8 @@ const Line* find_line(Loading& loading, yaml::Mark mark, const std::string& name
     names.reserve(loading.config.lines.size());
     for (const Line& line : loading.config.lines) names.push_back(line.name);
     const std::string commas = missing_commas(name);
-    loading.problems.add(mark, "there is no line " + yaml::quote(name) +
-                                   (commas.empty() ? did_you_mean(name, names, "lines") : commas));
+    loading.problems.add(mark, commas.empty() ? yaml::no_such("line", name, names)
+                                              : "there is no line " + yaml::quote(name) + commas);
     return nullptr;
 }
 
@@ -352,9 +352,7 @@ void load_access(Loading& loading, MapReader& in, tcp_server::Settings& settings
 }
 
 void load_modbus_tcp(Loading& loading, MapReader& root) {
-    const Node* list = root.sequence("modbus_tcp", "[{listen: 127.0.0.1:502}]");
-    if (list == nullptr) return;
-    for (const Node& node : list->items) {
+    for (const Node& node : root.entries("modbus_tcp", "[{listen: 127.0.0.1:502}]")) {
         tcp_server::Settings settings = load_listener(loading, node);
         const std::string name = settings.name();
         const std::string first = loading.firsts.again("listener " + name, node.mark);
@@ -365,24 +363,21 @@ void load_modbus_tcp(Loading& loading, MapReader& root) {
 }
 
 void load_http(Loading& loading, MapReader& root) {
-    const Node* node = root.map("http", "{listen: 127.0.0.1:8080}");
-    if (node == nullptr) return;
-    MapReader in(*node, loading.problems, "http");
-    web::Settings settings;
-    load_listen(in, settings);
-    if (auto standing = load_role(loading, in, "anonymous", true))
-        settings.anonymous = std::move(*standing);
-    http_keys().read(in, settings);
-    load_hosts(loading, in, settings);
-    load_cors(loading, in, settings.cors);
-    load_networks(loading, in, "allow", settings.allow);
-    load_tokens(loading, in, settings.tokens);
-    settings.tls = load_tls(loading, in);
-    in.finish();
-    if (settings.port != 0)
-        loading.firsts.once(in, "listen", "listener " + settings.name(),
-                            settings.name() + " is a modbus_tcp listener already");
-    loading.config.http = std::move(settings);
+    load_section(loading, root, "http", "{listen: 127.0.0.1:8080}", [&](MapReader& in) {
+        web::Settings& settings = loading.config.http.emplace();
+        load_listen(in, settings);
+        if (auto standing = load_role(loading, in, "anonymous", true))
+            settings.anonymous = std::move(*standing);
+        http_keys().read(in, settings);
+        load_hosts(loading, in, settings);
+        load_cors(loading, in, settings.cors);
+        load_networks(loading, in, "allow", settings.allow);
+        load_tokens(loading, in, settings.tokens);
+        settings.tls = load_tls(loading, in);
+        if (settings.port != 0)
+            loading.firsts.once(in, "listen", "listener " + settings.name(),
+                                settings.name() + " is a modbus_tcp listener already");
+    });
 }
 
 }  // namespace panelgate::config

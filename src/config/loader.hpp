@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/describe.hpp"
@@ -15,6 +16,8 @@
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::config {
+
+using yaml::did_you_mean;
 
 /// Where what may be there once was written first.
 class Firsts {
@@ -43,7 +46,8 @@ struct Loading {
     std::set<std::string> station_names;
     /// `lines`, or a line's `stations`, was no list: names that are not known may be right.
     bool names_missing = false;
-    Firsts firsts{};  ///< "line floor1", "device /dev/ttyS1"
+    Firsts firsts{};                          ///< "line floor1", "device /dev/ttyS1"
+    std::vector<yaml::Elsewhere> top_keys{};  ///< of the file, for maps that may end unnoticed
 
     /// The file that a text of the configuration names.
     std::string path_of(const std::string& typed) const { return beside(problems.file(), typed); }
@@ -67,6 +71,16 @@ void load_map(yaml::MapReader& in, std::string_view key, std::string_view exampl
     inside.finish();
 }
 
+/// The same for a map at the top level: a key that belongs beside it is told so.
+template <class Load>
+void load_section(Loading& loading, yaml::MapReader& root, std::string_view key,
+                  std::string_view example, const Load& load) {
+    load_map(root, key, example, [&](yaml::MapReader& in) {
+        in.elsewhere(loading.top_keys);
+        load(in);
+    });
+}
+
 /// Line and station names: [a-z0-9-]+.
 bool is_name(std::string_view text);
 /// Returns a regular expression for texts of these letters; a '-' must be the last of them.
@@ -79,9 +93,6 @@ std::optional<std::string> load_name(yaml::MapReader& in, bool required,
 std::string name_hint(std::string_view typed);
 /// Reads the key `access`: true for read_only.
 std::optional<bool> load_read_only(yaml::MapReader& in);
-/// Returns "; did you mean 'x'?" if one of `known` is near, else "; known NOUN are a, b, c".
-std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
-                         std::string_view noun);
 
 /// Reports missing lines, unless a key is probably a mistyped `lines`: then call refuse_no_lines()
 /// if finish() accepted that key.

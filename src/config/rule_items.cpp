@@ -221,7 +221,9 @@ void load_table_range(Loading& loading, const Node& node, Rule& rule) {
 }  // namespace
 
 void load_range(Loading& loading, MapReader& in, Rule& rule) {
-    in.schema("range").may_be_text = true;
+    yaml::KeyShape& schema = in.schema("range");
+    schema.may_be_text = true;
+    schema.may_be_null = false;
     const Node* node = in.child("range");
     if (node != nullptr && node->kind == Node::Kind::map) {
         if (const Node* map = in.map("range")) load_table_range(loading, *map, rule);

@@ -83,6 +83,18 @@ std::optional<std::string> hexadecimal(std::string_view text) {
     return std::to_string(value);
 }
 
+/// Factors as people write them: x0.1, 1/10, /10 and 10^-1; 9.6k.
+std::optional<double> factor(std::string_view text) {
+    if (text.starts_with('x')) text.remove_prefix(1);
+    const std::size_t sign = std::min(text.find_first_of("/^k"), text.size());
+    const auto left = text.starts_with('/') ? 1 : parse_number(text.substr(0, sign));
+    if (!left || sign == text.size()) return left;
+    if (text.substr(sign) == "k") return *left * 1000;
+    const auto right = parse_number(text.substr(sign + 1));
+    if (!right || text[sign] == 'k') return std::nullopt;
+    return text[sign] == '/' ? *left / *right : std::pow(*left, *right);
+}
+
 /// 600 of 9,600
 bool is_group(std::string_view text) {
     return text.size() == 3 && text.find_first_not_of(kDecimalDigits) == text.npos;
@@ -162,6 +174,8 @@ std::string number_hint(std::string_view text, bool whole) {
         if (text.starts_with(minus)) return write('-' + std::string(text.substr(minus.size())));
     if (std::string hint = comma_hint(text, whole); !hint.empty()) return hint;
     auto meant = hexadecimal(text);
+    const auto product = whole && !text.ends_with('k') ? std::nullopt : factor(text);
+    if (!meant && product) meant = plain_number(number_text(*product), whole);
     if (!meant) meant = plain_number(bare(text, whole), whole);
     return meant && *meant != text ? write(*meant) : "";
 }

@@ -78,6 +78,8 @@ class CommandLine(unittest.TestCase):
             self.assertIn("there is no setting", self.expect(USAGE, "config", "get", path, "-c", example).stderr)
         self.assertIn("did you mean 'lines.floor1.retries'",
                       self.expect(USAGE, "config", "get", "lines.floor1.retires", "-c", example).stderr)
+        self.assertIn("is changed in the file, with an editor",
+                      self.expect(USAGE, "config", "set", "lines.floor1.retries", "3", "--dry-run").stderr)
 
     def test_the_keys_of_a_configuration_are_explained(self):
         keys = lambda *path: self.expect(0, "config", "keys", *path).stdout

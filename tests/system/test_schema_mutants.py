@@ -54,11 +54,13 @@ realtime: {{priority: 0}}
 ONLY_CHECK = {
     "what a profile has": {
         "lines/stations/points/at", "lines/stations/poll/read", "lines/stations/poll/count",
-        "lines/stations/profile", "relays/count", "relays/from", "relays/to"},
+        "lines/stations/profile", "relays/count", "relays/from", "relays/to",
+        "access/rules/range"},
     "names that stand elsewhere, and those that would stand twice": {
         "lines/name", "lines/stations", "lines/stations/name", "lines/stations/template",
         "modbus_tcp/lines", "serial_masters/lines", "http/listen",
-        "modbus_tcp/diagnostics_unit", "access/roles/name", "access/rules/stations"},
+        "modbus_tcp/diagnostics_unit", "access/roles/name", "access/rules/stations",
+        "access/rules/listeners", "access/rules/tokens", "http/anonymous", "http/tokens/role"},
     "what is in files": {
         "http/tokens/file", "mqtt/ca", "mqtt/certificate", "mqtt/key", "mqtt/password_file",
         "profiles_dir"},
@@ -69,7 +71,7 @@ ONLY_CHECK = {
         "lines/stations/points/min", "lines/stations/timing/adaptive_ceiling",
         "serial_masters/framing", "access/rules/allow", "access/rules/deny"},
     "1e-3 is a name, and a number for YAML, which 0.5 is, too": {
-        "lines/stations/points/name", "serial_masters/name", "http/hosts"},
+        "lines/stations/points/name", "serial_masters/name", "http/hosts", "access/rules/name"},
 }
 ABSENT = object()
 VARIABLE = "${NOT_SET:-1}"  # nobody knows what the environment will bring

@@ -21,7 +21,7 @@ struct KeyShape {
     Kind kind = Kind::text;
     bool required = false;
     std::vector<std::string> words;  ///< of Kind::word; for other kinds, words accepted besides
-    std::int64_t min = 0;            ///< of Kind::integer
+    std::int64_t min = 0;            ///< of Kind::integer, and of holds_integers unless both are 0
     std::int64_t max = 0;
     Duration shortest{};  ///< of Kind::duration
     Duration longest{};

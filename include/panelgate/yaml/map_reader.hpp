@@ -22,6 +22,7 @@ struct Elsewhere {
     std::string_view owner;         ///< what has it: "a station"
     std::string_view instead = {};  ///< if nothing has it: what to do, "remove it: ..."
     std::span<const std::string_view> words = {};  ///< its possible values, if it has such
+    int top_column = 0;  ///< the column of the top level, if it is a key of that; else 0
 };
 
 /// Reads the keys of one map with types and ranges. Every getter returns nothing if the key is
@@ -37,6 +38,8 @@ class MapReader {
     ~MapReader() = default;
     MapReader(const MapReader&) = delete;
     MapReader& operator=(const MapReader&) = delete;
+
+    static constexpr std::size_t kAnyNumber = 0;
 
     bool has(std::string_view key);
     /// True if finish() will report a key that is probably this one, or belongs below it, which
@@ -84,6 +87,9 @@ class MapReader {
     /// Like child(), but another kind is a problem, shown with an example such as "{mode: off}".
     const Node* map(std::string_view key, std::string_view example = {});
     const Node* sequence(std::string_view key, std::string_view example = {});
+    /// The entries of a list, at most so many: "at most 64 relays, not 65". None if it is absent.
+    std::span<const Node> entries(std::string_view key, std::string_view example,
+                                  std::size_t most = kAnyNumber, std::string_view what = {});
     /// The scalars of a list that has one at least, as an empty one could mean all or none; `any`
     /// says what leaving it out means.
     std::vector<const Node*> items(std::string_view key, std::string_view example,
@@ -98,22 +104,22 @@ class MapReader {
     /// The text, or those in a list or map, must match this regular expression (ECMA 262);
     /// `number`: it may look like a number to YAML.
     void looks_like(std::string_view key, std::string_view pattern, bool number = false);
+    /// The same for one of these words.
+    void looks_like_one_of(std::string_view key, std::span<const std::string_view> words);
     /// What the key is for, what leaving it out means in the file's notation, and what a change of
     /// it needs. The keys of a map are in the order of these calls.
     void about(std::string_view key, std::string_view initial, std::string_view text,
                std::string_view change);
     /// What a Description records of a key, to be modified at once.
     KeyShape& schema(std::string_view key);
-    /// Reports a list with more entries, "at most 64 relays, not 65", and returns false.
-    bool at_most(std::string_view key, std::size_t most, std::string_view what);
     /// True if `key` has this word and `other`, which it then needs, is absent.
     bool lacks(std::string_view key, std::string_view word, std::string_view other);
     /// `key` is allowed only if `other` has one of these words, or, with `absent`, is missing.
     void belongs(std::string_view key, std::string_view other,
                  std::span<const std::string_view> words, bool absent = false);
 
-    /// Sets keys that belong in another map, which finish() then names. Must outlive this.
-    void elsewhere(std::span<const Elsewhere> keys) { elsewhere_ = keys; }
+    /// Adds keys that belong in another map, which finish() then names. Must outlive this.
+    void elsewhere(std::span<const Elsewhere> keys) { elsewhere_.push_back(keys); }
 
     /// Returns the place of the key's value (of the map if the key is absent), for later problems.
     Mark mark(std::string_view key) const;
@@ -150,6 +156,7 @@ class MapReader {
     std::string is_unknown(std::string_view key) const;
     std::string unknown(std::size_t entry) const;
     std::string place_of(const Entry& entry, bool exactly) const;
+    std::string told(const Elsewhere& place, const Entry& entry, bool near) const;
 
     const Node* node_;
     Problems* problems_;
@@ -159,9 +166,16 @@ class MapReader {
     std::vector<std::string> excused_;  ///< required, absent, and probably mistyped
     std::vector<std::string> parents_;  ///< known keys with a map or a list
     std::vector<std::pair<std::string_view, std::string>> not_empty_;
-    std::span<const Elsewhere> elsewhere_;
+    std::vector<std::span<const Elsewhere>> elsewhere_;
     int order_ = 0;  ///< of about()
 };
+
+/// Returns "; did you mean 'x'?" if one of `known` is near, else "; known NOUN are a, b, c".
+std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
+                         std::string_view noun);
+/// Returns "there is no WHAT 'typed'", with the same behind it.
+std::string no_such(std::string_view what, std::string_view typed,
+                    std::span<const std::string_view> known);
 
 /// Parse the text forms above for scalars that are not map values; nothing for other text. Units:
 /// us, ms, s, min.

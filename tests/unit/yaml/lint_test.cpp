@@ -213,11 +213,12 @@ TEST(Hints, WriteADurationAsItIsRead) {
 TEST(Hints, WriteANumberAsItIsRead) {
     const HintOf fraction = [](std::string_view text) { return number_hint(text, false); };
     const HintOf whole = [](std::string_view text) { return number_hint(text, true); };
-    expect_hints(fraction, {"0,1 -> 0.1", "+5 -> 5", "400 C -> 400", "10% -> 0.1"});
+    expect_hints(fraction, {"0,1 -> 0.1", "+5 -> 5", "400 C -> 400", "10% -> 0.1", "x0.1 -> 0.1",
+                            "1/10 -> 0.1", "/10 -> 0.1", "10^-1 -> 0.1", "9.6k -> 9600"});
     expect_none(fraction, {"", "ten", "-", ".", "/", "1/0", "x", "^2"});
     expect_hints(whole, {"0x1F -> 31", "38.400 -> 38400", "1.0 -> 1", "9600 baud -> 9600",
-                         "9.6e3 -> 9600", "9,600 -> 9600", "\u22125 -> -5"});
-    expect_none(whole, {"1.5", "1.5.600", "k", "ten", "1/0"});
+                         "9.6e3 -> 9600", "9,600 -> 9600", "\u22125 -> -5", "40k -> 40000"});
+    expect_none(whole, {"1.5", "1.5.600", "k", "ten", "1/0", "9600/8", "x"});
 }
 
 TEST(Hints, WriteAVariableAndABlankAsTheyAreRead) {
