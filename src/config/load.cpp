@@ -368,6 +368,14 @@ std::optional<std::string> load_name(MapReader& in, bool required, const std::st
     return std::nullopt;
 }
 
+std::string load_unique_name(Loading& loading, MapReader& in, const std::string& what) {
+    std::string name = load_name(in, true).value_or("");
+    if (!name.empty())
+        loading.firsts.once(in, "name", what + ' ' + name,
+                            "there are two " + what + "s '" + name + '\'');
+    return name;
+}
+
 std::string name_hint(std::string_view typed) {
     constexpr std::size_t kLongest = 40;
     std::string name;

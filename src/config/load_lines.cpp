@@ -204,12 +204,8 @@ Line load_line(Loading& loading, const Node& node) {
     in.elsewhere(kElsewhere);
     in.elsewhere(loading.top_keys);
     Line line;
-    line.name = load_name(in, true).value_or("");
-    if (!line.name.empty()) {
-        loading.firsts.once(in, "name", "line " + line.name,
-                            "there are two lines '" + line.name + '\'');
-        loading.config.line_marks.emplace(line.name, in.mark("name"));
-    }
+    line.name = load_unique_name(loading, in, "line");
+    if (!line.name.empty()) loading.config.line_marks.emplace(line.name, in.mark("name"));
     load_device(loading, in, line);
     load_mode(in, line);
     const bool serial_known = load_serial(loading, in, line.device.serial, &line);

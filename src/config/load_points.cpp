@@ -2,6 +2,7 @@
 #include <array>
 #include <cstdint>
 
+#include "hints.hpp"
 #include "load_stations.hpp"
 #include "panelgate/base/decimal.hpp"
 #include "panelgate/base/text.hpp"
@@ -122,19 +123,13 @@ void load_label(MapReader& in, const yaml::Entry& entry, Point& point) {
     const auto raw = yaml::parse_integer(entry.key);
     const bool is_text = entry.value.kind == Node::Kind::scalar && !entry.value.comma;
     if (!raw || !is_text || entry.value.scalar.empty()) {
-        const bool turned = yaml::parse_integer(entry.value.scalar).has_value();
         const bool is_null = raw && entry.value.kind == Node::Kind::null;
-        if (is_null) {
-            in.problems().add(entry.mark,
-                              "a label must be a text, not nothing; for the word null "
-                              "write 'null' in quotes: " +
-                                  entry.key + ": 'null'");
-            return;
-        }
-        in.problems().add(entry.mark,
-                          "labels are RAW-NUMBER: text, such as 1: running" +
-                              (turned ? "; write " + entry.value.scalar + ": " + entry.key
-                                      : yaml::number_blank_hint(entry.key)));
+        in.problems().add(
+            entry.mark,
+            is_null ? "a label must be a text, not nothing; for the word null write 'null' in "
+                      "quotes: " +
+                          entry.key + ": 'null'"
+                    : "labels are RAW-NUMBER: text, such as 1: running" + number_key_hint(entry));
         return;
     }
     if (const RawRange range = label_range(point.type); !range.contains(*raw)) {

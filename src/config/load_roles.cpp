@@ -49,15 +49,12 @@ void load_rights(Loading& loading, MapReader& in, OwnRole& role) {
 void load_own_role(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a role", kRoleExample);
     OwnRole role;
-    role.name = load_name(in, true).value_or("");
+    role.name = load_unique_name(loading, in, "role");
     const bool is_taken =
         role.name == "none" || role.name == "default" ||
         std::ranges::find(kDefaultRoles, std::string_view(role.name)) != kDefaultRoles.end();
     if (is_taken)
         in.problem("name", "the role '" + role.name + "' is there already; give it another name");
-    if (!role.name.empty())
-        loading.firsts.once(in, "name", "role " + role.name,
-                            "there are two roles '" + role.name + '\'');
     load_rights(loading, in, role);
     own_role_keys().read(in, role);
     in.finish();

@@ -165,14 +165,11 @@ void load_functions(Loading& loading, MapReader& in, Rule& rule) {
 }
 
 void load_name_of(Loading& loading, MapReader& in, Rule& rule) {
-    rule.name = load_name(in, true).value_or("");
+    rule.name = load_unique_name(loading, in, "rule");
     if (rule.name == "default")
         in.problem("name", "a rule cannot be called default: that is what no rule decides");
     if (is_role(loading.config, rule.name))
         in.problem("name", "a rule cannot be called as a role: refusals name either");
-    if (!rule.name.empty())
-        loading.firsts.once(in, "name", "rule " + rule.name,
-                            "there are two rules '" + rule.name + '\'');
 }
 
 void load_rule(Loading& loading, const Node& node) {

@@ -88,12 +88,6 @@ using tcp_server::BroadcastMode;
 
 constexpr std::string_view kMasterExample = "{name: plc, device: /dev/ttyUSB1, lines: [floor1]}";
 
-void check_name(Loading& loading, MapReader& in, const Settings& settings) {
-    if (settings.name.empty()) return;
-    loading.firsts.once(in, "name", "master " + settings.name,
-                        "there are two serial masters '" + settings.name + '\'');
-}
-
 /// Two users of one device would take each other's bytes. An invalid device is a problem already.
 void check_device(Loading& loading, MapReader& in, const line::Settings& port) {
     if (!port.device.starts_with('/')) return;
@@ -196,8 +190,7 @@ Settings load_master(Loading& loading, const Node& node) {
     in.elsewhere(kMasterKeysElsewhere);
     Settings settings;
     settings.access.diagnostics_unit.reset();
-    settings.name = load_name(in, true).value_or("");
-    check_name(loading, in, settings);
+    settings.name = load_unique_name(loading, in, "serial master");
     const bool serial_known = load_port(loading, in, settings.device, mode_of(node));
     check_device(loading, in, settings.device);
     load_access(loading, in, settings.access);

@@ -222,11 +222,8 @@ void load_units(Loading& loading, MapReader& in, tcp_server::Settings& settings)
     for (const yaml::Entry& entry : map->entries) {
         const auto unit = yaml::parse_integer(entry.key);
         if (!unit || *unit < 0 || *unit > 255) {
-            const bool turned = yaml::parse_integer(entry.value.scalar).has_value();
-            loading.problems.add(
-                entry.mark, "a unit id is a number from 0 to 255, not " + yaml::quote(entry.key) +
-                                (turned ? "; write " + entry.value.scalar + ": " + entry.key
-                                        : yaml::number_blank_hint(entry.key)));
+            loading.problems.add(entry.mark, "a unit id is a number from 0 to 255, not " +
+                                                 yaml::quote(entry.key) + number_key_hint(entry));
             continue;
         }
         if (const auto target = unit_target(loading, entry.value)) {

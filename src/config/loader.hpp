@@ -52,6 +52,11 @@ struct Loading {
     /// The file that a text of the configuration names.
     std::string path_of(const std::string& typed) const { return beside(problems.file(), typed); }
 
+    /// The content of a regular file; nothing if it cannot be read. Another one might never end.
+    std::optional<std::string> content_of(const std::string& path) const {
+        return files.is_special(path) ? std::nullopt : files.read(path);
+    }
+
     void warn(yaml::Mark mark, const std::string& message) {
         std::string text = yaml::format({problems.file(), mark, "warning: " + message});
         // Many stations may have it from one template.
@@ -89,6 +94,9 @@ std::string pattern_of(std::string_view letters);
 /// schema.
 std::optional<std::string> load_name(yaml::MapReader& in, bool required,
                                      const std::string& pattern = name_pattern());
+/// Reads the same, required, and reports one that is there before: "there are two rules 'a'"; "" if
+/// it is invalid.
+std::string load_unique_name(Loading& loading, yaml::MapReader& in, const std::string& what);
 /// Returns "; write big-press" for "Big Press"; "" if no letter is usable.
 std::string name_hint(std::string_view typed);
 /// Reads the key `access`: true for read_only.
