@@ -21,7 +21,6 @@
 #include "panelgate/config/describe.hpp"
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/yaml/document.hpp"
-#include "panelgate/yaml/secrets.hpp"
 #include "panelgate/yaml/variables.hpp"
 #include "tables.hpp"
 
@@ -434,7 +433,7 @@ std::optional<Config> load_text(std::string_view text, const Files& files, yaml:
 std::optional<Config> load(std::string_view text, const Files& files, yaml::Problems& problems,
                            const yaml::Environment& environment) {
     auto config = load_text(text, files, problems, environment);
-    if (!config) yaml::conceal_secrets(text, problems);
+    if (!config) problems.conceal_secrets(text);
     return config;
 }
 

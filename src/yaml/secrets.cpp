@@ -1,5 +1,3 @@
-#include "panelgate/yaml/secrets.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -7,6 +5,7 @@
 #include <vector>
 
 #include "panelgate/base/text.hpp"
+#include "panelgate/yaml/document.hpp"
 
 namespace panelgate::yaml {
 
@@ -69,7 +68,7 @@ void hide(std::string& text, const std::string& part) {
 
 }  // namespace
 
-void conceal_secrets(std::string_view text, Problems& problems) {
+void Problems::conceal_secrets(std::string_view text) {
     int number = 0;
     while (!text.empty()) {
         const std::size_t end = std::min(text.find('\n'), text.size());
@@ -80,10 +79,9 @@ void conceal_secrets(std::string_view text, Problems& problems) {
             line.remove_suffix(1);
         const std::string_view secret = secret_in(line);
         if (secret.empty()) continue;
-        for (Problem& problem : problems.list()) {
+        for (Problem& problem : list_) {
             // Advice at a neighbouring line may quote it, too.
-            if (problem.file != problems.file() || std::abs(problem.mark.line - number) > 1)
-                continue;
+            if (problem.file != file_ || std::abs(problem.mark.line - number) > 1) continue;
             for (const std::string& part : parts_of(secret)) {
                 hide(problem.message, part);
                 hide(problem.excerpt, part);

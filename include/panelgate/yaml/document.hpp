@@ -48,7 +48,10 @@ class Problems {
     }
     bool empty() const { return list_.empty(); }
     const std::vector<Problem>& list() const { return list_; }
-    std::vector<Problem>& list() { return list_; }
+    /// Takes what follows `password`, `token`, `secret` and the like in the file's text out of its
+    /// problems' messages: they go to the log, and to whoever may ask what came of a reload. A
+    /// secret does not belong there, but with a slip it is no value of a key that says so.
+    void conceal_secrets(std::string_view text);
     /// Returns this file's problems first, then those of other files, by line and column; of many
     /// the first kMaxShown, and how many others there are as the last one.
     std::vector<Problem> shown() const;
