@@ -359,11 +359,13 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
         bool others;
         bool in_budget = true;
         std::optional<std::uint8_t> reads_of{};  ///< only of this station
+        bool polls = false;                      ///< only these
     } wanted{others_go_first(now, stations, quiet)};
     const JobQueue::Test may_run = runnable(now, stations, quiet);
     const JobQueue::Test test = [&](const Job& job) {
         if (wanted.reads_of && (job.station != *wanted.reads_of || !job.request.is_read()))
             return false;
+        if (wanted.polls && job.priority != PriorityClass::poll) return false;
         return (!wanted.others || has_turn(job)) && may_run(job) &&
                (!wanted.in_budget || stations.may_spend(now, job));
     };
@@ -377,6 +379,13 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
     if (!next.job()->request.is_read() && stations.has_read_turn(next.job()->station)) {
         wanted.reads_of = next.job()->station;
         if (const auto read = queue.choose(test); read.job() != nullptr) next = read;
+    }
+    // ... and now and then its poll goes before its read.
+    if (next.job()->priority == PriorityClass::read &&
+        stations.has_poll_turn(next.job()->station)) {
+        wanted.reads_of = next.job()->station;
+        wanted.polls = true;
+        if (const auto poll = queue.choose(test); poll.job() != nullptr) next = poll;
     }
     if (!gap_is_over(now, next.job()->station, stations, quiet)) return {};
     if (auto read = read_before(now, *next.job(), stations, echo)) return std::move(*read);

@@ -118,6 +118,11 @@ class Stations {
         const Station* station = find(id);
         return station != nullptr && station->has_read_turn();
     }
+    /// True if a waiting poll of this station goes before its reads.
+    bool has_poll_turn(std::uint8_t id) const {
+        const Station* station = find(id);
+        return station != nullptr && station->has_poll_turn();
+    }
 
     /// Returns the listed station, offline or not answering writes, whose probe is most overdue;
     /// empty if none is due.
