@@ -353,19 +353,31 @@ std::optional<Schedule::Next> Schedule::read_before(TimePoint now, const Job& jo
     return Next{learning_for(job, stations.of(job.station)), false};
 }
 
+/// P9: in the turn of a station's write its read goes first, and the write is next; now and then
+/// its poll goes before its read.
+JobQueue::Choice Schedule::own_turn(JobQueue::Choice next, const Stations& stations,
+                                    const JobQueue::Test& may_run) const {
+    const std::uint8_t station = next.job()->station;
+    const auto prefer = [&](bool (*is)(const Job&)) {
+        const auto own = backlog_.queue().choose(
+            [&, is](const Job& job) { return job.station == station && is(job) && may_run(job); });
+        if (own.job() != nullptr) next = own;
+    };
+    if (!next.job()->request.is_read() && stations.has_read_turn(station))
+        prefer([](const Job& job) { return job.request.is_read(); });
+    if (next.job()->priority == PriorityClass::read && stations.has_poll_turn(station))
+        prefer([](const Job& job) { return job.priority == PriorityClass::poll; });
+    return next;
+}
+
 Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quiet,
                                   const EchoMemory& echo) {
     struct {
         bool others;
         bool in_budget = true;
-        std::optional<std::uint8_t> reads_of{};  ///< only of this station
-        bool polls = false;                      ///< only these
     } wanted{others_go_first(now, stations, quiet)};
     const JobQueue::Test may_run = runnable(now, stations, quiet);
     const JobQueue::Test test = [&](const Job& job) {
-        if (wanted.reads_of && (job.station != *wanted.reads_of || !job.request.is_read()))
-            return false;
-        if (wanted.polls && job.priority != PriorityClass::poll) return false;
         return (!wanted.others || has_turn(job)) && may_run(job) &&
                (!wanted.in_budget || stations.may_spend(now, job));
     };
@@ -375,18 +387,7 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
     wanted.in_budget = next.job() != nullptr;
     if (next.job() == nullptr) next = queue.choose(test);
     if (next.job() == nullptr) return {};
-    // P9: in the turn of a station's write its read goes first, and the write is next.
-    if (!next.job()->request.is_read() && stations.has_read_turn(next.job()->station)) {
-        wanted.reads_of = next.job()->station;
-        if (const auto read = queue.choose(test); read.job() != nullptr) next = read;
-    }
-    // ... and now and then its poll goes before its read.
-    if (next.job()->priority == PriorityClass::read &&
-        stations.has_poll_turn(next.job()->station)) {
-        wanted.reads_of = next.job()->station;
-        wanted.polls = true;
-        if (const auto poll = queue.choose(test); poll.job() != nullptr) next = poll;
-    }
+    next = own_turn(next, stations, test);
     if (!gap_is_over(now, next.job()->station, stations, quiet)) return {};
     if (auto read = read_before(now, *next.job(), stations, echo)) return std::move(*read);
     Job job = backlog_.queue().take(next);

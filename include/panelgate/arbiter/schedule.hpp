@@ -140,6 +140,8 @@ class Schedule {
     void take_turn(const Job& job);
     std::optional<Group> next_probe(TimePoint now, Stations& stations, Quiet& quiet) const;
     Next next_job(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo);
+    JobQueue::Choice own_turn(JobQueue::Choice next, const Stations& stations,
+                              const JobQueue::Test& may_run) const;
     std::optional<Next> proof_before(TimePoint now, const Job& job, const Stations& stations) const;
     std::optional<Next> read_before(TimePoint now, const Job& job, Stations& stations,
                                     const EchoMemory& echo);
