@@ -36,30 +36,38 @@ class GiveUp {
     bool refuted_ = false;            ///< by longer waits
 };
 
-/// How soon one station answers, as far as it helps to match replies to requests.
+/// What is known of one station, as far as it helps to match replies to requests.
 class Habits {
   public:
     /// A reply that surely answers its request came `think` after it.
     void answered(Duration think);
-    /// A reply came that may answer an older request. Returns true after two in a row with the
-    /// usual think time: late ones would not keep it.
-    bool answered_as_usual(Duration think);
-    void on_unanswered() { usual_ = 0; }
+    /// A read that was surely answered, and which a reply may look like.
+    void asks(const Bytes& pdu);
+    /// True if that frame may be a read that its master asks now and again.
+    bool has_asked(ByteView pdu) const;
 
     /// Longest recent think time; empty before the first reply.
     std::optional<Duration> longest_think() const { return longest_; }
+    /// The longest of the last ones but for one of eight; empty before the first reply.
+    std::optional<Duration> usual_think() const;
 
     GiveUp give_up;
-    std::optional<TimePoint> repeated;  ///< when it last sent a reply twice
+    std::optional<TimePoint> repeated;  ///< when it last sent more than it was asked for
+    int owed = 0;                       ///< replies, to requests that are outstanding in the book
 
   private:
+    static constexpr std::size_t kThinks = 32;
+    static constexpr std::size_t kSlower = 8;  ///< one of so many is an exception
+    static constexpr std::size_t kReads = 16;
     std::optional<Duration> longest_;
-    int usual_ = 0;  ///< replies in a row with the usual think time while others were outstanding
+    std::deque<Duration> thinks_;
+    std::deque<Bytes> reads_;  ///< the last one last
 };
 
 /// Listens to a line with another master, and matches replies to requests. Pure: bytes and time in,
-/// events out. A reply that may belong to another request is always marked `doubtful`. Memory is
-/// bounded.
+/// events out. A reply that may belong to another request is always marked `doubtful`. One that is
+/// believed is told when its master goes on, or no second one has come for a while: two different
+/// answers to one request are both in doubt. Memory is bounded.
 class Matcher {
   public:
     explicit Matcher(const Settings& settings);
@@ -89,12 +97,20 @@ class Matcher {
     void cut(bool silence);
     void take(Piece piece);
     bool resolve(Piece& piece);
+    bool resolve_echo(Piece& candidate, Piece& piece);
+    bool resolve_read(Piece& candidate, Piece& piece);
     void on_answer(Piece piece);
     void on_request(Piece piece);
     void on_reply(Piece piece);
     void close(const Piece& piece);
     void on_damaged(Piece piece);
     void answer(Piece piece, bool in_doubt);
+    void remember(const Transaction& made, bool in_doubt, bool outstanding);
+    bool is_duplicate(const Piece& piece, const Bytes& request,
+                      const arbiter::Claims& claimed) const;
+    void hold(Transaction made);
+    void tell_held();
+    bool is_second_answer(const Piece& piece) const;
     void ask(const Piece& piece, bool doubtful);
     void give_up(TimePoint now);
     void give_up_for(const Piece& request);
@@ -103,6 +119,7 @@ class Matcher {
     bool is_old_reply(const Piece& piece) const;
     Reading read(const Piece& piece) const;
     Duration quick(const Habits& habits) const;
+    Duration usual(const Habits& habits) const;
     Duration patience(const Habits& habits) const;
     std::optional<TimePoint> resolved_at() const;
     Habits& of(std::uint8_t station);
@@ -115,6 +132,8 @@ class Matcher {
     std::optional<Asked> asked_;
     std::optional<Piece>
         candidate_;  ///< its answer, or the same request again: later frames decide
+    std::optional<Transaction> held_;  ///< believed, if no second answer comes
+    TimePoint held_until_{};
     std::map<std::uint8_t, Habits> habits_;
     arbiter::OutstandingRequests book_;  ///< what the line's master has asked, seen from it
     GiveUp give_up_;                     ///< of the whole line
