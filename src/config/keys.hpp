@@ -63,6 +63,23 @@ class Keys {
             },
             [=](const V& of) { return yaml::format_duration(std::invoke(field, of)); });
     }
+    /// A duration, or `auto` for a member that is empty.
+    template <class Field>
+    Keys duration_or_auto(std::string_view key, Field field, Duration min, Duration max,
+                          std::string_view text) && {
+        return std::move(*this).add(
+            key, text,
+            [=](yaml::MapReader& in, S& into) {
+                std::optional<Duration>& member = std::invoke(field, into);
+                if (!in.is_word(key, "auto")) return store(in.duration(key, min, max), member);
+                member.reset();
+                return true;
+            },
+            [=](const V& of) {
+                const std::optional<Duration>& member = std::invoke(field, of);
+                return member ? yaml::format_duration(*member) : "auto";
+            });
+    }
     template <class Field>
     Keys integer(std::string_view key, Field field, std::int64_t min, std::int64_t max,
                  std::string_view text) && {

@@ -204,16 +204,11 @@ Line load_line(Loading& loading, const Node& node) {
     in.elsewhere(kElsewhere);
     in.elsewhere(loading.top_keys);
     Line line;
-    line.name = load_name(in, true).value_or("");
-    if (!line.name.empty()) {
-        loading.firsts.once(in, "name", "line " + line.name,
-                            "there are two lines '" + line.name + '\'');
-        loading.config.line_marks.emplace(line.name, in.mark("name"));
-    }
+    line.name = load_unique_name(loading, in, "line");
+    if (!line.name.empty()) loading.config.line_marks.emplace(line.name, in.mark("name"));
     load_device(loading, in, line);
     load_mode(in, line);
-    const bool serial_known =
-        load_serial(loading, in, line.device.serial, &line.arbiter.ascii_digits);
+    const bool serial_known = load_serial(loading, in, line.device.serial, &line);
     if (line.listens && line.device.serial.mode == SerialMode::ascii)
         in.problem("mode", "mode listen understands RTU only, not ASCII");
     line.arbiter.serial = line.device.serial;
@@ -225,10 +220,8 @@ Line load_line(Loading& loading, const Node& node) {
              [&](MapReader& queue) { load_queue(queue, line.arbiter.queue); });
     load_map(in, "offline", "{after: 3}",
              [&](MapReader& offline) { load_offline(offline, line.arbiter.offline); });
-    load_map(in, "simulate", "{echo: true}", [&](MapReader& simulate) {
-        line.simulated_echo = simulate.boolean("echo").value_or(false);
-        simulate.about("echo", "false", "The adapter hears what it sends.", "");
-    });
+    load_map(in, "simulate", "{echo: true}",
+             [&](MapReader& faults) { line_fault_keys().read(faults, line); });
     load_stations(loading, in, {line, serial_known, {}});
     in.finish();
     if (line.listens) warn_of_unused_keys(loading, in, line);

@@ -105,7 +105,7 @@ std::string load_password(Loading& loading, MapReader& in, std::string& file) {
     const auto typed = in.text("password_file");
     if (!typed) return "";
     file = loading.path_of(*typed);
-    auto text = loading.files.is_special(file) ? std::nullopt : loading.files.read(file);
+    auto text = loading.content_of(file);
     if (!text) {
         in.problem("password_file",
                    "cannot read the password file; give the path of a file that holds the password "
@@ -127,8 +127,7 @@ void load_file(Loading& loading, MapReader& in, std::string_view key, bool tls, 
     path = loading.path_of(*text);
     if (!tls)
         in.problem(key, std::string(key) + " needs TLS; write broker: mqtts://HOST:8883");
-    else if (const auto file =
-                 loading.files.is_special(path) ? std::nullopt : loading.files.read(path))
+    else if (const auto file = loading.content_of(path))
         content = *file;
     else
         in.problem(key, "cannot read " + path +

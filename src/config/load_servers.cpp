@@ -128,8 +128,8 @@ const Line* find_line(Loading& loading, yaml::Mark mark, const std::string& name
     names.reserve(loading.config.lines.size());
     for (const Line& line : loading.config.lines) names.push_back(line.name);
     const std::string commas = missing_commas(name);
-    loading.problems.add(mark, "there is no line " + yaml::quote(name) +
-                                   (commas.empty() ? did_you_mean(name, names, "lines") : commas));
+    loading.problems.add(mark, commas.empty() ? yaml::no_such("line", name, names)
+                                              : "there is no line " + yaml::quote(name) + commas);
     return nullptr;
 }
 
@@ -222,11 +222,8 @@ void load_units(Loading& loading, MapReader& in, tcp_server::Settings& settings)
     for (const yaml::Entry& entry : map->entries) {
         const auto unit = yaml::parse_integer(entry.key);
         if (!unit || *unit < 0 || *unit > 255) {
-            const bool turned = yaml::parse_integer(entry.value.scalar).has_value();
-            loading.problems.add(
-                entry.mark, "a unit id is a number from 0 to 255, not " + yaml::quote(entry.key) +
-                                (turned ? "; write " + entry.value.scalar + ": " + entry.key
-                                        : yaml::number_blank_hint(entry.key)));
+            loading.problems.add(entry.mark, "a unit id is a number from 0 to 255, not " +
+                                                 yaml::quote(entry.key) + number_key_hint(entry));
             continue;
         }
         if (const auto target = unit_target(loading, entry.value)) {
@@ -352,9 +349,7 @@ void load_access(Loading& loading, MapReader& in, tcp_server::Settings& settings
 }
 
 void load_modbus_tcp(Loading& loading, MapReader& root) {
-    const Node* list = root.sequence("modbus_tcp", "[{listen: 127.0.0.1:502}]");
-    if (list == nullptr) return;
-    for (const Node& node : list->items) {
+    for (const Node& node : root.entries("modbus_tcp", "[{listen: 127.0.0.1:502}]")) {
         tcp_server::Settings settings = load_listener(loading, node);
         const std::string name = settings.name();
         const std::string first = loading.firsts.again("listener " + name, node.mark);
