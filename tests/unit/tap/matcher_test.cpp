@@ -154,7 +154,7 @@ TEST(Matcher, KnowsThatNoneIsBehindWhenTheLateOneCame) {
 
 TEST(Matcher, OwesNoReplyThatCameDamaged) {
     Line line;
-    line.play("10 31:read, 3 31:value!, 200 31:other, 3 31:030200c8");
+    line.play("10 31:read, 3 31:value!, 300 31:other, 3 31:030200c8");
     line.settle();
     EXPECT_EQ(line.told(), "31: read -> damaged; 31: other -> 030200c8");
 }
