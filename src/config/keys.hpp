@@ -111,12 +111,12 @@ class Keys {
     }
     /// A value that has none of the words is shown as "".
     template <class Field, class T, std::size_t N>
-    Keys word(std::string_view key, Field field, const Words<T, N>& words,
-              std::string_view text) && {
+    Keys word(std::string_view key, Field field, const Words<T, N>& words, std::string_view text,
+              const yaml::MapReader::Hint& hint = {}) && {
         return std::move(*this).add(
             key, text,
             [=, &words](yaml::MapReader& in, S& into) {
-                return store(in.template choice<T>(key, words), std::invoke(field, into));
+                return store(in.template choice<T>(key, words, hint), std::invoke(field, into));
             },
             [=, &words](const V& of) {
                 const T value = std::invoke(field, of);

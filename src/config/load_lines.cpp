@@ -61,10 +61,8 @@ void load_rs485(MapReader& in, const Line& line, line::Rs485& rs485) {
     constexpr std::array<std::string_view, 2> kSwitched{"kernel", "rts"};
     for (const std::string_view key :
          {"rts_on_send", "delay_before_send", "delay_after_send", "receive_during_send"}) {
-        in.belongs(key, "mode", kSwitched);
-        if (rs485.mode == Mode::off && in.has(key)) {
+        if (in.belongs(key, "mode", kSwitched))
             in.problem(key, std::string(key) + " belongs to rs485 mode kernel or rts");
-        }
     }
     if (rs485.mode != Mode::off && line.kind != Line::Kind::serial) {
         in.problem("mode", "only a serial device has an rs485 mode: '" + line.device.device +
@@ -175,6 +173,7 @@ std::vector<yaml::Elsewhere> keys_elsewhere() {
         {"crc_order", {}, "a station"},
         {"profile", {}, "a station"},
         {"listen", {}, "modbus_tcp or http"},
+        {"access", {}, "a station or of modbus_tcp; rules are in 'access' at the top level"},
         {"type", {}, {}, "remove it: 'device' says what the line is"},
         {"framing", {}, {}, "a line has serial: {mode: ascii}, or is RTU without a word"},
         {"method", {}, {}, "remove it: a line is RTU, or has serial: {mode: ascii}"}};

@@ -180,16 +180,13 @@ void load_format(MapReader& in, mqtt::Settings& settings) {
               settings.topic);
     load_part(in, "group", "+#/", "one level of a topic, without +, # and /", settings.group);
     load_part(in, "node", "+#/", "one level of a topic, without +, # and /", settings.node);
-    in.belongs("group", "format", std::span(&kSparkplug, 1));
-    in.belongs("node", "format", std::span(&kSparkplug, 1));
-    in.belongs("qos", "format", std::span(&kJson, 1), true);
-    const bool sparkplug = settings.format == mqtt::Format::sparkplug;
-    if (sparkplug && in.has("qos"))
-        in.problem("qos", "Sparkplug prescribes the quality of service; remove qos");
     for (const std::string_view key : {"group", "node"}) {
-        if (!sparkplug && in.has(key))
+        if (in.belongs(key, "format", std::span(&kSparkplug, 1)))
             in.problem(key, std::string(key) + " is of Sparkplug; add format: sparkplug");
     }
+    const bool sparkplug = settings.format == mqtt::Format::sparkplug;
+    if (in.belongs("qos", "format", std::span(&kJson, 1), true) && sparkplug)
+        in.problem("qos", "Sparkplug prescribes the quality of service; remove qos");
 }
 
 void load_session(Loading& loading, MapReader& in, mqtt::Settings& settings) {

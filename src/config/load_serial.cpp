@@ -49,8 +49,7 @@ void load_serial_mode(MapReader& in, SerialFormat& format, Line* line) {
     }
     line_serial_keys().read(in, *line);
     constexpr std::array<std::string_view, 1> kAscii{"ascii"};
-    in.belongs("ascii_lower_case", "mode", kAscii);
-    if (in.has("ascii_lower_case") && format.mode != SerialMode::ascii)
+    if (in.belongs("ascii_lower_case", "mode", kAscii))
         in.problem("ascii_lower_case", "only a line with mode: ascii has hex digits");
 }
 

@@ -30,13 +30,6 @@ using tcp_server::BroadcastMode;
 using tcp_server::Retransmissions;
 using yaml::MapReader;
 
-constexpr std::array<std::string_view, 3> kFramingWords{"tcp", "rtu", "ascii"};
-constexpr std::array kFramings{Framing::tcp, Framing::rtu, Framing::ascii};
-
-std::string framing_hint(std::string_view typed) {
-    return typed == "udp" ? "; datagrams have framing: tcp, write udp: true" : "";
-}
-
 std::string framing_is(Framing framing) {
     return "framing: " + std::string(modbus::label(framing));
 }
@@ -58,11 +51,9 @@ void refuse_in_serial_modes(MapReader& in, const tcp_server::Settings& settings)
 }  // namespace
 
 void load_framing(MapReader& in, tcp_server::Settings& settings) {
-    if (const auto chosen = in.choice_index("framing", kFramingWords, framing_hint))
-        settings.framing = kFramings[*chosen];
     listener_keys().read(in, settings);
-    in.belongs("ascii_lower_case", "framing", std::span(&kFramingWords[2], 1));
-    if (in.has("ascii_lower_case") && settings.framing != Framing::ascii)
+    constexpr std::string_view kAscii = "ascii";
+    if (in.belongs("ascii_lower_case", "framing", std::span(&kAscii, 1)))
         in.problem("ascii_lower_case", "only a listener with framing: ascii reads hex digits");
     if (settings.framing != Framing::tcp) refuse_in_serial_modes(in, settings);
 }
@@ -112,12 +103,6 @@ std::optional<std::string> load_modbus_listen(MapReader& in, tcp_server::Setting
     settings.address = secure->address;
     settings.port = secure->port;
     return text;
-}
-
-const Line* find_line(const Config& config, std::string_view name) {
-    const auto found = std::find_if(config.lines.begin(), config.lines.end(),
-                                    [&](const Line& line) { return line.name == name; });
-    return found == config.lines.end() ? nullptr : &*found;
 }
 
 /// Returns nullptr and adds a problem at `mark` if there is none.
@@ -319,6 +304,11 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
 }
 
 }  // namespace
+
+const Line* find_line(const Config& config, std::string_view name) {
+    const auto found = std::ranges::find(config.lines, name, &Line::name);
+    return found == config.lines.end() ? nullptr : &*found;
+}
 
 void load_networks(Loading& loading, MapReader& in, std::string_view key,
                    std::vector<Network>& networks) {

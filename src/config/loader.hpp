@@ -86,6 +86,9 @@ void load_section(Loading& loading, yaml::MapReader& root, std::string_view key,
     });
 }
 
+/// Returns nullptr if there is none.
+const Line* find_line(const Config& config, std::string_view name);
+
 /// Line and station names: [a-z0-9-]+.
 bool is_name(std::string_view text);
 /// Returns a regular expression for texts of these letters; a '-' must be the last of them.

@@ -121,7 +121,7 @@ bool MapReader::lacks(std::string_view key, std::string_view word, std::string_v
     return node != nullptr && node->scalar == word && !has(other);
 }
 
-void MapReader::belongs(std::string_view key, std::string_view other,
+bool MapReader::belongs(std::string_view key, std::string_view other,
                         std::span<const std::string_view> words, bool absent) {
     if (Description* description = problems_->description())
         description->add_rule(*node_, {{},
@@ -130,6 +130,10 @@ void MapReader::belongs(std::string_view key, std::string_view other,
                                        {words.begin(), words.end()},
                                        false,
                                        absent});
+    const Node* value = node_->find(other);
+    const bool fits =
+        value == nullptr ? absent : std::ranges::find(words, value->scalar) != words.end();
+    return has(key) && !fits;
 }
 
 std::optional<double> MapReader::share(std::string_view key) {

@@ -40,6 +40,8 @@ class MapReader {
     MapReader& operator=(const MapReader&) = delete;
 
     static constexpr std::size_t kAnyNumber = 0;
+    /// Returns more about a wrong value, for the end of the message.
+    using Hint = std::function<std::string(std::string_view typed)>;
 
     bool has(std::string_view key);
     /// True if finish() will report a key that is probably this one, or belongs below it, which
@@ -66,15 +68,14 @@ class MapReader {
     /// nearest).
     template <class T>
     std::optional<T> choice(std::string_view key,
-                            std::span<const std::pair<std::string_view, T>> words) {
+                            std::span<const std::pair<std::string_view, T>> words,
+                            const Hint& hint = {}) {
         std::vector<std::string_view> names;
         for (const auto& [name, value] : words) names.push_back(name);
-        const std::optional<std::size_t> i = choice_index(key, names);
+        const std::optional<std::size_t> i = choice_index(key, names, hint);
         if (!i) return std::nullopt;
         return words[*i].second;
     }
-    /// Returns more about a wrong value, for the end of the message.
-    using Hint = std::function<std::string(std::string_view typed)>;
     std::optional<std::size_t> choice_index(std::string_view key,
                                             std::span<const std::string_view> words,
                                             const Hint& hint = {});
@@ -114,8 +115,9 @@ class MapReader {
     KeyShape& schema(std::string_view key);
     /// True if `key` has this word and `other`, which it then needs, is absent.
     bool lacks(std::string_view key, std::string_view word, std::string_view other);
-    /// `key` is allowed only if `other` has one of these words, or, with `absent`, is missing.
-    void belongs(std::string_view key, std::string_view other,
+    /// `key` is allowed only if `other` has one of these words, or, with `absent`, is missing. True
+    /// if it is there all the same.
+    bool belongs(std::string_view key, std::string_view other,
                  std::span<const std::string_view> words, bool absent = false);
 
     /// Adds keys that belong in another map, which finish() then names. Must outlive this.
