@@ -197,9 +197,9 @@ Matcher::Reading Matcher::read(const Piece& piece) const {
 
 /// The station answers so soon as a rule, and no master repeats a request so soon.
 Duration Matcher::usual(const Habits& habits) const {
-    constexpr Duration kJitter = 4ms;
+    constexpr Duration kJitter = 2ms;
     const Duration think = habits.usual_think().value_or(Duration::zero());
-    return std::min(patience(habits), std::max(think + think / 4 + kJitter, kAtOnce));
+    return std::min(patience(habits), std::max(think + think / 8 + kJitter, kAtOnce));
 }
 
 /// A time that any master waits at least.
