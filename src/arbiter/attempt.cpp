@@ -8,7 +8,6 @@
 #include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 
@@ -50,8 +49,10 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo,
 
 bool Attempt::can_join(TimePoint now, const Job& job) const {
     const bool leaving = timing_.tolerance && now < earliest_end();
+    const auto& items = job.request.span();
     return leaving && !group_.probe && group_.attempts == 1 && job.station == group_.station &&
-           contained_in(group_.span, job) && group_.jobs.size() < JobQueue::kMost;
+           group_.span && items && !job.alone && group_.span->contains(*items) &&
+           group_.jobs.size() < JobQueue::kMost;
 }
 
 Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
@@ -234,7 +235,7 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
         judge_unsolicited(before, ends);
     }
     const bool usual_is_over = now >= timing_.sent + timing_.usual;
-    if (candidate_ && usual_is_over && kept_ == Candidate::doubted) return Verdict::doubtful;
+    if (candidate_ && usual_is_over && is_doubted()) return Verdict::doubtful;
     if (candidate_ && usual_is_over) {
         reply_ = std::exchange(candidate_, std::nullopt);
         return Verdict::replied;
@@ -321,7 +322,7 @@ void Attempt::keep_candidate(Duration needed, Candidate kind) {
     kept_ = kind;
     timing_.usual = std::min(timing_.usual, needed);
     // The reply that the duplicate has delayed comes after it.
-    if (kind == Candidate::doubted)
+    if (is_doubted())
         timing_.usual = std::min(last_byte_ - timing_.sent + needed, timing_.patience);
     candidate_ = std::exchange(reply_, std::nullopt);
     candidate_at_ = last_byte_;
