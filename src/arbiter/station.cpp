@@ -126,7 +126,7 @@ bool Station::may_retry(const Group& group) const {
     if (group.abandoned() || health_.offline() || failing() || speculative()) return false;
     if (missed_last() && !group.first_silence) return false;
     const bool harmless = group.request.is_read() || (settings_.retry_writes && group.repeatable);
-    const int failed = group.attempts - (group.doubted.empty() ? 0 : 1);
+    const int failed = group.attempts - group.doubts;
     return harmless && failed <= settings_.retries;
 }
 

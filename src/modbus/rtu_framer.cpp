@@ -1,6 +1,7 @@
 #include "panelgate/modbus/rtu_framer.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <utility>
 
@@ -302,6 +303,19 @@ bool ReplyFramer::is_own_reply(ByteView damaged) const {
            damaged[1] == request_[0] && damaged[2] == count && request_[1] != count;
 }
 
+/// True for the reply to our read, without its first one to three bytes: an adapter that opens its
+/// receiver too late loses them. What they were is known, and the CRC tells.
+bool ReplyFramer::is_beheaded(ByteView damaged) const {
+    if (!is_read(request_[0]) || !expected_ || damaged.size() >= *expected_) return false;
+    const std::size_t lost = *expected_ - damaged.size();
+    if (lost > kHeader) return false;
+    const std::array head{station_, request_[0],
+                          static_cast<std::uint8_t>(*expected_ - kReadReplyOverhead)};
+    Bytes whole(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(lost));
+    whole.insert(whole.end(), damaged.begin(), damaged.end());
+    return crc_ok(whole, orders_);
+}
+
 void ReplyFramer::classify(ByteView bytes) {
     if (ends_ == Ends::told) {
         if (!bytes.empty()) step_over(classify_frame(bytes, station_, false));
@@ -316,6 +330,8 @@ void ReplyFramer::step_over(Unused part) {
         damaged_whole_ = damaged_whole_ || part.bytes.size() >= expected_.value_or(0);
         own_header_ = own_header_ || is_own_reply(part.bytes);
     }
+    if (part.kind == Unused::Kind::damaged && is_beheaded(part.bytes))
+        damaged_ = damaged_whole_ = own_header_ = true;
     constexpr std::size_t kKept = 64;  // parts; further bytes go to the last one
     if (unused_.size() < kKept) {
         unused_.push_back(std::move(part));

@@ -116,11 +116,11 @@ class Station {
         const auto quickest = quickest_.value();
         return quickest && first_sign < *quickest;
     }
-    /// ... by a wide margin; compared with the whole `line` if few replies of the station are
+    /// ... by a wide margin; compared with the whole `line` if no reply of the station is
     /// known.
     bool is_far_too_quick(Duration first_sign, const Quickest& line) const {
-        const Quickest& seen = quickest_.known() ? quickest_ : line;
-        return seen.known() && first_sign < *seen.value() * 3 / 4;
+        const Quickest& seen = quickest_.value() ? quickest_ : line;
+        return seen.value() && first_sign < *seen.value() * 3 / 4;
     }
 
     /// ... of its own.
