@@ -54,9 +54,12 @@ bool comes_from(const Rule& rule, const Who& who) {
            });
 }
 
+/// A token counts more than a certificate (docs/operate/tls.md). Of that the words count, too: the
+/// gateway may not have such a role.
 bool has_role(const Rule& rule, const Who& who) {
     return rule.roles.empty() || std::ranges::any_of(rule.roles, [&](const std::string& role) {
-               return role == who.standing.name() || role == who.certificate_role;
+               return role == who.standing.name() ||
+                      (who.token.empty() && role == who.certificate_role);
            });
 }
 

@@ -44,9 +44,9 @@ std::string_view outcome_of(const bus::WriteEnd& end) {
 
 void add_outcome(Composer& record, const bus::WriteEnd& end) {
     const std::string_view outcome = outcome_of(end);
-    record.text("outcome", outcome);
-    if (outcome == "unknown" || outcome == "not_sent") record.text("why", label(end.outcome));
-    if (end.exception) record.text("by", "panel").number("exception", *end.exception);
+    record.word("outcome", outcome);
+    if (outcome == "unknown" || outcome == "not_sent") record.word("why", label(end.outcome));
+    if (end.exception) record.word("by", "panel").number("exception", *end.exception);
     record.text("rule", end.rule);
     if (end.transaction != 0) record.number("transaction", end.transaction);
 }
@@ -57,6 +57,23 @@ std::uint16_t register_at(ByteView bytes, std::size_t at) {
 
 std::string plain_place(const modbus::Span& items) {
     return std::string(modbus::label(items.table)) + '/' + std::to_string(items.first);
+}
+
+/// In the panel's notation; of panels together and of one that is not listed, by table.
+std::string notation_of(const Station* station, const modbus::Span& items) {
+    if (station == nullptr) return plain_place(items);
+    return profile::format_notation(*station->configured->profile, items.table,
+                                    static_cast<std::uint16_t>(items.first));
+}
+
+/// Which items a write is about, as members of a record.
+std::string place_members(const Station* station, std::uint8_t function,
+                          const modbus::Span& items) {
+    return audit::members_by([&](Composer& record) {
+        record.text("at", notation_of(station, items)).number("function", function);
+        record.word("table", modbus::label(items.table)).number("address", items.first);
+        record.number("count", items.count);
+    });
 }
 
 /// Where the values of a write begin; 0: it has none that are simply values.
@@ -113,11 +130,12 @@ std::string client_members(const WhoRef& who) {
     });
 }
 
-void log_anchor(const audit::Position& at, const std::string& chain) {
+void log_anchor(const audit::Position& at, const std::string& chain, const std::string& file) {
     rt::log(rt::LogLevel::info, "audit anchor",
             {{"number", std::to_string(at.number)},
              {"hash", std::string(text_of(at.hash))},
-             {"chain", chain}});
+             {"chain", chain},
+             {"file", file}});
 }
 
 /// What the disk has not taken is gone: the log is the only place that can say so.
@@ -125,7 +143,7 @@ void tell_of_end(const audit::Trail::End& end, const std::string& file) {
     if (end.unwritten > 0)
         rt::log(rt::LogLevel::error, "audit records lost",
                 {{"count", std::to_string(end.unwritten)}, {"file", file}});
-    if (end.last.number > 0) log_anchor(end.last, end.chain);
+    if (end.last.number > 0) log_anchor(end.last, end.chain, file);
 }
 
 }  // namespace
@@ -178,7 +196,7 @@ void AuditBook::tell(const audit::Notice& notice) {
             return rt::log(rt::LogLevel::info, "audit recovered",
                            {{"file", file_}, {"lost", std::to_string(counters().lost)}});
         case Notice::anchor:
-            return log_anchor(notice.at, notice.text);
+            return log_anchor(notice.at, notice.text, file_);
         case Notice::remark:
             return rt::log(rt::LogLevel::warn, "audit file",
                            {{"file", file_}, {"why", notice.text}});
@@ -218,19 +236,22 @@ AuditBook::Known* AuditBook::find(const std::string& line, std::uint8_t id) {
     return found == stations->second.end() ? nullptr : &found->second;
 }
 
-const std::string& AuditBook::notation_of(Known& known, const modbus::Span& items) {
-    const auto key = static_cast<std::uint32_t>(items.table) << 16U | items.first;
-    const auto found = known.notations.find(key);
-    if (found != known.notations.end()) return found->second;
-    if (known.notations.size() >= kNotations) known.notations.clear();
-    std::string text = profile::format_notation(*known.station->configured->profile, items.table,
-                                                static_cast<std::uint16_t>(items.first));
-    return known.notations.emplace(key, std::move(text)).first->second;
-}
-
-/// In the panel's notation; of panels together and of one that is not listed, by table.
-std::string AuditBook::place_of(Known* known, const modbus::Span& items) {
-    return known != nullptr ? notation_of(*known, items) : plain_place(items);
+/// What tells which items of a station are written is made once for each place.
+void AuditBook::add_place(Known* known, std::uint8_t function, const modbus::Span& items) {
+    const Station* station = known != nullptr ? known->station : nullptr;
+    if (known == nullptr) {
+        composer_.members(place_members(station, function, items));
+        return;
+    }
+    const std::uint64_t key = std::uint64_t{function} << 48U |
+                              static_cast<std::uint64_t>(items.table) << 40U |
+                              static_cast<std::uint64_t>(items.first) << 20U | items.count;
+    auto place = known->places.find(key);
+    if (place == known->places.end()) {
+        if (known->places.size() >= kPlaces) known->places.clear();
+        place = known->places.emplace(key, place_members(station, function, items)).first;
+    }
+    composer_.members(place->second);
 }
 
 /// What tells who it is is made once for each client.
@@ -266,14 +287,12 @@ void AuditBook::add_write(const std::string& line, const bus::WriteEnd& end, Kno
         record.members(known->members);
     else
         record.text("line", line).number("id", end.station);
-    if (end.items) record.text("at", place_of(known, *end.items));
-    if (!end.pdu.empty()) record.number("function", end.pdu[0]);
     if (end.items) {
-        record.text("table", modbus::label(end.items->table)).number("address", end.items->first);
-        record.number("count", end.items->count);
+        add_place(known, end.pdu[0], *end.items);
         add_values(end.pdu, *end.items);
         if (known != nullptr) add_before(*known, *end.items);
     } else {
+        if (!end.pdu.empty()) record.number("function", end.pdu[0]);
         record.hex("pdu", end.pdu);
     }
     add_outcome(record, end);
@@ -336,9 +355,9 @@ bool AuditBook::is_vain_repeat(const std::string& line, const bus::WriteEnd& end
     what += '\t';
     if (end.items) what += plain_place(*end.items);
     return is_repeat(end.who, what, refused ? 1 : kNotSent, [&] {
-        const std::string station =
-            known != nullptr ? known->station->name : std::to_string(end.station);
-        const std::string at = end.items ? member("at", place_of(known, *end.items)) : "";
+        const Station* listed = known != nullptr ? known->station : nullptr;
+        const std::string station = listed ? listed->name : std::to_string(end.station);
+        const std::string at = end.items ? member("at", notation_of(listed, *end.items)) : "";
         return member("line", line) + member("station", station) + at +
                member("outcome", outcome_of(end)) +
                (refused ? end.rule.empty() ? std::string() : member("rule", end.rule)
@@ -347,14 +366,15 @@ bool AuditBook::is_vain_repeat(const std::string& line, const bus::WriteEnd& end
 }
 
 bool AuditBook::is_repeat(const WhoRef& who, std::string_view what, unsigned in_full,
-                          const std::function<std::string()>& more) {
+                          const std::function<std::string()>& more, bool shares) {
     make_client_key(key_, who);
     const std::size_t client = key_.size();
     key_ += what;
     const auto members = [&] { return client_members(who); };
-    const bool is_new = repeats_.is_new(clock_.now(), rt::wall_now(), key_, in_full,
-                                        [&] { return members() + more(); },
-                                        {std::string_view(key_).substr(0, client), members});
+    const audit::Repeats::Client one{std::string_view(key_).substr(0, shares ? client : 0),
+                                     members};
+    const bool is_new = repeats_.is_new(
+        clock_.now(), rt::wall_now(), key_, in_full, [&] { return members() + more(); }, one);
     if (!waits_) wait_for_repeats();
     return !is_new;
 }

@@ -37,9 +37,9 @@ struct TopicRefusal;
 /// `audit:` it records nothing. One thread.
 class AuditBook {
   public:
-    static constexpr std::size_t kNotations = 4096;  ///< of a station, kept
-    static constexpr std::size_t kClients = 1024;    ///< whose members are kept
-    static constexpr std::size_t kChanges = 200;     ///< of a reload, told
+    static constexpr std::size_t kPlaces = 4096;   ///< of a station, whose members are kept
+    static constexpr std::size_t kClients = 1024;  ///< whose members are kept
+    static constexpr std::size_t kChanges = 200;   ///< of a reload, told
     static constexpr unsigned kNotSent = 3;  ///< writes to one place that were not sent, in full
 
     /// The clock outlives it.
@@ -68,6 +68,8 @@ class AuditBook {
     void deed(const web::Deed& deed);
     /// A client of what MQTT refuses before it comes to a bus; it may outlive this.
     std::function<void(const TopicRefusal&)> topic_refusals();
+    /// A client of the writes over Modbus/TCP that come to no line; it may outlive this.
+    std::function<void(const WhoRef&, std::uint8_t unit, ByteView pdu)> stray_writes();
     /// A reload or a rollback, and what it changed.
     void reload(const web::ReloadVerdict& verdict);
     /// Tokens that came, went or changed.
@@ -99,9 +101,10 @@ class AuditBook {
     void add_write(const std::string& line, const bus::WriteEnd& end, Known* known);
     void add_values(ByteView pdu, const modbus::Span& items);
     void add_before(const Known& known, const modbus::Span& items);
-    /// True if it was counted. `more`: members that tell what is repeated, besides the client.
+    /// True if it was counted. `more`: members that tell what is repeated, besides the client;
+    /// `shares`: where the client repeats many things, it is counted with the others.
     bool is_repeat(const WhoRef& who, std::string_view what, unsigned in_full,
-                   const std::function<std::string()>& more);
+                   const std::function<std::string()>& more, bool shares = true);
     bool is_vain_repeat(const std::string& line, const bus::WriteEnd& end, Known* known);
     void refusal(const web::Deed& deed);
     void record_refusal(const Refused& refused);
@@ -129,12 +132,11 @@ class AuditBook {
     struct Known {
         const Station* station = nullptr;
         std::string members{};  ///< of a record, that tell where it is
-        std::unordered_map<std::uint32_t, std::string> notations{};  ///< by table and address
+        std::unordered_map<std::uint64_t, std::string> places{};  ///< members that tell what
         std::optional<TimePoint> written{};  ///< the last write that may have had an effect
     };
     Known* find(const std::string& line, std::uint8_t id);
-    std::string place_of(Known* known, const modbus::Span& items);
-    const std::string& notation_of(Known& known, const modbus::Span& items);
+    void add_place(Known* known, std::uint8_t function, const modbus::Span& items);
 
     std::shared_ptr<const Snapshot> snapshot_;
     std::map<std::string, std::map<std::uint8_t, Known>, std::less<>> known_;

@@ -44,7 +44,9 @@ void AuditBook::deed(const web::Deed& deed) {
     const bool discovers = deed.path.ends_with("/discover");
     const bool simulates = deed.path.find("/simulator/") != deed.path.npos;
     if (deed.status == 401 && deed.shown_token) {
-        if (is_repeat(deed.who, "login", 1, [&] { return member("outcome", "log-in failed"); }))
+        // One key a client: it always has a place of its own.
+        if (is_repeat(
+                deed.who, "login", 1, [&] { return member("outcome", "log-in failed"); }, false))
             return;
         begin(Kind::login);
         add_who(deed.who);
@@ -118,6 +120,23 @@ std::function<void(const TopicRefusal&)> AuditBook::topic_refusals() {
         refused.status = refusal.why.status;
         refused.why = refusal.why.detail;
         record_refusal(refused);
+    };
+}
+
+std::function<void(const WhoRef&, std::uint8_t, ByteView)> AuditBook::stray_writes() {
+    return [this, life = std::weak_ptr(alive_)](const WhoRef& who, std::uint8_t unit,
+                                                ByteView pdu) {
+        if (life.expired() || !trail_ || pdu.empty()) return;
+        what_ = "unit\t" + std::to_string(unit) + '\t' + std::to_string(pdu[0]);
+        const auto members = [&](audit::Composer& record) {
+            record.number("unit", unit).number("function", pdu[0]).word("outcome", "refused");
+        };
+        if (is_repeat(who, what_, 1, [&] { return audit::members_by(members); })) return;
+        begin(Kind::refusal);
+        add_who(who);
+        members(composer_);
+        composer_.hex("pdu", pdu).text("why", "the unit leads to no station that can be written");
+        record();
     };
 }
 

@@ -1,3 +1,4 @@
+#include <sys/stat.h>
 #include <algorithm>
 #include <boost/json/object.hpp>
 #include <boost/json/parse.hpp>
@@ -12,8 +13,11 @@
 #include "commands.hpp"
 #include "load.hpp"
 #include "panelgate/audit/files.hpp"
+#include "panelgate/audit/record.hpp"
 #include "panelgate/audit/verify.hpp"
 #include "panelgate/cli/audit_text.hpp"
+#include "panelgate/cli/place.hpp"
+#include "panelgate/config/config.hpp"
 #include "panelgate/rt/clock.hpp"
 
 namespace panelgate::app {
@@ -36,10 +40,27 @@ std::string head_of(const std::string& file) {
     return head;
 }
 
-/// The files that were named, or those of the configuration, oldest first.
-std::optional<Files> files_of(const AuditOptions& options, ExitCode& code) {
-    Files files = options.files;
-    if (files.empty()) {
+/// Which files are meant: these, or all of the chain that is written to one.
+struct Named {
+    Files files;
+    std::string chain{};                   ///< the file that is written; empty: `files` were named
+    std::vector<cli::Station> stations{};  ///< of the configuration, if that names the files
+
+    /// The files there are now, oldest first. A rotation while they are read makes others of them.
+    Files now() const {
+        Files all = files;
+        if (!chain.empty()) {
+            all = audit::rotated_files(chain);
+            all.push_back(chain);
+        }
+        return audit::in_order(std::move(all), head_of);
+    }
+};
+
+/// The files that were named, or those of the configuration.
+std::optional<Named> named_by(const AuditOptions& options, ExitCode& code) {
+    Named named{options.files};
+    if (named.files.empty()) {
         Loaded loaded = load_file(options.config);
         code = loaded.code;
         if (!loaded.config) return std::nullopt;
@@ -49,17 +70,18 @@ std::optional<Files> files_of(const AuditOptions& options, ExitCode& code) {
             code = kUsage;
             return std::nullopt;
         }
-        const std::string& file = loaded.config->audit->file;
-        files = audit::rotated_files(file);
-        files.push_back(file);
+        named.chain = loaded.config->audit->file;
+        for (const config::Line& line : loaded.config->lines)
+            for (const config::Station& station : line.stations)
+                named.stations.push_back({station.name, line.name, station.id});
     }
     std::error_code unknown;
-    for (const std::string& file : files) {
+    for (const std::string& file : named.now()) {
         if (!std::filesystem::is_directory(file, unknown)) continue;
         code = cannot_read(file, "it is a folder; name the files in it");
         return std::nullopt;
     }
-    return audit::in_order(std::move(files), head_of);
+    return named;
 }
 
 std::optional<audit::Anchors> anchors_of(const Files& logs, ExitCode& code) {
@@ -112,32 +134,86 @@ ExitCode print_report(const audit::Report& report, std::size_t files, bool has_l
     return kFine;
 }
 
-}  // namespace
+/// What is behind each name.
+std::vector<std::pair<std::string, ino_t>> identities(const Files& files) {
+    std::vector<std::pair<std::string, ino_t>> all;
+    for (const std::string& file : files) {
+        struct stat found{};
+        all.emplace_back(file, ::stat(file.c_str(), &found) == 0 ? found.st_ino : 0);
+    }
+    return all;
+}
 
-ExitCode audit_verify(const AuditOptions& options) {
-    ExitCode code = kFine;
-    const auto anchors = anchors_of(options.logs, code);
-    if (!anchors) return code;
-    const auto files = files_of(options, code);
-    if (!files) return code;
-    audit::Verifier verifier(*anchors, options.files.empty());
-    for (const std::string& file : *files) {
+/// Returns the file that cannot be read, and why.
+std::optional<std::pair<std::string, std::string>> read_into(audit::Verifier& verifier,
+                                                             const Files& files) {
+    for (const std::string& file : files) {
         verifier.begin_file(file);
         bool wanted = true;
-        const std::string why = audit::read_lines(file, [&](std::string_view line, bool whole) {
+        std::string why = audit::read_lines(file, [&](std::string_view line, bool whole) {
             wanted = verifier.take(line, whole);
             return wanted;
         });
-        if (!why.empty()) return cannot_read(file, why);
+        if (!why.empty()) return std::pair(file, std::move(why));
         if (!wanted) break;
     }
-    return print_report(verifier.finish(), files->size(), !options.logs.empty());
+    return std::nullopt;
+}
+
+}  // namespace
+
+ExitCode audit_verify(const AuditOptions& options) {
+    constexpr int kTries = 20;
+    ExitCode code = kFine;
+    const auto anchors = anchors_of(options.logs, code);
+    if (!anchors) return code;
+    const auto named = named_by(options, code);
+    if (!named) return code;
+    for (int tries = 1;; ++tries) {
+        const Files files = named->now();
+        const auto before = identities(files);
+        audit::Verifier verifier(*anchors, named->chain);
+        const auto unread = read_into(verifier, files);
+        const audit::Report report = verifier.finish();
+        // A rotation meanwhile looks as if records were removed, or added.
+        const bool has_rotated = before != identities(named->now());
+        if (has_rotated && (unread || report.fault) && tries < kTries) continue;
+        if (unread) return cannot_read(unread->first, unread->second);
+        return print_report(report, files.size(), !options.logs.empty());
+    }
 }
 
 namespace {
 
+/// Which station is meant. What only an earlier configuration had is looked for by its name;
+/// `doubt`: what to say if nothing is found.
+void set_station(cli::AuditFilter& filter, const std::string& typed, const Named& named,
+                 std::string& doubt) {
+    if (typed.empty()) return;
+    cli::FoundStation found = cli::station_of(named.stations, typed);
+    if (!found.wrong.empty()) {
+        const std::size_t slash = std::min(typed.find_first_of("/:"), typed.size());
+        filter.station = typed;
+        filter.line = slash < typed.size() ? typed.substr(0, slash) : "";
+        filter.id = slash < typed.size() ? typed.substr(slash + 1) : "";
+        if (!named.chain.empty()) doubt = std::move(found.wrong);
+        return;
+    }
+    filter.station = found.station.name;
+    filter.line = found.station.line;
+    filter.id = std::to_string(found.station.id);
+}
+
 std::optional<cli::AuditFilter> filter_of(const AuditOptions& options) {
-    cli::AuditFilter filter{options.station, options.kind, options.client, {}, {}};
+    cli::AuditFilter filter;
+    filter.kind = options.kind;
+    filter.client = options.client;
+    const std::vector<std::string> kinds = audit::kind_labels();
+    if (!filter.kind.empty() && std::ranges::find(kinds, filter.kind) == kinds.end()) {
+        std::cerr << "panelgate: audit: there is no kind '" << filter.kind << '\''
+                  << cli::suggestion(filter.kind, kinds) << '\n';
+        return std::nullopt;
+    }
     for (const auto& [typed, option, into] :
          {std::tuple{&options.since, "--since", &filter.since},
           std::tuple{&options.until, "--until", &filter.until}}) {
@@ -166,18 +242,25 @@ bool print_record(std::string_view line, const cli::AuditFilter& filter, bool as
 
 ExitCode audit_show(const AuditOptions& options) {
     ExitCode code = kFine;
-    const auto filter = filter_of(options);
+    auto filter = filter_of(options);
     if (!filter) return kUsage;
-    const auto files = files_of(options, code);
-    if (!files) return code;
+    const auto named = named_by(options, code);
+    if (!named) return code;
+    std::string doubt;
+    set_station(*filter, options.station, *named, doubt);
     bool any = false;
-    for (const std::string& file : *files) {
+    const Files files = named->now();
+    for (const std::string& file : files) {
         const std::string why = audit::read_lines(file, [&](std::string_view line, bool) {
             any = print_record(line, *filter, options.json) || any;
             return static_cast<bool>(std::cout);
         });
-        if (!why.empty()) return cannot_read(file, why);
+        // What a rotation drops meanwhile is no longer there to be shown.
+        const bool has_rotated = !named->chain.empty() && named->now() != files;
+        if (!why.empty() && !has_rotated) return cannot_read(file, why);
     }
+    if (!any && !doubt.empty())
+        std::cerr << "panelgate: audit: " << doubt << ", and no record names it\n";
     return any ? kFine : kNo;
 }
 

@@ -20,8 +20,8 @@
 #include "inventory.hpp"
 #include "load.hpp"
 #include "panelgate/base/text.hpp"
-#include "panelgate/config/mbusd_conf.hpp"
 #include "panelgate/config/real_files.hpp"
+#include "panelgate/mbusd/conf.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/web/http/json_text.hpp"
 #include "rights_text.hpp"
@@ -196,7 +196,7 @@ ExitCode import_conf(const std::string& file) {
         return kNoInput;
     }
     yaml::Problems problems(path);
-    const auto imported = config::import_mbusd(*text, problems);
+    const auto imported = mbusd::import_conf(*text, problems);
     if (!imported) {
         std::cerr << problems.text();
         return kBadConfig;

@@ -46,19 +46,12 @@ std::optional<std::vector<std::string>> line_names(const GatewayClient& gateway,
     return names;
 }
 
-/// The station that is asked for; "" for the line if there is none such.
 std::optional<cli::Station> station_of(const std::vector<cli::Station>& all,
                                        const std::string& typed) {
-    const cli::Named named = cli::find_station(all, typed);
-    if (!named.wrong.empty()) {
-        std::cerr << "panelgate: " << named.wrong << '\n';
-        return std::nullopt;
-    }
-    const auto found = std::ranges::find(all, named.name, &cli::Station::name);
-    if (found != all.end()) return *found;
-    const std::size_t colon = named.name.rfind(':');
-    return cli::Station{"", named.name.substr(0, colon),
-                        static_cast<unsigned>(std::stoul(named.name.substr(colon + 1)))};
+    cli::FoundStation found = cli::station_of(all, typed);
+    if (found.wrong.empty()) return std::move(found.station);
+    std::cerr << "panelgate: " << found.wrong << '\n';
+    return std::nullopt;
 }
 
 std::optional<std::vector<TracedLine>> lines_to_trace(const GatewayClient& gateway,

@@ -57,6 +57,29 @@ bool lets_in(const rt::AccessList& allow, const std::string& address) {
     return address.empty() || (!none && allow.allows(peer));
 }
 
+Destinations destinations_of(const tcp_server::Settings& listener, const config::Config& config) {
+    Destinations reach;
+    const auto is_own = [&](const config::Line& line) {
+        return listener.lines.empty() ||
+               std::ranges::find(listener.lines, line.name) != listener.lines.end();
+    };
+    const auto own = std::ranges::count_if(config.lines, is_own);
+    for (const config::Line& line : config.lines) {
+        if (!is_own(line)) continue;
+        std::bitset<256>& stations = reach[line.name];
+        if (own == 1 && !line.refuse_unlisted) stations.set();
+        stations.set(0);
+        for (const config::Station& station : line.stations) stations.set(station.id);
+    }
+    for (const auto& [unit, target] : listener.units) reach[target.line].set(target.station);
+    return reach;
+}
+
+bool leads_to(const Destinations& reach, std::string_view line, std::uint8_t station) {
+    const auto found = reach.find(line);
+    return found != reach.end() && found->second.test(station);
+}
+
 void Doors::open(std::shared_ptr<const config::Config> config) {
     config_ = std::move(config);
     allow_.clear();
@@ -64,7 +87,13 @@ void Doors::open(std::shared_ptr<const config::Config> config) {
         if (!listener.allow.empty()) allow_.emplace(listener.name(), listener.allow);
     };
     if (config_->http) add(*config_->http);
-    for (const tcp_server::Settings& listener : config_->modbus_tcp) add(listener);
+    doors_.clear();
+    for (const tcp_server::Settings& listener : config_->modbus_tcp) {
+        add(listener);
+        doors_[listener.name()] = {&listener, destinations_of(listener, *config_)};
+    }
+    for (const serial_server::Settings& master : config_->serial_masters)
+        doors_[master.name] = {&master.access, destinations_of(master.access, *config_)};
 }
 
 bool Doors::is_allowed(const std::string& listener, const std::string& address) const {
@@ -84,16 +113,16 @@ void Doors::change(std::shared_ptr<const config::Config> config) {
     open(std::move(config));
 }
 
-std::optional<Admission> Doors::admit(const WhoRef& who, WallTime at) const {
+std::optional<Admission> Doors::admit(const WhoRef& who, std::string_view line,
+                                      std::uint8_t station, WallTime at) const {
     if (!config_ || !who) return std::nullopt;
     switch (who->face) {
         case Face::http:
             return by_http(who, at);
         case Face::modbus_tcp:
         case Face::udp:
-            return by_modbus(who);
         case Face::serial_master:
-            return by_serial(who);
+            return by_unit(who, line, station);
         case Face::mqtt:
             return by_broker(who);
         case Face::gateway:
@@ -120,25 +149,21 @@ std::optional<Admission> Doors::by_http(const WhoRef& who, WallTime at) const {
     return with(who, token->standing);
 }
 
-std::optional<Admission> Doors::by_modbus(const WhoRef& who) const {
-    const auto listener = std::ranges::find_if(
-        config_->modbus_tcp, [&](const auto& one) { return one.name() == who->listener; });
-    if (listener == config_->modbus_tcp.end()) return std::nullopt;
+std::optional<Admission> Doors::by_unit(const WhoRef& who, std::string_view line,
+                                        std::uint8_t station) const {
+    const auto door = doors_.find(who->listener);
+    if (door == doors_.end()) return std::nullopt;
     if (!is_allowed(who->listener, who->address)) return not_allowed(who);
-    if (listener->read_only) return only_reads(who, "access", "its listener is read-only now");
-    if (listener->broadcast == tcp_server::BroadcastMode::deny)
+    if (!leads_to(door->second.reach, line, station))
+        return out(who, "access", "its listener does not lead there any more");
+    const tcp_server::Settings& listener = *door->second.listener;
+    if (listener.read_only) return only_reads(who, "access", "its listener is read-only now");
+    if (listener.broadcast == tcp_server::BroadcastMode::deny)
         return Admission{.who = who,
                          .may = rights({Right::read, Right::write}),
                          .rule = "access",
                          .why = "its listener takes no broadcasts now"};
     return std::nullopt;
-}
-
-std::optional<Admission> Doors::by_serial(const WhoRef& who) const {
-    const auto master =
-        std::ranges::find(config_->serial_masters, who->listener, &serial_server::Settings::name);
-    if (master == config_->serial_masters.end() || !master->access.read_only) return std::nullopt;
-    return only_reads(who, "access", "its port is read-only now");
 }
 
 std::optional<Admission> Doors::by_broker(const WhoRef& who) const {

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <bitset>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/who.hpp"
@@ -16,6 +19,12 @@ namespace panelgate::app {
 
 /// True if the list lets a client of this address in; "": it is not known.
 bool lets_in(const rt::AccessList& allow, const std::string& address);
+
+/// The stations of each line to which a listener leads; 0: its broadcasts go there.
+using Destinations = std::map<std::string, std::bitset<256>, std::less<>>;
+/// `listener`: of Modbus/TCP, or what a serial master may ask. As tcp_server::UnitMap routes.
+Destinations destinations_of(const tcp_server::Settings& listener, const config::Config& config);
+bool leads_to(const Destinations& reach, std::string_view line, std::uint8_t station);
 
 /// What the doors of the running configuration say of those who have come in: whose token was taken
 /// away, or has another role, meets that while his requests wait, too. Pure.
@@ -29,18 +38,25 @@ class Doors {
 
     /// Nothing if he may what he could when he came in. A listener that is gone answers what it has
     /// taken in.
-    std::optional<bus::Admission> admit(const WhoRef& who, WallTime at) const;
+    std::optional<bus::Admission> admit(const WhoRef& who, std::string_view line,
+                                        std::uint8_t station, WallTime at) const;
 
   private:
     bool is_allowed(const std::string& listener, const std::string& address) const;
     std::optional<bus::Admission> by_http(const WhoRef& who, WallTime at) const;
-    std::optional<bus::Admission> by_modbus(const WhoRef& who) const;
-    std::optional<bus::Admission> by_serial(const WhoRef& who) const;
+    /// Of Modbus/TCP, or a port with a serial master.
+    std::optional<bus::Admission> by_unit(const WhoRef& who, std::string_view line,
+                                          std::uint8_t station) const;
     std::optional<bus::Admission> by_broker(const WhoRef& who) const;
 
     std::shared_ptr<const config::Config> config_;  ///< null: none is open yet
     std::map<std::string, rt::AccessList> allow_;   ///< by listener; others let everybody in
-    std::set<std::string> renewed_;                 ///< tokens by name
+    struct Door {
+        const tcp_server::Settings* listener = nullptr;  ///< of `config_`
+        Destinations reach;
+    };
+    std::map<std::string, Door> doors_;  ///< by listener's or serial master's name
+    std::set<std::string> renewed_;      ///< tokens by name
 };
 
 }  // namespace panelgate::app

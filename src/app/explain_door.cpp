@@ -17,20 +17,12 @@ bool may_come(const std::vector<Network>& allow, const std::string& address) {
     return allow.empty() || lets_in(rt::AccessList(allow), address);
 }
 
-bool serves(const tcp_server::Settings& listener, const AtDoor& request) {
-    const bool by_line =
-        std::ranges::find(listener.lines, request.line.name) != listener.lines.end();
-    return by_line || std::ranges::any_of(listener.units, [&](const auto& unit) {
-               return unit.second.line == request.line.name &&
-                      unit.second.station == request.station.id;
-           });
-}
-
-std::string refused_by(const tcp_server::Settings& listener, const std::string& name,
-                       const AtDoor& request) {
+std::string refused_by(const config::Config& config, const tcp_server::Settings& listener,
+                       const std::string& name, const AtDoor& request) {
     if (!may_come(listener.allow, request.who.address))
         return name + " does not let " + request.who.address + " in (allow)";
-    if (!serves(listener, request))
+    const std::uint8_t station = request.act == Act::broadcast ? 0 : request.station.id;
+    if (!leads_to(destinations_of(listener, config), request.line.name, station))
         return name + " does not serve line '" + request.line.name + "'";
     if (request.writes && listener.read_only) return name + " has access: read_only";
     if (request.act == Act::broadcast && listener.broadcast == tcp_server::BroadcastMode::deny)
@@ -82,11 +74,11 @@ std::string refused_at_door(const config::Config& config, const AtDoor& request,
         return "mqtt has no write: points";
     for (const tcp_server::Settings& listener : config.modbus_tcp) {
         if (listener.name() != who.listener) continue;
-        return refused_by(listener, "the listener " + who.listener, request);
+        return refused_by(config, listener, "the listener " + who.listener, request);
     }
     for (const serial_server::Settings& master : config.serial_masters) {
         if (master.name != who.listener) continue;
-        return refused_by(master.access, "the serial master " + who.listener, request);
+        return refused_by(config, master.access, "the serial master " + who.listener, request);
     }
     return "";
 }

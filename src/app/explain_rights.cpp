@@ -149,8 +149,13 @@ void complete(const config::Config& config, AskedRight& asked) {
     if (!asked.who.token.empty() && config.http) {
         const auto& tokens = config.http->tokens;
         const auto token = std::ranges::find(tokens, asked.who.token, &web::Token::name);
-        if (token == tokens.end()) asked.wrong = "there is no token '" + asked.who.token + '\'';
-        if (token != tokens.end() && !asked.has_role) asked.who.standing = token->standing;
+        if (token == tokens.end())
+            asked.wrong = "there is no token '" + asked.who.token + '\'';
+        else if (asked.has_role && asked.who.standing != token->standing)
+            asked.wrong = "the token '" + asked.who.token + "' has the role " +
+                          std::string(token->standing.name()) + ", leave out role";
+        else
+            asked.who.standing = token->standing;
         asked.has_role = true;
         if (!asked.has_face) asked.who.face = Face::http;
     }
@@ -256,8 +261,8 @@ std::string place_in(const std::string& file, const access::Rule& rule) {
 
 namespace {
 
-Explanation explain(const config::Config& config, const std::string& file,
-                    const AskedRight& asked) {
+Explanation explain_on_line(const config::Config& config, const std::string& file,
+                            const AskedRight& asked) {
     const auto request = request_of(asked);
     if (!request) return {false, "", "no request does that to so many items of this table"};
     if (const std::string why = decided_before(config, asked); !why.empty())
@@ -283,6 +288,36 @@ Explanation explain(const config::Config& config, const std::string& file,
         text += "rule '" + verdict.rule->name + "' (" + place_in(file, *verdict.rule) + ')';
     }
     return {verdict.allowed, std::move(text), ""};
+}
+
+/// The other lines to which a broadcast through this listener goes.
+std::vector<const config::Line*> further_lines(const config::Config& config,
+                                               const AskedRight& asked) {
+    std::vector<const config::Line*> further;
+    const auto listener = std::ranges::find_if(
+        config.modbus_tcp, [&](const auto& one) { return one.name() == asked.who.listener; });
+    if (asked.act != Act::broadcast || listener == config.modbus_tcp.end()) return further;
+    const auto& own = listener->lines;
+    for (const config::Line& line : config.lines)
+        if (&line != asked.line && !line.stations.empty() &&
+            (own.empty() || std::ranges::find(own, line.name) != own.end()))
+            further.push_back(&line);
+    return further;
+}
+
+/// What one line refuses of a broadcast goes to none.
+Explanation explain(const config::Config& config, const std::string& file,
+                    const AskedRight& asked) {
+    Explanation all = explain_on_line(config, file, asked);
+    AskedRight there = asked;
+    for (const config::Line* line : further_lines(config, asked)) {
+        if (!all.allowed) break;
+        there.line = line;
+        there.station = &line->stations.front();
+        Explanation other = explain_on_line(config, file, there);
+        if (!other.allowed) all = {false, other.text + ", on line '" + line->name + '\'', ""};
+    }
+    return all;
 }
 
 }  // namespace

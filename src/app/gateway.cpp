@@ -79,7 +79,7 @@ Gateway::Gateway(boost::asio::any_io_executor executor,
       simulate_(simulate),
       reloads_(reloads),
       events_(new_epoch()),
-      servers_(executor_, clock_),
+      servers_(executor_, clock_, audit_.stray_writes()),
       northbound_(executor_, clock_, audit_.topic_refusals()) {
     Lines lines = lines_of(*config);
     for (std::size_t i = 0; i < lines.size(); ++i)
@@ -112,7 +112,9 @@ LineWatch Gateway::watch() {
         audit_.write(line, end);
     };
     watch.refuses_writes = [this] { return audit_.refuses_writes(); };
-    watch.admit = [this](const WhoRef& who) { return doors_.admit(who, rt::wall_now()); };
+    watch.admit = [this](const WhoRef& who, const std::string& line, std::uint8_t station) {
+        return doors_.admit(who, line, station, rt::wall_now());
+    };
     return watch;
 }
 

@@ -144,7 +144,8 @@ class CommandLine {
     ExitCode mistaken(const std::string& command, const CLI::ParseError& error) const {
         const bool extra = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
         const CLI::App& asked = *cli_.get_subcommand(command);
-        if (extra && !asked.remaining().empty()) return unexpected(asked);
+        const bool has_commands = !asked.get_subcommands({}).empty();  // one of them is needed
+        if ((extra || has_commands) && !asked.remaining().empty()) return unexpected(asked);
         const std::string fault = usage_fault(error);
         std::cerr << "panelgate: " << command << ": " << fault << "; `panelgate help " << command
                   << "` says what it takes\n";
@@ -171,14 +172,16 @@ class CommandLine {
             for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
             for (const std::string& name : option->get_snames()) names.push_back('-' + name);
         }
-        const bool is_file =
-            looks_like_file(typed) && command.get_option_no_throw("--config") != nullptr;
+        for (const CLI::App* one : command.get_subcommands({}))
+            if (!one->get_group().empty()) names.push_back(one->get_name());
+        const bool is_file = !is_option && looks_like_file(typed) &&
+                             command.get_option_no_throw("--config") != nullptr;
         std::cerr << "panelgate: " << command.get_name()
                   << (is_option ? " has no option '" : " does not take '") << typed << '\'';
-        if (is_option) {
-            std::cerr << did_you_mean(typed, names);
-        } else if (is_file) {
+        if (is_file) {
             std::cerr << "; a file is given with -c: " << command.get_name() << " -c " << typed;
+        } else {
+            std::cerr << did_you_mean(typed, names);
         }
         std::cerr << "; `panelgate help " << command.get_name() << "` says what it takes\n";
         return kUsage;

@@ -254,7 +254,11 @@ bus::Settings RunningLine::settings_of(const config::Line& line) {
         };
     }
     settings.refuses_writes = watch_.refuses_writes;
-    settings.admit = watch_.admit;
+    if (watch_.admit) {
+        settings.admit = [this, name = line.name](const WhoRef& who, std::uint8_t station) {
+            return watch_.admit(who, name, station);
+        };
+    }
     return settings;
 }
 

@@ -56,7 +56,10 @@ struct LineWatch {
     std::function<void(const std::string& line, const bus::WriteEnd& end)> write{};
     /// True while no write may be sent. May be empty.
     std::function<bool()> refuses_writes{};
-    bus::Admit admit{};  ///< what doors say now. May be empty
+    /// What doors say now. May be empty.
+    std::function<std::optional<bus::Admission>(const WhoRef& who, const std::string& line,
+                                                std::uint8_t station)>
+        admit{};
 };
 
 /// The wire of a line, whatever its name: its device with links resolved, or the far end.

@@ -164,8 +164,9 @@ std::vector<tcp_server::LineInfo> lines_of_master(const Plant& plant) {
 
 }  // namespace
 
-Servers::Servers(boost::asio::any_io_executor executor, rt::Clock& clock)
-    : executor_(std::move(executor)), clock_(clock), openings_(clock) {}
+Servers::Servers(boost::asio::any_io_executor executor, rt::Clock& clock,
+                 tcp_server::StrayWrite stray)
+    : executor_(std::move(executor)), clock_(clock), openings_(clock), stray_(std::move(stray)) {}
 
 tcp_server::Settings Servers::completed(tcp_server::Settings settings,
                                         const config::Config& config) const {
@@ -177,8 +178,9 @@ tcp_server::Settings Servers::completed(tcp_server::Settings settings,
 
 Servers::Modbus Servers::make(const tcp_server::Settings& settings, const Plant& plant) {
     tcp_server::UnitMap units(settings, plant.listener_lines());
-    return {settings, std::make_unique<tcp_server::Listener>(executor_, clock_, settings,
-                                                             std::move(units), PANELGATE_VERSION)};
+    return {settings,
+            std::make_unique<tcp_server::Listener>(executor_, clock_, settings, std::move(units),
+                                                   PANELGATE_VERSION, stray_)};
 }
 
 Servers::Modbus* Servers::find(const tcp_server::Settings& settings) {

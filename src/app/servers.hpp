@@ -84,7 +84,8 @@ std::string listening_advice(const boost::system::error_code& why, std::uint16_t
 /// those that need not be reopened (is_same_listener()), with their connections. One thread.
 class Servers {
   public:
-    Servers(boost::asio::any_io_executor executor, rt::Clock& clock);
+    /// `stray` may be called as long as a connection lives.
+    Servers(boost::asio::any_io_executor executor, rt::Clock& clock, tcp_server::StrayWrite stray);
 
     /// What HTTP serves, created when first needed.
     struct Web {
@@ -157,6 +158,7 @@ class Servers {
     std::shared_ptr<std::list<Modbus>> leaving_ = std::make_shared<std::list<Modbus>>();
     std::vector<Http> leaving_http_;
     Openings openings_;
+    tcp_server::StrayWrite stray_;
     std::size_t open_listeners_ = 0;
 };
 

@@ -39,6 +39,13 @@ std::string_view label(Kind kind) {
     std::abort();
 }
 
+std::vector<std::string> kind_labels() {
+    std::vector<std::string> labels;
+    for (int kind = 0; kind <= static_cast<int>(Kind::lost); ++kind)
+        labels.emplace_back(label(static_cast<Kind>(kind)));
+    return labels;
+}
+
 namespace {
 
 constexpr std::string_view kHex = "0123456789abcdef";
@@ -127,6 +134,14 @@ Composer& Composer::text(std::string_view name, std::string_view value) {
     if (value.empty()) return *this;
     key(name);
     append_json(body_, value);
+    return *this;
+}
+
+Composer& Composer::word(std::string_view name, std::string_view value) {
+    key(name);
+    body_ += '"';
+    body_ += value;
+    body_ += '"';
     return *this;
 }
 

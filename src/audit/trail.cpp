@@ -47,34 +47,25 @@ class Syslog {
     Syslog(const Syslog&) = delete;
     Syslog& operator=(const Syslog&) = delete;
 
-    /// Sends each of the bodies; returns how many were not taken.
-    std::uint64_t send(std::string_view bodies) {
-        std::uint64_t lost = 0;
-        while (!bodies.empty()) {
-            const std::size_t end = std::min(bodies.find('\n'), bodies.size());
-            if (!send_one(bodies.substr(0, end))) ++lost;
-            bodies.remove_prefix(std::min(end + 1, bodies.size()));
-        }
-        return lost;
-    }
-
-  private:
-    /// `"time":"T","kind":"K",...` becomes `<110>1 T HOST panelgate PID K - {...}`: 110 is the
-    /// facility "log audit" at level info.
-    bool send_one(std::string_view body) {
+    /// A record becomes `<110>1 TIME HOST panelgate PID KIND - {...}`: 110 is the facility "log
+    /// audit" at level info. False: it was not taken.
+    bool send(std::string_view line) {
+        const auto record = parse_line(line);
+        const std::string_view body = record ? record->body : std::string_view();
         text_ = "<110>1 ";
         text_ += member_of(body, "time");
         text_ += ' ' + host_ + " panelgate " + std::to_string(::getpid()) + ' ';
         text_ += member_of(body, "kind");
-        text_ += " - {";
-        text_ += body;
-        text_ += '}';
+        text_ += " - ";
+        text_ += line;
         if (socket_ < 0 && !connect()) return false;
         if (::send(socket_, text_.data(), text_.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0)
             return true;
         if (errno != EAGAIN && errno != ENOBUFS) close();  // it was restarted: the next one tries
         return false;
     }
+
+  private:
     bool connect() {
         sockaddr_un address{};
         address.sun_family = AF_UNIX;
@@ -104,7 +95,10 @@ struct Trail::State {
         : settings(s),
           hooks(std::move(h)),
           failing(f),
-          writer(s, hooks.wall, hooks.start),
+          writer(s, hooks.wall, hooks.start,
+                 [this](std::string_view line) {
+                     if (settings.syslog && !syslog.send(line)) ++syslog_lost;
+                 }),
           syslog(s.syslog_socket) {
         pending.reserve(std::min<std::size_t>(settings.buffer, 64 * 1024));
     }
@@ -198,7 +192,6 @@ void Trail::State::work() {
     bool good = false;
     std::string why;
     try {
-        if (!taken.empty() && settings.syslog) syslog_lost += syslog.send(taken);
         if (!taken.empty()) writer.take(taken);
         taken.clear();
         good = writer.work();

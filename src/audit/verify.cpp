@@ -99,7 +99,9 @@ void collect_anchor(std::string_view log_line, Anchors& anchors) {
     const std::string_view hash = fields->take("hash").value_or("");
     const std::string_view chain = fields->take("chain").value_or("");
     if (!number || hash.size() < kShortest || hash.size() > 64) return;
-    if (is_hex(hash) && is_hex(chain)) anchors.chains[std::string(chain)][*number] = hash;
+    if (!is_hex(hash) || !is_hex(chain)) return;
+    anchors.chains[std::string(chain)][*number] = hash;
+    if (const auto file = fields->take("file")) anchors.files[std::string(chain)] = *file;
 }
 
 void Verifier::begin_file(std::string name) {
@@ -286,7 +288,7 @@ void Verifier::remark(const Sealed& record) {
         record_text(record.number) + " (" + std::string(member_of(record.body, "time")) + "): ";
     const std::string_view gone = member_of(record.body, "gone");
     if (number_of(gone))
-        note(when + "the file before was removed while it was written, with the records from " +
+        note(when + "the file before was removed, or changed by others, while it was written, with the records from " +
              std::string(gone) + " on");
     if (kind == "lost")
         note(when + std::string(member_of(record.body, "count")) +
@@ -295,6 +297,8 @@ void Verifier::remark(const Sealed& record) {
         note(when +
              "the run before did not end in order; what it did in its last second, or since its "
              "log says `audit fails`, may be missing");
+    if (const std::string_view said = member_of(record.body, "remark"); !said.empty())
+        note(when + std::string(said));
     const std::string_view torn = member_of(record.body, "torn_bytes");
     if (!torn.empty())
         note(when + "a torn line of " + std::string(torn) +
@@ -305,7 +309,7 @@ void Verifier::remark(const Sealed& record) {
 void Verifier::check_begin() {
     if (report_.records == 0 || kept_from_ == 0 || report_.first <= kept_from_) return;
     const std::string missing = records_text(kept_from_, report_.first - 1);
-    if (!all_)
+    if (all_of_.empty())
         return note("these files begin with " + record_text(report_.first) + "; " + missing +
                     " stand in other files of this audit");
     report_.fault =
@@ -342,10 +346,21 @@ void Verifier::tell_of_log() {
              " records could not be written when a run ended");
     for (const auto& [chain, named] : anchors_.chains) {
         if (chain == report_.chain || named.empty()) continue;
-        note("the log names records of another chain too, " +
-             (chain.empty() ? "without id" : chain) + ", up to " +
-             record_text(named.rbegin()->first) + ": of another audit, or of one that was removed");
+        check_other_chain(chain, named.rbegin()->first);
     }
+}
+
+/// What was written to the same file is no other audit: its files were removed, or moved away.
+void Verifier::check_other_chain(const std::string& chain, std::uint64_t last) {
+    const std::string named = "the log names records of another chain too, " +
+                              (chain.empty() ? "without id" : chain) + ", up to " +
+                              record_text(last);
+    const auto file = anchors_.files.find(chain);
+    const bool was_here = file != anchors_.files.end() && file->second == all_of_;
+    if (!was_here) return note(named + ": of another audit, or of one that was removed");
+    if (report_.fault) return note(named + ", which were written to this file");
+    report_.fault = Fault{Fault::Kind::removed, last, all_of_, 0,
+                          named + ", which were written to this file and are not there"};
 }
 
 Report Verifier::finish() {

@@ -75,8 +75,11 @@ void sync_folder(const std::string& file) {
 
 }  // namespace
 
-Writer::Writer(Settings settings, Wall wall, std::string start)
-    : settings_(std::move(settings)), wall_(std::move(wall)), start_(std::move(start)) {}
+Writer::Writer(Settings settings, Wall wall, std::string start, Also also)
+    : settings_(std::move(settings)),
+      wall_(std::move(wall)),
+      start_(std::move(start)),
+      also_(std::move(also)) {}
 
 Writer::~Writer() { close(); }
 
@@ -139,15 +142,25 @@ std::uint64_t Writer::unwritten() {
 }
 
 /// Closes a file that has no longer its name: it was moved away by a rotation that is not ours, or
-/// removed, which is a failure. False: it was removed just now.
+/// removed, which is a failure, as it is if others have written to it or cut it off. False: just
+/// now.
 bool Writer::look_after_file() {
     struct stat named{};
     struct stat open{};
     const bool there = ::stat(settings_.file.c_str(), &named) == 0;
     if (!there && errno != ENOENT) return true;
     if (::fstat(file_, &open) != 0) return true;
-    if (there && named.st_ino == open.st_ino && named.st_dev == open.st_dev) return true;
+    const bool is_ours = there && named.st_ino == open.st_ino && named.st_dev == open.st_dev;
+    if (is_ours && static_cast<std::size_t>(open.st_size) == size_) return true;
     close();
+    if (is_ours) {
+        gone_ = first_;
+        why_ = settings_.file +
+               " was changed by another program while it was written, with the "
+               "records " +
+               std::to_string(first_) + " to " + std::to_string(safe_.number);
+        return false;
+    }
     if (open.st_nlink > 0) {
         remark_ = settings_.file + " was moved away, and a new one begins";
         return true;
@@ -273,10 +286,7 @@ void Writer::begin_file() {
     if (const std::uint64_t gone = std::exchange(gone_, 0); gone > 0)
         composer_.number("gone", gone);
     first_ = chain_.last().number + 1;
-    if (sent_ == out_.size()) {
-        chain_.append(out_, composer_.body());
-        ++sealed_;
-    }
+    if (sent_ == out_.size()) append(composer_.body());
 }
 
 void Writer::begin_run() {
@@ -285,17 +295,22 @@ void Writer::begin_run() {
     if (unclean_) composer_.flag("unclean", true);
     if (torn_bytes_ > 0) composer_.number("torn_bytes", torn_bytes_).text("torn", torn_);
     composer_.text("remark", remark_);
-    chain_.append(out_, std::string(composer_.body()) + start_);
-    ++sealed_;
+    append(std::string(composer_.body()) + start_);
     if (unclean_ && remark_.empty())
         remark_ = "the run before did not end in order: what it recorded last may be missing";
+}
+
+void Writer::append(std::string_view body) {
+    const std::size_t from = out_.size();
+    chain_.append(out_, body);
+    ++sealed_;
+    if (also_) also_(std::string_view(out_).substr(from, out_.size() - from - 1));
 }
 
 void Writer::seal() {
     while (at_ < batch_.size() && out_.size() < kChunk && size_ + out_.size() < settings_.rotate) {
         const std::size_t end = std::min(batch_.find('\n', at_), batch_.size());
-        chain_.append(out_, std::string_view(batch_).substr(at_, end - at_));
-        ++sealed_;
+        append(std::string_view(batch_).substr(at_, end - at_));
         at_ = std::min(end + 1, batch_.size());
     }
 }
@@ -338,22 +353,29 @@ bool Writer::rotate() {
         return fail("cannot rename " + settings_.file);
     close();
     ++rotations_;
-    drop_oldest();
+    const std::vector<std::string> oldest = find_oldest();
     if (!open() || !resume()) {
         close();
         return false;
     }
+    // The new file says which ones are kept before the others go: a crash between leaves too many.
+    errno = 0;
+    const bool begun = flush() && sync();
+    if (begun || errno == ENOSPC)
+        for (const std::string& name : oldest) std::remove(name.c_str());
     sync_folder(settings_.file);
-    return true;
+    return begun;
 }
 
-void Writer::drop_oldest() {
-    const auto older = rotated_files(settings_.file);
-    if (older.size() <= settings_.keep) return;
-    const std::size_t count = older.size() - settings_.keep;
-    for (std::size_t i = 0; i < count; ++i) std::remove(older[i].c_str());
+/// The files that are too many; what is kept begins behind them.
+std::vector<std::string> Writer::find_oldest() {
+    std::vector<std::string> oldest = rotated_files(settings_.file);
+    if (oldest.size() <= settings_.keep) return {};
+    const std::size_t count = oldest.size() - settings_.keep;
     from_ = chain_.last().number + 1;
-    if (settings_.keep > 0) from_ = number_in(older[count], settings_.file).value_or(from_);
+    if (settings_.keep > 0) from_ = number_in(oldest[count], settings_.file).value_or(from_);
+    oldest.resize(count);
+    return oldest;
 }
 
 }  // namespace panelgate::audit

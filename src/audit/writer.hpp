@@ -21,8 +21,12 @@ class Writer {
   public:
     using Wall = std::function<WallTime()>;
 
+    /// Takes each record as it is written, once, without its newline.
+    using Also = std::function<void(std::string_view line)>;
+
     /// `start`: members of the record `start` behind its time, such as `,"version":"1.0.0"`.
-    Writer(Settings settings, Wall wall, std::string start);
+    /// `also` may be empty.
+    Writer(Settings settings, Wall wall, std::string start, Also also = {});
     ~Writer();
     Writer(const Writer&) = delete;
     Writer& operator=(const Writer&) = delete;
@@ -57,9 +61,10 @@ class Writer {
     void read_head(std::string_view head);
     void resume_after_older();
     bool rotate();
-    void drop_oldest();
+    std::vector<std::string> find_oldest();
     void begin_file();
     void begin_run();
+    void append(std::string_view body);
     void seal();
     void take_back();
     bool flush();
@@ -70,6 +75,7 @@ class Writer {
     Settings settings_;
     Wall wall_;
     std::string start_;
+    Also also_;
     Composer composer_;
     Chain chain_;
     Position safe_;

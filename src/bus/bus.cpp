@@ -115,9 +115,9 @@ std::optional<Refusal> Bus::State::refusal_of(const Request& request,
 std::optional<Refusal> Bus::State::judge(const WhoRef& who,
                                          const access::LineRules::Question& question) const {
     std::optional<Admission> now;
-    if (settings.admit) now = settings.admit(who);
-    if (!now) return rights.judge(who, question);
     const std::uint8_t id = question.station;
+    if (settings.admit) now = settings.admit(who, id);
+    if (!now) return rights.judge(who, question);
     std::string name = id == 0 ? std::string() : name_of(settings.stations, id);
     if (auto refusal = refusal_at_door(*now, question.acts(), std::move(name))) return refusal;
     return rights.judge(now->who, question);

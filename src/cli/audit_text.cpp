@@ -85,6 +85,15 @@ std::string rest_text(const json::object& record) {
     return text;
 }
 
+/// By its name in the record, or by its line and id: it may have had another name, or none.
+bool is_about_station(const json::object& record, const AuditFilter& filter) {
+    if (filter.station.empty() && filter.line.empty()) return true;
+    if (!filter.station.empty() && text_of(record, "station") == filter.station) return true;
+    const std::string id = any_text(record, "id");
+    return !filter.line.empty() && text_of(record, "line") == filter.line &&
+           (id == filter.id || id == "0");
+}
+
 }  // namespace
 
 bool is_shown(const json::object& record, const AuditFilter& filter) {
@@ -92,7 +101,7 @@ bool is_shown(const json::object& record, const AuditFilter& filter) {
     if (!filter.since.empty() && time < filter.since) return false;
     if (!filter.until.empty() && time >= filter.until) return false;
     if (!filter.kind.empty() && text_of(record, "kind") != filter.kind) return false;
-    if (!filter.station.empty() && text_of(record, "station") != filter.station) return false;
+    if (!is_about_station(record, filter)) return false;
     return filter.client.empty() || std::ranges::any_of(kClientKeys, [&](std::string_view key) {
                return text_of(record, key).find(filter.client) != std::string::npos;
            });

@@ -160,6 +160,16 @@ Named find_station(std::span<const Station> all, const std::string& typed) {
     return {"", "there is no station '" + typed + '\'' + suggestion(typed, names)};
 }
 
+FoundStation station_of(std::span<const Station> all, const std::string& typed) {
+    const Named named = find_station(all, typed);
+    if (!named.wrong.empty()) return {{}, named.wrong};
+    const auto found = std::ranges::find(all, named.name, &Station::name);
+    if (found != all.end()) return {*found, ""};
+    const std::size_t colon = named.name.rfind(':');
+    const auto id = id_in(std::string_view(named.name).substr(colon + 1));
+    return {{"", named.name.substr(0, colon), static_cast<unsigned>(id.value_or(0))}, ""};
+}
+
 Target target_of(const std::string& station, const std::string& place,
                  std::span<const std::string> points) {
     const std::string base = "/api/v1/stations/" + escaped(station) + '/';

@@ -88,12 +88,8 @@ Mark mark_of(const Node& map, std::string_view key) {
     return value != nullptr ? value->mark : map.mark;
 }
 
-const Line& line_of(const Config& config, std::string_view name) {
-    return *std::ranges::find(config.lines, name, &Line::name);
-}
-
 const Station* station_of(const Config& config, const UnitTarget& target) {
-    const std::vector<Station>& stations = line_of(config, target.line).stations;
+    const std::vector<Station>& stations = find_line(config, target.line)->stations;
     const auto found = std::ranges::find(stations, target.station, &Station::id);
     return found == stations.end() ? nullptr : &*found;
 }
@@ -107,7 +103,7 @@ std::string free_unit(const tcp_server::Settings& listener) {
 
 bool can_write(const Config& config, const tcp_server::Settings& listener) {
     const auto writable = [&](const std::string& name) {
-        const Line& line = line_of(config, name);
+        const Line& line = *find_line(config, name);
         const bool passes = !line.refuse_unlisted && listener.lines.size() == 1;
         return passes || !std::ranges::all_of(line.stations, &Station::read_only);
     };

@@ -95,6 +95,11 @@ std::string missing_commas(std::string_view typed) {
     return parts > 1 && parts <= kMost ? "; a ',' is missing: write [" + list + ']' : "";
 }
 
+std::string number_key_hint(const yaml::Entry& entry) {
+    if (!yaml::parse_integer(entry.value.scalar)) return yaml::number_blank_hint(entry.key);
+    return write(entry.value.scalar + ": " + entry.key);
+}
+
 std::string listen_hint(std::string_view typed) {
     const std::string_view text = bare(typed);
     if (is_port(text)) return port_hint(text);

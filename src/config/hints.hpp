@@ -17,6 +17,9 @@ std::string network_hint(std::string_view typed, std::string_view key);
 /// For an item of a list whose words have no blanks: "; a ',' is missing: write [a, b]".
 std::string missing_commas(std::string_view typed);
 
+/// For an entry of a map whose keys are numbers: "; write 1: on" for on: 1.
+std::string number_key_hint(const yaml::Entry& entry);
+
 /// Returns `serial` as a map of what was typed instead: "9600 8N1" or [9600, 8, N, 1]. Only what
 /// was typed; an example if nothing is understood or typed (nullptr).
 std::string serial_example(const yaml::Node* typed);

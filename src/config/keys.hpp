@@ -63,6 +63,23 @@ class Keys {
             },
             [=](const V& of) { return yaml::format_duration(std::invoke(field, of)); });
     }
+    /// A duration, or `auto` for a member that is empty.
+    template <class Field>
+    Keys duration_or_auto(std::string_view key, Field field, Duration min, Duration max,
+                          std::string_view text) && {
+        return std::move(*this).add(
+            key, text,
+            [=](yaml::MapReader& in, S& into) {
+                std::optional<Duration>& member = std::invoke(field, into);
+                if (!in.is_word(key, "auto")) return store(in.duration(key, min, max), member);
+                member.reset();
+                return true;
+            },
+            [=](const V& of) {
+                const std::optional<Duration>& member = std::invoke(field, of);
+                return member ? yaml::format_duration(*member) : "auto";
+            });
+    }
     template <class Field>
     Keys integer(std::string_view key, Field field, std::int64_t min, std::int64_t max,
                  std::string_view text) && {
@@ -94,12 +111,12 @@ class Keys {
     }
     /// A value that has none of the words is shown as "".
     template <class Field, class T, std::size_t N>
-    Keys word(std::string_view key, Field field, const Words<T, N>& words,
-              std::string_view text) && {
+    Keys word(std::string_view key, Field field, const Words<T, N>& words, std::string_view text,
+              const yaml::MapReader::Hint& hint = {}) && {
         return std::move(*this).add(
             key, text,
             [=, &words](yaml::MapReader& in, S& into) {
-                return store(in.template choice<T>(key, words), std::invoke(field, into));
+                return store(in.template choice<T>(key, words, hint), std::invoke(field, into));
             },
             [=, &words](const V& of) {
                 const T value = std::invoke(field, of);

@@ -368,6 +368,14 @@ std::optional<std::string> load_name(MapReader& in, bool required, const std::st
     return std::nullopt;
 }
 
+std::string load_unique_name(Loading& loading, MapReader& in, const std::string& what) {
+    std::string name = load_name(in, true).value_or("");
+    if (!name.empty())
+        loading.firsts.once(in, "name", what + ' ' + name,
+                            "there are two " + what + "s '" + name + '\'');
+    return name;
+}
+
 std::string name_hint(std::string_view typed) {
     constexpr std::size_t kLongest = 40;
     std::string name;
@@ -378,19 +386,6 @@ std::string name_hint(std::string_view typed) {
         if (is_name(one)) name += one;
     }
     return name.empty() ? "" : "; write " + name;
-}
-
-std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
-                         std::string_view noun) {
-    const std::string near = nearest(typed, known);
-    if (!near.empty()) return "; did you mean '" + near + "'?";
-    if (known.empty()) return "; there are none";
-    std::string list;
-    constexpr std::size_t kMost = 30;
-    for (const std::string_view word : known.first(std::min(kMost, known.size())))
-        list += (list.empty() ? "" : ", ") + std::string(word);
-    if (known.size() > kMost) list += " and " + std::to_string(known.size() - kMost) + " more";
-    return "; known " + std::string(noun) + " are " + list;
 }
 
 std::optional<bool> load_read_only(MapReader& in) {

@@ -78,10 +78,8 @@ std::optional<std::string> origin_of(std::string text) {
 }  // namespace
 
 void load_cors(Loading& loading, yaml::MapReader& in, std::vector<std::string>& origins) {
-    const yaml::Node* list = in.sequence("cors");
     in.looks_like("cors", "^[Hh][Tt][Tt][Pp][Ss]?://\\[?[A-Za-z0-9._:-]+\\]?(:[0-9]{1,5})?$");
-    if (list == nullptr) return;
-    for (const yaml::Node& item : list->items) {
+    for (const yaml::Node& item : in.entries("cors", {})) {
         if (auto origin = origin_of(item.scalar)) {
             origins.push_back(std::move(*origin));
             continue;
@@ -214,11 +212,8 @@ web::Token load_token(Loading& loading, const Node& node) {
 }  // namespace
 
 void load_tokens(Loading& loading, MapReader& in, std::vector<web::Token>& tokens) {
-    const Node* list =
-        in.sequence("tokens", "[{name: ops, role: operator, file: /run/secrets/ops}]");
     in.refuse_empty("tokens", "give at least one token, or leave it out");
-    if (list == nullptr) return;
-    for (const Node& node : list->items) {
+    for (const Node& node : in.entries("tokens", "[" + std::string(kTokenExample) + "]")) {
         web::Token token = load_token(loading, node);
         if (!token.name.empty() &&
             std::ranges::find(tokens, token.name, &web::Token::name) != tokens.end())

@@ -61,10 +61,8 @@ void load_rs485(MapReader& in, const Line& line, line::Rs485& rs485) {
     constexpr std::array<std::string_view, 2> kSwitched{"kernel", "rts"};
     for (const std::string_view key :
          {"rts_on_send", "delay_before_send", "delay_after_send", "receive_during_send"}) {
-        in.belongs(key, "mode", kSwitched);
-        if (rs485.mode == Mode::off && in.has(key)) {
+        if (in.belongs(key, "mode", kSwitched))
             in.problem(key, std::string(key) + " belongs to rs485 mode kernel or rts");
-        }
     }
     if (rs485.mode != Mode::off && line.kind != Line::Kind::serial) {
         in.problem("mode", "only a serial device has an rs485 mode: '" + line.device.device +
@@ -175,6 +173,7 @@ std::vector<yaml::Elsewhere> keys_elsewhere() {
         {"crc_order", {}, "a station"},
         {"profile", {}, "a station"},
         {"listen", {}, "modbus_tcp or http"},
+        {"access", {}, "a station or of modbus_tcp; rules are in 'access' at the top level"},
         {"type", {}, {}, "remove it: 'device' says what the line is"},
         {"framing", {}, {}, "a line has serial: {mode: ascii}, or is RTU without a word"},
         {"method", {}, {}, "remove it: a line is RTU, or has serial: {mode: ascii}"}};
@@ -204,16 +203,11 @@ Line load_line(Loading& loading, const Node& node) {
     in.elsewhere(kElsewhere);
     in.elsewhere(loading.top_keys);
     Line line;
-    line.name = load_name(in, true).value_or("");
-    if (!line.name.empty()) {
-        loading.firsts.once(in, "name", "line " + line.name,
-                            "there are two lines '" + line.name + '\'');
-        loading.config.line_marks.emplace(line.name, in.mark("name"));
-    }
+    line.name = load_unique_name(loading, in, "line");
+    if (!line.name.empty()) loading.config.line_marks.emplace(line.name, in.mark("name"));
     load_device(loading, in, line);
     load_mode(in, line);
-    const bool serial_known =
-        load_serial(loading, in, line.device.serial, &line.arbiter.ascii_digits);
+    const bool serial_known = load_serial(loading, in, line.device.serial, &line);
     if (line.listens && line.device.serial.mode == SerialMode::ascii)
         in.problem("mode", "mode listen understands RTU only, not ASCII");
     line.arbiter.serial = line.device.serial;
@@ -225,10 +219,8 @@ Line load_line(Loading& loading, const Node& node) {
              [&](MapReader& queue) { load_queue(queue, line.arbiter.queue); });
     load_map(in, "offline", "{after: 3}",
              [&](MapReader& offline) { load_offline(offline, line.arbiter.offline); });
-    load_map(in, "simulate", "{echo: true}", [&](MapReader& simulate) {
-        line.simulated_echo = simulate.boolean("echo").value_or(false);
-        simulate.about("echo", "false", "The adapter hears what it sends.", "");
-    });
+    load_map(in, "simulate", "{echo: true}",
+             [&](MapReader& faults) { line_fault_keys().read(faults, line); });
     load_stations(loading, in, {line, serial_known, {}});
     in.finish();
     if (line.listens) warn_of_unused_keys(loading, in, line);

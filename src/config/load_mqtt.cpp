@@ -105,7 +105,7 @@ std::string load_password(Loading& loading, MapReader& in, std::string& file) {
     const auto typed = in.text("password_file");
     if (!typed) return "";
     file = loading.path_of(*typed);
-    auto text = loading.files.is_special(file) ? std::nullopt : loading.files.read(file);
+    auto text = loading.content_of(file);
     if (!text) {
         in.problem("password_file",
                    "cannot read the password file; give the path of a file that holds the password "
@@ -127,8 +127,7 @@ void load_file(Loading& loading, MapReader& in, std::string_view key, bool tls, 
     path = loading.path_of(*text);
     if (!tls)
         in.problem(key, std::string(key) + " needs TLS; write broker: mqtts://HOST:8883");
-    else if (const auto file =
-                 loading.files.is_special(path) ? std::nullopt : loading.files.read(path))
+    else if (const auto file = loading.content_of(path))
         content = *file;
     else
         in.problem(key, "cannot read " + path +
@@ -181,16 +180,13 @@ void load_format(MapReader& in, mqtt::Settings& settings) {
               settings.topic);
     load_part(in, "group", "+#/", "one level of a topic, without +, # and /", settings.group);
     load_part(in, "node", "+#/", "one level of a topic, without +, # and /", settings.node);
-    in.belongs("group", "format", std::span(&kSparkplug, 1));
-    in.belongs("node", "format", std::span(&kSparkplug, 1));
-    in.belongs("qos", "format", std::span(&kJson, 1), true);
-    const bool sparkplug = settings.format == mqtt::Format::sparkplug;
-    if (sparkplug && in.has("qos"))
-        in.problem("qos", "Sparkplug prescribes the quality of service; remove qos");
     for (const std::string_view key : {"group", "node"}) {
-        if (!sparkplug && in.has(key))
+        if (in.belongs(key, "format", std::span(&kSparkplug, 1)))
             in.problem(key, std::string(key) + " is of Sparkplug; add format: sparkplug");
     }
+    const bool sparkplug = settings.format == mqtt::Format::sparkplug;
+    if (in.belongs("qos", "format", std::span(&kJson, 1), true) && sparkplug)
+        in.problem("qos", "Sparkplug prescribes the quality of service; remove qos");
 }
 
 void load_session(Loading& loading, MapReader& in, mqtt::Settings& settings) {

@@ -2,6 +2,7 @@
 #include <array>
 #include <cstdint>
 
+#include "hints.hpp"
 #include "load_stations.hpp"
 #include "panelgate/base/decimal.hpp"
 #include "panelgate/base/text.hpp"
@@ -122,19 +123,13 @@ void load_label(MapReader& in, const yaml::Entry& entry, Point& point) {
     const auto raw = yaml::parse_integer(entry.key);
     const bool is_text = entry.value.kind == Node::Kind::scalar && !entry.value.comma;
     if (!raw || !is_text || entry.value.scalar.empty()) {
-        const bool turned = yaml::parse_integer(entry.value.scalar).has_value();
         const bool is_null = raw && entry.value.kind == Node::Kind::null;
-        if (is_null) {
-            in.problems().add(entry.mark,
-                              "a label must be a text, not nothing; for the word null "
-                              "write 'null' in quotes: " +
-                                  entry.key + ": 'null'");
-            return;
-        }
-        in.problems().add(entry.mark,
-                          "labels are RAW-NUMBER: text, such as 1: running" +
-                              (turned ? "; write " + entry.value.scalar + ": " + entry.key
-                                      : yaml::number_blank_hint(entry.key)));
+        in.problems().add(
+            entry.mark,
+            is_null ? "a label must be a text, not nothing; for the word null write 'null' in "
+                      "quotes: " +
+                          entry.key + ": 'null'"
+                    : "labels are RAW-NUMBER: text, such as 1: running" + number_key_hint(entry));
         return;
     }
     if (const RawRange range = label_range(point.type); !range.contains(*raw)) {
@@ -176,12 +171,11 @@ void load_labels(MapReader& in, Point& point) {
 }
 
 void load_no_value(MapReader& in, Point& point) {
-    const Node* list = in.sequence("no_value");
+    const auto list = in.entries("no_value", {}, points::kMaxNoValues, "values that mean none");
     in.schema("no_value").holds_integers = true;
-    const bool few = in.at_most("no_value", points::kMaxNoValues, "values that mean none");
-    if (list == nullptr || !few || !is_number(point.type)) return;
+    if (!is_number(point.type)) return;
     const RawRange range = no_value_range(point.type);
-    for (const Node& item : list->items) {
+    for (const Node& item : list) {
         const bool plain = item.kind == Node::Kind::scalar && !item.is_text();
         const auto raw = plain ? yaml::parse_integer(item.scalar) : std::nullopt;
         if (!raw) {
@@ -307,14 +301,6 @@ void load_poll(Loading& loading, const Node& node, Station& station) {
     if (item) station.polls.push_back(std::move(poll));
 }
 
-template <class Load>
-void load_list(Loading& loading, MapReader& in, std::string_view key, std::string_view example,
-               std::size_t most, const Load& load) {
-    const Node* list = in.sequence(key, example);
-    if (!in.at_most(key, most, std::string(key) + " of one station") || list == nullptr) return;
-    for (const Node& item : list->items) load(loading, item);
-}
-
 }  // namespace
 
 std::optional<profile::Item> load_notation(MapReader& in, std::string_view key,
@@ -342,11 +328,13 @@ void load_points(Loading& loading, MapReader& in, Station& station) {
                    "the line is only listened to (mode: listen): nothing is asked there; write "
                    "points, which what passes by fills");
     }
-    load_list(loading, in, "poll", "[{read: UW100, count: 8, every: 1s}]", points::kMaxPolls,
-              [&](Loading& l, const Node& node) { load_poll(l, node, station); });
+    for (const Node& node : in.entries("poll", "[{read: UW100, count: 8, every: 1s}]",
+                                       points::kMaxPolls, "poll of one station"))
+        load_poll(loading, node, station);
     Firsts names;
-    load_list(loading, in, "points", "[{name: temperature, at: UW100}]", points::kMaxPoints,
-              [&](Loading& l, const Node& node) { load_point(l, node, station, names); });
+    for (const Node& node : in.entries("points", "[{name: temperature, at: UW100}]",
+                                       points::kMaxPoints, "points of one station"))
+        load_point(loading, node, station, names);
 }
 
 }  // namespace panelgate::config

@@ -188,9 +188,9 @@ std::optional<End> load_end(Loading& loading, MapReader& in, std::string_view ke
         std::vector<std::string_view> names(loading.station_names.begin(),
                                             loading.station_names.end());
         const std::string hint = end_hint(loading.config, *text);
-        in.problem(key,
-                   "there is no station " + yaml::quote(end.end.station) +
-                       (hint.empty() ? did_you_mean(end.end.station, names, "stations") : hint));
+        in.problem(key, hint.empty()
+                            ? yaml::no_such("station", end.end.station, names)
+                            : "there is no station " + yaml::quote(end.end.station) + hint);
         return std::nullopt;
     }
     if (end.station->listens) {
@@ -313,10 +313,10 @@ void load_relay(Loading& loading, const Node& node, std::vector<Route>& routes) 
 }  // namespace
 
 void load_relays(Loading& loading, MapReader& root) {
-    const Node* list = root.sequence("relays", "[{from: press/UW100, to: oven/GDT200}]");
-    if (!root.at_most("relays", points::kMaxRelays, "relays") || list == nullptr) return;
     std::vector<Route> routes;
-    for (const Node& node : list->items) load_relay(loading, node, routes);
+    for (const Node& node : root.entries("relays", "[{from: press/UW100, to: oven/GDT200}]",
+                                         points::kMaxRelays, "relays"))
+        load_relay(loading, node, routes);
 }
 
 }  // namespace panelgate::config

@@ -21,19 +21,11 @@ constexpr std::array<std::string_view, 4> kDefaultRoles{"viewer", "operator", "e
 constexpr std::string_view kRolePattern = "^[a-z0-9-]+$";
 constexpr std::string_view kRoleExample = "{name: setter, rights: [read, write]}";
 
-std::vector<std::string_view> right_words() {
+void load_rights(Loading& loading, MapReader& in, OwnRole& role) {
     std::vector<std::string_view> words;
     for (const Right right : kAllRights) words.push_back(label(right));
-    return words;
-}
-
-void load_rights(Loading& loading, MapReader& in, OwnRole& role) {
-    const std::vector<std::string_view> words = right_words();
-    std::string pattern;
-    for (const std::string_view word : words)
-        pattern += (pattern.empty() ? "^(" : "|") + std::string(word);
-    in.looks_like("rights", pattern + ")$");
     const Node* list = in.sequence("rights", "[read, write]");
+    in.looks_like_one_of("rights", words);
     yaml::KeyShape& schema = in.schema("rights");
     schema.fewest = 1;
     schema.required = true;
@@ -49,8 +41,7 @@ void load_rights(Loading& loading, MapReader& in, OwnRole& role) {
         if (item.kind == Node::Kind::scalar && known != kAllRights.end()) {
             role.rights.add(*known);
         } else {
-            loading.problems.add(item.mark, "there is no right " + yaml::quote(item.scalar) +
-                                                did_you_mean(item.scalar, words, "rights"));
+            loading.problems.add(item.mark, yaml::no_such("right", item.scalar, words));
         }
     }
 }
@@ -58,15 +49,12 @@ void load_rights(Loading& loading, MapReader& in, OwnRole& role) {
 void load_own_role(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a role", kRoleExample);
     OwnRole role;
-    role.name = load_name(in, true).value_or("");
+    role.name = load_unique_name(loading, in, "role");
     const bool is_taken =
         role.name == "none" || role.name == "default" ||
         std::ranges::find(kDefaultRoles, std::string_view(role.name)) != kDefaultRoles.end();
     if (is_taken)
         in.problem("name", "the role '" + role.name + "' is there already; give it another name");
-    if (!role.name.empty())
-        loading.firsts.once(in, "name", "role " + role.name,
-                            "there are two roles '" + role.name + '\'');
     load_rights(loading, in, role);
     own_role_keys().read(in, role);
     in.finish();

@@ -42,33 +42,22 @@ constexpr Words<Face, 4> kFaces{{{"modbus_tcp", Face::modbus_tcp},
                                  {"mqtt", Face::mqtt},
                                  {"serial_master", Face::serial_master}}};
 
-/// Reports a word that is not known.
-void unknown(Loading& loading, const Node& item, std::string_view what,
-             std::span<const std::string_view> known) {
-    loading.problems.add(item.mark, "there is no " + std::string(what) + ' ' +
-                                        yaml::quote(item.scalar) +
-                                        did_you_mean(item.scalar, known, std::string(what) + 's'));
-}
-
 template <class T, std::size_t N>
 std::vector<T> words(Loading& loading, MapReader& in, std::string_view key,
                      std::string_view example, const Words<T, N>& known) {
     std::vector<std::string_view> names;
-    std::string pattern;
-    for (const auto& [name, value] : known) {
-        names.push_back(name);
-        pattern += (pattern.empty() ? "^(" : "|") + std::string(name);
-    }
+    for (const auto& [name, value] : known) names.push_back(name);
     std::vector<T> all;
     for (const Node* item : in.items(key, example, kAny)) {
         const auto found = std::ranges::find(known, item->scalar, &Words<T, N>::value_type::first);
         if (found != known.end()) {
             all.push_back(found->second);
         } else {
-            unknown(loading, *item, key == "faces" ? "face" : "act", names);
+            loading.problems.add(
+                item->mark, yaml::no_such(key == "faces" ? "face" : "act", item->scalar, names));
         }
     }
-    in.looks_like(key, pattern + ")$");
+    in.looks_like_one_of(key, names);
     return all;
 }
 
@@ -106,7 +95,7 @@ void load_token_names(Loading& loading, MapReader& in, Rule& rule) {
     for (const Node* item : in.items("tokens", "[ops]", kAny)) {
         rule.tokens.push_back(item->scalar);
         if (std::ranges::find(known, item->scalar) == known.end())
-            unknown(loading, *item, "token", known);
+            loading.problems.add(item->mark, yaml::no_such("token", item->scalar, known));
     }
 }
 
@@ -125,7 +114,7 @@ void load_listeners(Loading& loading, MapReader& in, Rule& rule) {
     for (const Node* item : in.items("listeners", "[\"0.0.0.0:502\"]", kAny)) {
         rule.listeners.push_back(item->scalar);
         if (std::ranges::find(known, item->scalar) == known.end())
-            unknown(loading, *item, "listener", known);
+            loading.problems.add(item->mark, yaml::no_such("listener", item->scalar, known));
     }
 }
 
@@ -151,18 +140,19 @@ void load_stations(Loading& loading, MapReader& in, Rule& rule) {
         } else if (!loading.names_missing) {
             const std::vector<std::string_view> names(loading.station_names.begin(),
                                                       loading.station_names.end());
-            unknown(loading, *item, "station", names);
+            loading.problems.add(item->mark, yaml::no_such("station", item->scalar, names));
         }
     }
 }
 
 void load_functions(Loading& loading, MapReader& in, Rule& rule) {
     constexpr std::int64_t kLast = 127;
+    const std::vector<const Node*> items = in.items("functions", "[16, 23]", kAny);
     yaml::KeyShape& schema = in.schema("functions");
     schema.holds_integers = true;
     schema.min = 1;
     schema.max = kLast;
-    for (const Node* item : in.items("functions", "[16, 23]", kAny)) {
+    for (const Node* item : items) {
         const auto code = yaml::parse_integer(item->scalar);
         if (code && *code >= 1 && *code <= kLast) {
             rule.functions.push_back(static_cast<std::uint8_t>(*code));
@@ -175,14 +165,11 @@ void load_functions(Loading& loading, MapReader& in, Rule& rule) {
 }
 
 void load_name_of(Loading& loading, MapReader& in, Rule& rule) {
-    rule.name = load_name(in, true).value_or("");
+    rule.name = load_unique_name(loading, in, "rule");
     if (rule.name == "default")
         in.problem("name", "a rule cannot be called default: that is what no rule decides");
     if (is_role(loading.config, rule.name))
         in.problem("name", "a rule cannot be called as a role: refusals name either");
-    if (!rule.name.empty())
-        loading.firsts.once(in, "name", "rule " + rule.name,
-                            "there are two rules '" + rule.name + '\'');
 }
 
 void load_rule(Loading& loading, const Node& node) {
@@ -305,12 +292,11 @@ void load_rules(Loading& loading, MapReader& root) {
         [&](MapReader& in) {
             rules_keys().read(in, loading.config.access);
             // load_own_roles() reads them
-            in.sequence("roles", "[{name: setter, rights: [read, write]}]");
-            in.at_most("roles", access::Settings::kMaxRoles, "roles");
-            const Node* list = in.sequence("rules", "[" + std::string(kRuleExample) + "]");
-            if (!in.at_most("rules", access::Settings::kMaxRules, "rules") || list == nullptr)
-                return;
-            for (const Node& item : list->items) load_rule(loading, item);
+            in.entries("roles", "[{name: setter, rights: [read, write]}]",
+                       access::Settings::kMaxRoles, "roles");
+            for (const Node& item : in.entries("rules", "[" + std::string(kRuleExample) + "]",
+                                               access::Settings::kMaxRules, "rules"))
+                load_rule(loading, item);
         });
     root.refuse_empty("access", "leave it out for no rules");
     if (loading.problems.empty()) warn_of_rules(loading);

@@ -39,45 +39,40 @@ void load_data_bits(MapReader& in, SerialFormat& format) {
 }
 
 /// Reads the keys of `serial` that set the protocol of a line; a serial master sets it elsewhere.
-void load_serial_mode(MapReader& in, SerialFormat& format, modbus::HexDigits* digits) {
-    if (digits == nullptr) {
+void load_serial_mode(MapReader& in, SerialFormat& format, Line* line) {
+    if (line == nullptr) {
         const bool given = in.refuse("mode",
                                      "is a serial master's framing: write framing: ascii beside "
                                      "serial, or leave it out for RTU");
         if (given) format.mode = SerialMode::ascii;  // accepts 7 and 8 data bits
         return;
     }
-    format.mode = in.choice<SerialMode>("mode", kSerialModeWords).value_or(format.mode);
-    *digits = in.choice<modbus::HexDigits>("ascii_lower_case", kLowerCase).value_or(*digits);
-    in.about("mode", "rtu", "Framing of the panels' messages.", "");
-    in.about("ascii_lower_case", "refuse", "Whether hex digits a-f are taken.", "");
+    line_serial_keys().read(in, *line);
     constexpr std::array<std::string_view, 1> kAscii{"ascii"};
-    in.belongs("ascii_lower_case", "mode", kAscii);
-    if (in.has("ascii_lower_case") && format.mode != SerialMode::ascii)
+    if (in.belongs("ascii_lower_case", "mode", kAscii))
         in.problem("ascii_lower_case", "only a line with mode: ascii has hex digits");
 }
 
 }  // namespace
 
-bool load_serial(Loading& loading, MapReader& line, SerialFormat& format,
-                 modbus::HexDigits* digits) {
+bool load_serial(Loading& loading, MapReader& owner, SerialFormat& format, Line* line) {
     const std::size_t before = loading.problems.list().size();
     if (format.mode == SerialMode::ascii) format.data_bits = 7;
-    const Node* typed = line.child("serial");
+    const Node* typed = owner.child("serial");
     const std::string example = serial_example(typed);
     const bool is_list = typed != nullptr && typed->kind == Node::Kind::sequence;
     const bool is_values = is_list && std::ranges::all_of(typed->items, [](const Node& item) {
                                return item.kind == Node::Kind::scalar;
                            });
     if (is_values && !typed->items.empty()) {  // [9600, 8, N, 1]
-        line.has("serial");
-        line.problem("serial", "serial must be a map of keys, not a list; write " + example);
+        owner.has("serial");
+        owner.problem("serial", "serial must be a map of keys, not a list; write " + example);
         return false;
     }
-    const Node* node = line.map("serial", example);
+    const Node* node = owner.map("serial", example);
     if (node == nullptr) return loading.problems.list().size() == before;
     MapReader in(*node, loading.problems, "serial");
-    load_serial_mode(in, format, digits);
+    load_serial_mode(in, format, line);
     load_data_bits(in, format);
     serial_keys().read(in, format);
     in.finish();
@@ -91,14 +86,6 @@ using serial_server::Settings;
 using tcp_server::BroadcastMode;
 
 constexpr std::string_view kMasterExample = "{name: plc, device: /dev/ttyUSB1, lines: [floor1]}";
-constexpr std::string_view kMasterListExample =
-    "[{name: plc, device: /dev/ttyUSB1, lines: [floor1]}]";
-
-void check_name(Loading& loading, MapReader& in, const Settings& settings) {
-    if (settings.name.empty()) return;
-    loading.firsts.once(in, "name", "master " + settings.name,
-                        "there are two serial masters '" + settings.name + '\'');
-}
 
 /// Two users of one device would take each other's bytes. An invalid device is a problem already.
 void check_device(Loading& loading, MapReader& in, const line::Settings& port) {
@@ -202,8 +189,7 @@ Settings load_master(Loading& loading, const Node& node) {
     in.elsewhere(kMasterKeysElsewhere);
     Settings settings;
     settings.access.diagnostics_unit.reset();
-    settings.name = load_name(in, true).value_or("");
-    check_name(loading, in, settings);
+    settings.name = load_unique_name(loading, in, "serial master");
     const bool serial_known = load_port(loading, in, settings.device, mode_of(node));
     check_device(loading, in, settings.device);
     load_access(loading, in, settings.access);
@@ -222,9 +208,7 @@ Settings load_master(Loading& loading, const Node& node) {
 }  // namespace
 
 void load_serial_masters(Loading& loading, MapReader& root) {
-    const Node* list = root.sequence("serial_masters", kMasterListExample);
-    if (list == nullptr) return;
-    for (const Node& node : list->items)
+    for (const Node& node : root.entries("serial_masters", "[" + std::string(kMasterExample) + "]"))
         loading.config.serial_masters.push_back(load_master(loading, node));
 }
 

@@ -3,7 +3,6 @@
 #include "loader.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/line/settings.hpp"
-#include "panelgate/modbus/ascii.hpp"
 
 namespace panelgate::config {
 
@@ -11,9 +10,8 @@ namespace panelgate::config {
 /// False if its serial format had a fault and must not be used.
 bool load_port(Loading& loading, yaml::MapReader& in, line::Settings& port, SerialMode mode);
 
-/// Reads `serial` of a line or a port; `digits` is for a line, nullptr if the mode is set elsewhere
+/// Reads `serial` of a port, or of a line, whose format it is; nullptr: the mode is set elsewhere,
 /// and in `format` already. False if there was a fault: the format must not be used.
-bool load_serial(Loading& loading, yaml::MapReader& in, SerialFormat& format,
-                 modbus::HexDigits* digits);
+bool load_serial(Loading& loading, yaml::MapReader& in, SerialFormat& format, Line* line);
 
 }  // namespace panelgate::config

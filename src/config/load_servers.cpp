@@ -30,13 +30,6 @@ using tcp_server::BroadcastMode;
 using tcp_server::Retransmissions;
 using yaml::MapReader;
 
-constexpr std::array<std::string_view, 3> kFramingWords{"tcp", "rtu", "ascii"};
-constexpr std::array kFramings{Framing::tcp, Framing::rtu, Framing::ascii};
-
-std::string framing_hint(std::string_view typed) {
-    return typed == "udp" ? "; datagrams have framing: tcp, write udp: true" : "";
-}
-
 std::string framing_is(Framing framing) {
     return "framing: " + std::string(modbus::label(framing));
 }
@@ -58,11 +51,9 @@ void refuse_in_serial_modes(MapReader& in, const tcp_server::Settings& settings)
 }  // namespace
 
 void load_framing(MapReader& in, tcp_server::Settings& settings) {
-    if (const auto chosen = in.choice_index("framing", kFramingWords, framing_hint))
-        settings.framing = kFramings[*chosen];
     listener_keys().read(in, settings);
-    in.belongs("ascii_lower_case", "framing", std::span(&kFramingWords[2], 1));
-    if (in.has("ascii_lower_case") && settings.framing != Framing::ascii)
+    constexpr std::string_view kAscii = "ascii";
+    if (in.belongs("ascii_lower_case", "framing", std::span(&kAscii, 1)))
         in.problem("ascii_lower_case", "only a listener with framing: ascii reads hex digits");
     if (settings.framing != Framing::tcp) refuse_in_serial_modes(in, settings);
 }
@@ -114,12 +105,6 @@ std::optional<std::string> load_modbus_listen(MapReader& in, tcp_server::Setting
     return text;
 }
 
-const Line* find_line(const Config& config, std::string_view name) {
-    const auto found = std::find_if(config.lines.begin(), config.lines.end(),
-                                    [&](const Line& line) { return line.name == name; });
-    return found == config.lines.end() ? nullptr : &*found;
-}
-
 /// Returns nullptr and adds a problem at `mark` if there is none.
 const Line* find_line(Loading& loading, yaml::Mark mark, const std::string& name) {
     if (const Line* line = find_line(loading.config, name)) return line;
@@ -128,8 +113,8 @@ const Line* find_line(Loading& loading, yaml::Mark mark, const std::string& name
     names.reserve(loading.config.lines.size());
     for (const Line& line : loading.config.lines) names.push_back(line.name);
     const std::string commas = missing_commas(name);
-    loading.problems.add(mark, "there is no line " + yaml::quote(name) +
-                                   (commas.empty() ? did_you_mean(name, names, "lines") : commas));
+    loading.problems.add(mark, commas.empty() ? yaml::no_such("line", name, names)
+                                              : "there is no line " + yaml::quote(name) + commas);
     return nullptr;
 }
 
@@ -222,11 +207,8 @@ void load_units(Loading& loading, MapReader& in, tcp_server::Settings& settings)
     for (const yaml::Entry& entry : map->entries) {
         const auto unit = yaml::parse_integer(entry.key);
         if (!unit || *unit < 0 || *unit > 255) {
-            const bool turned = yaml::parse_integer(entry.value.scalar).has_value();
-            loading.problems.add(
-                entry.mark, "a unit id is a number from 0 to 255, not " + yaml::quote(entry.key) +
-                                (turned ? "; write " + entry.value.scalar + ": " + entry.key
-                                        : yaml::number_blank_hint(entry.key)));
+            loading.problems.add(entry.mark, "a unit id is a number from 0 to 255, not " +
+                                                 yaml::quote(entry.key) + number_key_hint(entry));
             continue;
         }
         if (const auto target = unit_target(loading, entry.value)) {
@@ -323,6 +305,11 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
 
 }  // namespace
 
+const Line* find_line(const Config& config, std::string_view name) {
+    const auto found = std::ranges::find(config.lines, name, &Line::name);
+    return found == config.lines.end() ? nullptr : &*found;
+}
+
 void load_networks(Loading& loading, MapReader& in, std::string_view key,
                    std::vector<Network>& networks) {
     in.looks_like(key, network_pattern());
@@ -352,9 +339,7 @@ void load_access(Loading& loading, MapReader& in, tcp_server::Settings& settings
 }
 
 void load_modbus_tcp(Loading& loading, MapReader& root) {
-    const Node* list = root.sequence("modbus_tcp", "[{listen: 127.0.0.1:502}]");
-    if (list == nullptr) return;
-    for (const Node& node : list->items) {
+    for (const Node& node : root.entries("modbus_tcp", "[{listen: 127.0.0.1:502}]")) {
         tcp_server::Settings settings = load_listener(loading, node);
         const std::string name = settings.name();
         const std::string first = loading.firsts.again("listener " + name, node.mark);

@@ -324,17 +324,15 @@ void load_response_timeout(MapReader& in, Timing& timing) {
         settings.response_timeout = *timeout;
         settings.adaptive_timeout = false;
     }
-    Duration& floor = settings.timeout_floor;
-    floor = in.duration("adaptive_floor", 1ms, 10s).value_or(floor);
     const auto ceiling = in.duration("adaptive_ceiling", 1ms, 2min);
     timing.unused_bound.reset();
     for (const std::string_view bound : {"adaptive_floor", "adaptive_ceiling"})
         if (!settings.adaptive_timeout && in.has(bound)) timing.unused_bound = in.mark(bound);
     if (!settings.adaptive_timeout) return;
     settings.response_timeout = ceiling.value_or(settings.response_timeout);
-    if (floor > settings.response_timeout) {
+    if (settings.timeout_floor > settings.response_timeout) {
         in.problem(in.has("adaptive_floor") ? "adaptive_floor" : "adaptive_ceiling",
-                   "adaptive_floor " + yaml::format_duration(floor) +
+                   "adaptive_floor " + yaml::format_duration(settings.timeout_floor) +
                        " is above the adaptive_ceiling " +
                        yaml::format_duration(settings.response_timeout));
     }
@@ -345,22 +343,15 @@ void load_response_timeout(MapReader& in, Timing& timing) {
 /// 2.5.1.1). ASCII needs no gap to separate frames.
 Duration shortest_gap(const SerialFormat& serial) { return wire_time(serial, 7) / 2; }
 
-/// Nothing = auto. A line without a serial device here may have any gap.
-void load_frame_gap(MapReader& in, const LineContext& work, Timing& timing) {
-    if (in.is_word("frame_gap", "auto")) {
-        timing.frame_gap.reset();
-        return;
-    }
-    const auto gap = in.duration("frame_gap", 0ms, 10s);
-    if (!gap) return;
-    timing.frame_gap = gap;
+/// A line without a serial device here may have any gap.
+void check_shortest_gap(MapReader& in, const LineContext& work, Duration gap) {
     const SerialFormat& serial = work.line.device.serial;
     const bool free = work.line.kind != Line::Kind::serial || !work.serial_known ||
                       serial.mode == SerialMode::ascii;
-    if (free || *gap >= shortest_gap(serial)) return;
+    if (free || gap >= shortest_gap(serial)) return;
     in.problem("frame_gap", "frame_gap must be at least " + at_least(shortest_gap(serial)) +
                                 " (3.5 characters at " + to_string(serial) + "), not " +
-                                yaml::format_duration(*gap));
+                                yaml::format_duration(gap));
 }
 
 void warn_of_gap(Loading& loading, yaml::Mark mark, Duration gap, Duration asked,
@@ -418,25 +409,17 @@ void load_reply_hole(MapReader& in, Line& line) {
     line.arbiter.reply_hole = hole.value_or(line.arbiter.reply_hole);
 }
 
-void load_late_window(Loading& loading, MapReader& in, StationSettings& settings) {
-    if (in.is_word("late_window", "auto")) {
-        settings.late_window.reset();
-    } else if (const auto window = in.duration("late_window", 0ms, 10min)) {
-        settings.late_window = window;
-        if (*window == Duration::zero())
-            loading.warn(in.mark("late_window"),
-                         "late_window: 0ms expects no late reply: one that comes all the same may "
-                         "pass for the answer to the next request; write auto, or how late replies "
-                         "come, such as 500ms");
-    }
-}
-
 /// Reads the keys that lines and stations share.
-void load_common(Loading& loading, MapReader& in, const LineContext& work, Timing& timing) {
+void load_common(Loading& loading, MapReader& in, const LineContext& work, Timing& timing,
+                 Otherwise otherwise) {
+    const Given given = timing_keys().read(in, timing, otherwise);
     load_response_timeout(in, timing);
-    load_frame_gap(in, work, timing);
-    load_late_window(loading, in, timing.settings);
-    timing.think_time = in.duration("think_time", 0ms, 10s).value_or(timing.think_time);
+    if (given.has("frame_gap") && timing.frame_gap) check_shortest_gap(in, work, *timing.frame_gap);
+    if (given.has("late_window") && timing.settings.late_window == Duration::zero())
+        loading.warn(in.mark("late_window"),
+                     "late_window: 0ms expects no late reply: one that comes all the same may "
+                     "pass for the answer to the next request; write auto, or how late replies "
+                     "come, such as 500ms");
 }
 
 }  // namespace
@@ -446,8 +429,7 @@ void load_line_timing(Loading& loading, MapReader& in, LineContext& work) {
     work.line.arbiter.reply_hole = automatic_hole(work.line);
     if (const Node* node = in.map("timing", "{response_timeout: 500ms}")) {
         MapReader timing(*node, loading.problems, "timing");
-        load_common(loading, timing, work, work.timing);
-        timing_keys().read(timing, work.timing.settings);
+        load_common(loading, timing, work, work.timing, Otherwise::initial);
         load_reply_hole(timing, work.line);
         line_timing_keys().read(timing, work.line);
         timing.finish();
@@ -469,8 +451,7 @@ StationSettings load_station_timing(Loading& loading, MapReader& in, const LineC
     std::optional<yaml::Mark> own_gap;
     if (const Node* node = in.map("timing", "{response_timeout: 500ms}")) {
         MapReader own(*node, loading.problems, "a station's timing");
-        load_common(loading, own, work, timing);
-        timing_keys().read(own, timing.settings, Otherwise::owner);
+        load_common(loading, own, work, timing, Otherwise::owner);
         if (own.has("frame_gap")) own_gap = own.mark("frame_gap");
         const auto refuse = [&](std::string_view key, const std::string& why) {
             if (own.has(key))

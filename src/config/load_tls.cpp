@@ -23,7 +23,7 @@ bool load_file(Loading& loading, MapReader& in, std::string_view key, bool requi
     const auto text = required ? in.required_text(key) : in.text(key);
     if (!text) return !required && !in.has(key);
     path = loading.path_of(*text);
-    const auto read = loading.files.is_special(path) ? std::nullopt : loading.files.read(path);
+    const auto read = loading.content_of(path);
     if (!read) {
         in.problem(key, "cannot read " + path +
                             "; give the path of a PEM file that this program may read "

@@ -17,6 +17,8 @@
 
 namespace panelgate::config {
 
+using yaml::did_you_mean;
+
 /// Where what may be there once was written first.
 class Firsts {
   public:
@@ -50,6 +52,11 @@ struct Loading {
     /// The file that a text of the configuration names.
     std::string path_of(const std::string& typed) const { return beside(problems.file(), typed); }
 
+    /// The content of a regular file; nothing if it cannot be read. Another one might never end.
+    std::optional<std::string> content_of(const std::string& path) const {
+        return files.is_special(path) ? std::nullopt : files.read(path);
+    }
+
     void warn(yaml::Mark mark, const std::string& message) {
         std::string text = yaml::format({problems.file(), mark, "warning: " + message});
         // Many stations may have it from one template.
@@ -79,6 +86,9 @@ void load_section(Loading& loading, yaml::MapReader& root, std::string_view key,
     });
 }
 
+/// Returns nullptr if there is none.
+const Line* find_line(const Config& config, std::string_view name);
+
 /// Line and station names: [a-z0-9-]+.
 bool is_name(std::string_view text);
 /// Returns a regular expression for texts of these letters; a '-' must be the last of them.
@@ -87,13 +97,13 @@ std::string pattern_of(std::string_view letters);
 /// schema.
 std::optional<std::string> load_name(yaml::MapReader& in, bool required,
                                      const std::string& pattern = name_pattern());
+/// Reads the same, required, and reports one that is there before: "there are two rules 'a'"; "" if
+/// it is invalid.
+std::string load_unique_name(Loading& loading, yaml::MapReader& in, const std::string& what);
 /// Returns "; write big-press" for "Big Press"; "" if no letter is usable.
 std::string name_hint(std::string_view typed);
 /// Reads the key `access`: true for read_only.
 std::optional<bool> load_read_only(yaml::MapReader& in);
-/// Returns "; did you mean 'x'?" if one of `known` is near, else "; known NOUN are a, b, c".
-std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
-                         std::string_view noun);
 
 /// Reports missing lines, unless a key is probably a mistyped `lines`: then call refuse_no_lines()
 /// if finish() accepted that key.

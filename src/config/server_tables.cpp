@@ -44,6 +44,9 @@ const Keys<tcp_server::Settings>& listener_keys() {
     using Settings = tcp_server::Settings;
     using tcp_server::BroadcastMode;
     using tcp_server::Retransmissions;
+    static constexpr Words<modbus::Framing, 3> kFramings{{{"tcp", modbus::Framing::tcp},
+                                                          {"rtu", modbus::Framing::rtu},
+                                                          {"ascii", modbus::Framing::ascii}}};
     static constexpr Words<BroadcastMode, 3> kBroadcasts{{{"reply", BroadcastMode::reply},
                                                           {"silent", BroadcastMode::silent},
                                                           {"deny", BroadcastMode::deny}}};
@@ -54,11 +57,11 @@ const Keys<tcp_server::Settings>& listener_keys() {
             .other("listen", "ADDR:PORT or [ADDR]:PORT; port 0: a free one.", &Settings::name)
             .initially("127.0.0.1:502")
             .change_needs(kListensAnew)
-            .other("framing", "Framing of its clients' requests, over TCP.",
-                   [](const Settings& settings) {
-                       return std::string(modbus::label(settings.framing));
-                   })
-            .initially("tcp")
+            .word("framing", &Settings::framing, kFramings,
+                  "Framing of its clients' requests, over TCP.",
+                  [](std::string_view typed) {
+                      return typed == "udp" ? "; datagrams have framing: tcp, write udp: true" : "";
+                  })
             .change_needs(kListensAnew)
             .boolean("udp", &Settings::udp,
                      "Takes datagrams on the same port as well, with framing tcp.")

@@ -31,25 +31,16 @@ void show_point(const SettingWriter& station, const points::Point& point) {
 }
 
 /// As written: what was reckoned is `auto`.
-void show_timing(const SettingWriter& section, arbiter::StationSettings settings,
-                 bool automatic_gap, Duration think_time, const SettingWriter* owner) {
-    if (automatic_gap) settings.frame_gap.reset();
-    const std::string think = yaml::format_duration(think_time);
-    if (owner != nullptr) {
-        timing_keys().show(section, settings, *owner);
-        section.put("think_time", think, *owner);
-    } else {
-        timing_keys().show(section, settings);
-        section.put("think_time", think);
-    }
+Timing written(const arbiter::StationSettings& settings, bool automatic_gap, Duration think_time) {
+    return {settings, automatic_gap ? std::nullopt : settings.frame_gap, think_time};
 }
 
 void show_station(const SettingWriter& line, const StationView& of) {
     const SettingWriter section = line.item("stations", of.station.name);
     station_keys().show(section, of, line);
-    const SettingWriter owner = line.below("timing");
-    show_timing(section.below("timing"), of.settings, of.station.automatic_gap,
-                of.station.think_time, &owner);
+    timing_keys().show(section.below("timing"),
+                       written(of.settings, of.station.automatic_gap, of.station.think_time),
+                       line.below("timing"));
     fault_keys().show(section.below("simulate"), of.station.faults);
     for (const points::Point& point : of.station.points) show_point(section, point);
     Distinct reads;
@@ -61,17 +52,14 @@ void show_line(const SettingWriter& top, const Line& line) {
     const SettingWriter section = top.item("lines", line.name);
     show_port(section, line.device);
     const bool is_ascii = line.device.serial.mode == SerialMode::ascii;
-    const bool any_case = line.arbiter.ascii_digits == modbus::HexDigits::any_case;
-    const SettingWriter serial = section.below("serial");
-    serial.put("mode", is_ascii ? "ascii" : "rtu");
-    serial.put("ascii_lower_case", any_case ? "take" : "refuse");
+    line_serial_keys().show(section.below("serial"), line);
     line_keys().show(section, line);
-    show_timing(section.below("timing"), line.arbiter.unlisted, line.automatic_gap, line.think_time,
-                nullptr);
+    timing_keys().show(section.below("timing"),
+                       written(line.arbiter.unlisted, line.automatic_gap, line.think_time));
     line_timing_keys().show(section.below("timing"), line);
     queue_keys().show(section.below("queue"), line.arbiter.queue);
     offline_keys().show(section.below("offline"), line.arbiter.offline);
-    section.below("simulate").put("echo", line.simulated_echo ? "true" : "false");
+    line_fault_keys().show(section.below("simulate"), line);
     for (std::size_t i = 0; i < line.stations.size(); ++i)
         show_station(section, {line.stations[i], line.arbiter.stations[i], is_ascii});
 }

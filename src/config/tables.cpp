@@ -12,10 +12,6 @@ namespace {
 
 using yaml::format_duration;
 
-std::string or_auto(const std::optional<Duration>& duration) {
-    return duration ? format_duration(*duration) : "auto";
-}
-
 }  // namespace
 
 const Keys<Config>& root_keys() {
@@ -138,6 +134,24 @@ const Keys<SerialFormat>& serial_keys() {
     return kKeys;
 }
 
+const Keys<Line>& line_serial_keys() {
+    static const auto kKeys =
+        Keys<Line>()
+            .word(
+                "mode", [](auto& line) -> auto& { return line.device.serial.mode; },
+                kSerialModeWords, "Framing of the panels' messages.")
+            .word(
+                "ascii_lower_case", [](auto& line) -> auto& { return line.arbiter.ascii_digits; },
+                kLowerCase, "Whether hex digits a-f are taken.");
+    return kKeys;
+}
+
+const Keys<Line>& line_fault_keys() {
+    static const auto kKeys =
+        Keys<Line>().boolean("echo", &Line::simulated_echo, "The adapter hears what it sends.");
+    return kKeys;
+}
+
 const Keys<line::Rs485>& rs485_keys() {
     using line::Rs485;
     using Mode = Rs485::Mode;
@@ -161,45 +175,39 @@ const Keys<line::Rs485>& rs485_keys() {
     return kKeys;
 }
 
-const Keys<arbiter::StationSettings>& timing_keys() {
-    using Settings = arbiter::StationSettings;
+const Keys<Timing>& timing_keys() {
+    const auto is_adaptive = [](const Timing& timing) { return timing.settings.adaptive_timeout; };
     static const auto kKeys =
-        Keys<Settings>()
+        Keys<Timing>()
             .other("response_timeout",
                    "Longest time from the end of a request on the wire to the first byte "
                    "of its reply; adaptive: as the panel has needed it lately.",
-                   [](const Settings& settings) {
-                       return settings.adaptive_timeout
+                   [=](const Timing& timing) {
+                       return is_adaptive(timing)
                                   ? "adaptive"
-                                  : format_duration(settings.response_timeout);
+                                  : format_duration(timing.settings.response_timeout);
                    })
             .initially("500ms")
-            .other("adaptive_floor", "Shortest timeout, of response_timeout: adaptive.",
-                   [](const Settings& settings) {
-                       return settings.adaptive_timeout ? format_duration(settings.timeout_floor)
-                                                        : "";
-                   })
-            .initially("20ms")
+            .duration(
+                "adaptive_floor", [](auto& of) -> auto& { return of.settings.timeout_floor; }, 1ms,
+                10s, "Shortest timeout, of response_timeout: adaptive.")
+            .shown_if(is_adaptive)
             .other("adaptive_ceiling",
                    "Longest timeout, of response_timeout: adaptive; not below adaptive_floor. "
                    "Without it the line's timeout, or 500ms.",
-                   [](const Settings& settings) {
-                       return settings.adaptive_timeout ? format_duration(settings.response_timeout)
-                                                        : "";
-                   })
-            .other("frame_gap",
-                   "Silence between two frames; auto: 3.5 characters (1.75 ms above 19200 "
-                   "baud), or what the profile asks. Shorter than 3.5 characters only on "
-                   "sim, on tcp:// and in ASCII.",
-                   [](const Settings& settings) { return or_auto(settings.frame_gap); })
-            .initially("auto")
-            .other("late_window",
-                   "How long after a timeout a late reply may still come; auto: as has "
-                   "been seen of the station.",
-                   [](const Settings& settings) { return or_auto(settings.late_window); })
-            .initially("auto")
-            .other("think_time", "Think time of a panel that the plan of `check` assumes.")
-            .initially("1ms");
+                   [](const Timing& of) { return format_duration(of.settings.response_timeout); })
+            .shown_if(is_adaptive)
+            .duration_or_auto("frame_gap", &Timing::frame_gap, 0ms, 10s,
+                              "Silence between two frames; auto: 3.5 characters (1.75 ms above "
+                              "19200 baud), or what the profile asks. Shorter than 3.5 characters "
+                              "only on sim, on tcp:// and in ASCII.")
+            .duration_or_auto(
+                "late_window", [](auto& of) -> auto& { return of.settings.late_window; }, 0ms,
+                10min,
+                "How long after a timeout a late reply may still come; auto: as has been seen of "
+                "the station.")
+            .duration("think_time", &Timing::think_time, 0ms, 10s,
+                      "Think time of a panel that the plan of `check` assumes.");
     return kKeys;
 }
 

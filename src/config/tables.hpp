@@ -51,9 +51,12 @@ const Keys<line::Settings>& port_keys();
 const Keys<SerialFormat>& serial_keys();
 const Keys<line::Rs485>& rs485_keys();
 /// Of lines and stations.
-const Keys<arbiter::StationSettings>& timing_keys();
+const Keys<Timing>& timing_keys();
 /// A pause inside frames and a rest, which only lines have.
 const Keys<Line>& line_timing_keys();
+/// The protocol, which a serial master has elsewhere.
+const Keys<Line>& line_serial_keys();
+const Keys<Line>& line_fault_keys();
 const Keys<arbiter::QueueSettings>& queue_keys();
 const Keys<arbiter::OfflineSettings>& offline_keys();
 

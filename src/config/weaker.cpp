@@ -27,6 +27,13 @@ void compare_allow(Lines& all, const std::string& endpoint, const std::vector<Ne
     }
 }
 
+/// Lists what is not in the running list.
+void compare_names(Lines& all, const std::string& what, const std::vector<std::string>& running,
+                   const std::vector<std::string>& next) {
+    for (const std::string& name : next)
+        if (std::ranges::find(running, name) == running.end()) all.push_back(what + ' ' + name);
+}
+
 void compare_access(Lines& all, const std::string& what, bool was_read_only, bool is_read_only) {
     if (was_read_only && !is_read_only) all.push_back(what + ": access read_only -> read_write");
 }
@@ -49,10 +56,7 @@ void compare_rights(Lines& all, const std::string& endpoint, const tcp_server::S
     if (running.broadcast == BroadcastMode::deny && next.broadcast != BroadcastMode::deny)
         all.push_back(endpoint + ": broadcast deny -> " +
                       (next.broadcast == BroadcastMode::reply ? "reply" : "silent"));
-    for (const std::string& line : next.lines) {
-        if (std::ranges::find(running.lines, line) == running.lines.end())
-            all.push_back(endpoint + ": reaches line " + line);
-    }
+    compare_names(all, endpoint + ": reaches line", running.lines, next.lines);
     const bool was_one = running.units.contains(0) && !next.units.contains(0);
     if (was_one && next.broadcast != BroadcastMode::deny)
         all.push_back(endpoint + ": unit 0 is a broadcast to all stations");
@@ -259,17 +263,7 @@ void compare_tokens(Lines& all, const web::Settings& running, const web::Setting
 void compare_hosts(Lines& all, const web::Settings& running, const web::Settings& next) {
     if (running.hosts.empty() && next.hosts.empty()) return;
     if (next.hosts.empty()) all.push_back("http: hosts are all names of this machine");
-    for (const std::string& host : next.hosts) {
-        if (std::ranges::find(running.hosts, host) == running.hosts.end())
-            all.push_back("http: hosts has " + host);
-    }
-}
-
-void compare_cors(Lines& all, const web::Settings& running, const web::Settings& next) {
-    for (const std::string& origin : next.cors) {
-        if (std::ranges::find(running.cors, origin) == running.cors.end())
-            all.push_back("http: cors has " + origin);
-    }
+    compare_names(all, "http: hosts has", running.hosts, next.hosts);
 }
 
 void compare_http(Lines& all, const Config& running, const Config& next) {
@@ -283,7 +277,7 @@ void compare_http(Lines& all, const Config& running, const Config& next) {
     compare_tls(all, endpoint, running.http->tls, next.http->tls);
     compare_allow(all, endpoint, running.http->allow, next.http->allow);
     compare_hosts(all, *running.http, *next.http);
-    compare_cors(all, *running.http, *next.http);
+    compare_names(all, "http: cors has", running.http->cors, next.http->cors);
     const Standing& was = running.http->anonymous;
     const Standing& anonymous = next.http->anonymous;
     if (anonymous.exceeds(was)) all.push_back("http: anonymous " + change_of(was, anonymous));

@@ -54,7 +54,7 @@ std::string text(const tcp::endpoint& peer) {
 }
 
 std::shared_ptr<Shared> share(rt::Clock& clock, Settings settings, UnitMap units,
-                              std::string version) {
+                              std::string version, StrayWrite stray) {
     auto own_answers =
         std::make_shared<OwnAnswers>(clock, settings.own_answers, settings.own_answers_period);
     return std::make_shared<Shared>(Shared{std::move(settings),
@@ -63,7 +63,9 @@ std::shared_ptr<Shared> share(rt::Clock& clock, Settings settings, UnitMap units
                                            clock,
                                            {},
                                            clock.now(),
-                                           std::move(own_answers)});
+                                           std::move(own_answers),
+                                           {},
+                                           std::move(stray)});
 }
 
 }  // namespace
@@ -71,8 +73,9 @@ std::shared_ptr<Shared> share(rt::Clock& clock, Settings settings, UnitMap units
 class Listener::Core : public std::enable_shared_from_this<Core> {
   public:
     Core(const asio::any_io_executor& executor, rt::Clock& clock, Settings settings, UnitMap units,
-         std::string version)
-        : shared_(share(clock, std::move(settings), std::move(units), std::move(version))),
+         std::string version, StrayWrite stray)
+        : shared_(share(clock, std::move(settings), std::move(units), std::move(version),
+                        std::move(stray))),
           allowed_(shared_->settings.allow),
           acceptor_(
               executor, [this](tcp::socket socket) { on_accepted(std::move(socket)); },
@@ -289,9 +292,9 @@ void Listener::Core::close_now() {
 }
 
 Listener::Listener(const asio::any_io_executor& executor, rt::Clock& clock, Settings settings,
-                   UnitMap units, std::string version)
+                   UnitMap units, std::string version, StrayWrite stray)
     : core_(std::make_shared<Core>(executor, clock, std::move(settings), std::move(units),
-                                   std::move(version))) {}
+                                   std::move(version), std::move(stray))) {}
 
 Listener::~Listener() { core_->close_now(); }
 

@@ -205,6 +205,7 @@ void Pipeline::admit() {
 void Pipeline::serve(const modbus::Adu& adu) {
     std::visit(Overloaded{
                    [&](const Refuse& refusal) {
+                       if (refusal.asked.empty()) tell_stray(adu);
                        for (const Target& target : refusal.asked)
                            caller_.count_refused(target.bus, target.station, adu.pdu);
                        answer(adu, [function = adu.pdu[0], code = refusal.code] {
@@ -212,6 +213,7 @@ void Pipeline::serve(const modbus::Adu& adu) {
                        });
                    },
                    [&](const Diagnose&) {
+                       tell_stray(adu);
                        answer(adu, [pdu = adu.pdu, shared = shared_.get(), who = caller_.who()] {
                            return answer_diagnostics(pdu, own_state(*shared, who));
                        });
@@ -221,6 +223,12 @@ void Pipeline::serve(const modbus::Adu& adu) {
                },
                decide(adu.unit, adu.pdu, shared_->settings, shared_->units, caller_.reads_only(),
                       caller_.who()));
+}
+
+/// A write that comes to no bus is told here.
+void Pipeline::tell_stray(const modbus::Adu& adu) const {
+    if (shared_->stray && !modbus::is_pure_read(adu.pdu))
+        shared_->stray(caller_.who(), adu.unit, adu.pdu);
 }
 
 void Pipeline::answer(const modbus::Adu& adu, OwnPdu pdu) {

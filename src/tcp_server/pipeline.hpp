@@ -122,6 +122,7 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
     ReplyQueue::Ticket open(const modbus::Adu& adu);
     void admit();
     void serve(const modbus::Adu& adu);
+    void tell_stray(const modbus::Adu& adu) const;
     void forward(const modbus::Adu& adu, Forward forwarding);
     void broadcast(const modbus::Adu& adu, const Broadcast& broadcasting);
     void refuse(const modbus::Adu& adu, Fault fault);

@@ -58,6 +58,7 @@ struct Shared {
     TimePoint started;
     std::shared_ptr<OwnAnswers> own_answers;        ///< never null
     std::shared_ptr<tls::Handshakes> handshakes{};  ///< null: no TLS
+    StrayWrite stray{};                             ///< may be empty
 
     /// Logs one line for this listener.
     void log(rt::LogLevel level, std::string_view event, std::vector<rt::LogField> more = {}) const;

@@ -85,6 +85,13 @@ void MapReader::looks_like(std::string_view key, std::string_view pattern, bool 
     told.may_be_number = number;
 }
 
+void MapReader::looks_like_one_of(std::string_view key, std::span<const std::string_view> words) {
+    std::string pattern;
+    for (const std::string_view word : words)
+        pattern += (pattern.empty() ? "^(" : "|") + std::string(word);
+    looks_like(key, pattern + ")$");
+}
+
 void MapReader::about(std::string_view key, std::string_view initial, std::string_view text,
                       std::string_view change) {
     if (problems_->description() == nullptr) return;
@@ -95,14 +102,15 @@ void MapReader::about(std::string_view key, std::string_view initial, std::strin
     told.order = ++order_;
 }
 
-bool MapReader::at_most(std::string_view key, std::size_t most, std::string_view what) {
+std::span<const Node> MapReader::entries(std::string_view key, std::string_view example,
+                                         std::size_t most, std::string_view what) {
+    const Node* list = sequence(key, example);
     schema(key).most_entries = most;
-    const Node* list = node_->find(key);
-    const std::size_t count = list == nullptr ? 0 : list->items.size();
-    if (count > most)
-        problem(key, "at most " + std::to_string(most) + ' ' + std::string(what) + ", not " +
-                         std::to_string(count));
-    return count <= most;
+    if (list == nullptr) return {};
+    if (most == kAnyNumber || list->items.size() <= most) return list->items;
+    problem(key, "at most " + std::to_string(most) + ' ' + std::string(what) + ", not " +
+                     std::to_string(list->items.size()));
+    return {};
 }
 
 bool MapReader::lacks(std::string_view key, std::string_view word, std::string_view other) {
@@ -113,7 +121,7 @@ bool MapReader::lacks(std::string_view key, std::string_view word, std::string_v
     return node != nullptr && node->scalar == word && !has(other);
 }
 
-void MapReader::belongs(std::string_view key, std::string_view other,
+bool MapReader::belongs(std::string_view key, std::string_view other,
                         std::span<const std::string_view> words, bool absent) {
     if (Description* description = problems_->description())
         description->add_rule(*node_, {{},
@@ -122,6 +130,10 @@ void MapReader::belongs(std::string_view key, std::string_view other,
                                        {words.begin(), words.end()},
                                        false,
                                        absent});
+    const Node* value = node_->find(other);
+    const bool fits =
+        value == nullptr ? absent : std::ranges::find(words, value->scalar) != words.end();
+    return has(key) && !fits;
 }
 
 std::optional<double> MapReader::share(std::string_view key) {
@@ -255,6 +267,25 @@ void MapReader::finish() {
     for (const std::string& key : excused_) {
         if (told == 0) problems_->add(node_->mark, needs(key));  // the similar key was a known one
     }
+}
+
+std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
+                         std::string_view noun) {
+    const std::string near = nearest(typed, known);
+    if (!near.empty()) return "; did you mean '" + near + "'?";
+    if (known.empty()) return "; there are none";
+    std::string list;
+    constexpr std::size_t kMost = 30;
+    for (const std::string_view word : known.first(std::min(kMost, known.size())))
+        list += (list.empty() ? "" : ", ") + std::string(word);
+    if (known.size() > kMost) list += " and " + std::to_string(known.size() - kMost) + " more";
+    return "; known " + std::string(noun) + " are " + list;
+}
+
+std::string no_such(std::string_view what, std::string_view typed,
+                    std::span<const std::string_view> known) {
+    return "there is no " + std::string(what) + ' ' + quote(typed) +
+           did_you_mean(typed, known, std::string(what) + 's');
 }
 
 }  // namespace panelgate::yaml

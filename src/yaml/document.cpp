@@ -416,7 +416,7 @@ constexpr std::string_view kDirective = "a directive (%...) has no meaning here;
 constexpr std::string_view kHex =
     "what follows this backslash is no character; write \\xNN or \\uNNNN, or \\\\ for a backslash";
 
-constexpr std::array<Words, 30> kLibraryMessages{{
+constexpr std::array<Words, 28> kLibraryMessages{{
     {"end of map flow", kBracket},
     {"end of sequence flow", kBracket},
     {"illegal flow end", kBracket},
@@ -429,10 +429,8 @@ constexpr std::array<Words, 30> kLibraryMessages{{
      "value"},
     {"illegal tab", "a tab in the indentation; type blanks in its place"},
     {"unknown token", "this character cannot begin a text; put the text in quotes"},
-    {"the referenced anchor", "'*' repeats a name that no '&' gives; put a text in quotes"},
-    {"illegal EOF", "the file ends inside a text in quotes; close the quote"},
-    {"illegal document indicator",
-     "'---' or '...' inside a text in quotes; close the quote before it"},
+    {"the referenced anchor",
+     "'*' repeats a name that no '&' before it gives; put a text that begins with '*' in quotes"},
     {"unknown escape", "this backslash means nothing in double quotes; write \\\\ for a backslash"},
     {"bad character found while scanning hex", kHex},
     {"invalid unicode", kHex},

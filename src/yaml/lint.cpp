@@ -39,7 +39,6 @@ enum class On : std::uint8_t {
     begin,     ///< the same, of the first token of a line
     alone,     ///< the same, where the line has no ': '
     two_keys,  ///< the same, from a key on whose value is an item, or has a ': '
-    alias,     ///< an alias that no anchor before it gives
 };
 
 /// A mistake that is seen in the letters of one line.
@@ -97,9 +96,6 @@ constexpr auto kSlips = std::to_array<Slip>({
     {On::two_keys, Kind::plain, "", R"(\S+?: +(?!\()(.* ([A-Za-z][\w-]*):(?: .*)?))", 1,
      "two keys on one line; begin a new line for '$2'; one text that holds ': ' must be in quotes: "
      "\"$1\""},
-    {On::two_keys, Kind::plain, "", R"(\S+?: +(?!\()(.*))", 1,
-     "a text that holds ': ' must be in quotes; write \"$1\", or begin a new line for a second "
-     "key"},
     {On::alone, Kind::plain, "\xEF", "([A-Za-z][\\w-]*)(\xEF\xBC\x9A)\\s*(.*)", 2,
      "U+FF1A is no colon; write '$1: $3'"},
     {On::alone, Kind::plain, "", R"(([A-Za-z][\w-]*|<<):(?!//)(.+))", 2,
@@ -114,10 +110,6 @@ constexpr auto kSlips = std::to_array<Slip>({
      "a text that begins with '*' must be in quotes; write \"*\""},
     {On::line, Kind::alias, "", R"((\*\S+) +\{([^}]*).*)", 0,
      "no key may be beside or below '$1'; write {<<: $1, $2}"},
-    {On::alias, Kind::alias, "", R"(\*(.+))", 0,
-     "'*$1' repeats what '&$1' names, and there is no such name before it; a text that begins with "
-     "'*' must be in quotes"},
-    {On::token, Kind::odd, "", R"(,)", 0, "a ',' separates nothing here; remove it"},
     {On::token, Kind::odd, "", R"((([%@`]).*))", 0,
      "a text that begins with '$2' must be in quotes; write \"$1\""},
     {On::any, Kind::odd, "{", R"(\{\{ *([A-Za-z]\w*)?.*)", 0,
@@ -129,12 +121,10 @@ constexpr auto kSlips = std::to_array<Slip>({
     {On::token, Kind::quoted, "\\",
      R"("(?:[^\\]|\\[0abtnvfre "/\\N_LPxuU])*(\\[^0abtnvfre "/\\N_LPxuU]).*)", 1,
      "'$1' means nothing in double quotes; write \\\\ for a backslash, or use single quotes"},
-    {On::line, Kind::quoted, "'", R"('(?:[^']|'')*'(?!') *([^ ,:}\]][^,}\]]*).*)", 1,
-     "\"$1\" is after the closing quote; remove it, or put all of the text in quotes (a ' inside "
-     "single quotes is written '')"},
-    {On::line, Kind::quoted, "\"", R"("(?:[^"\\]|\\.)*" *([^ ,:}\]][^,}\]]*).*)", 1,
-     "'$1' is after the closing quote; remove it, or put all of the text in quotes (a \" inside "
-     "double quotes is written \\\")"},
+    {On::line, Kind::quoted, "",
+     R"re((?:'(?:[^']|'')*'(?!')|"(?:[^"\\]|\\.)*") *([^ ,:}\]][^,}\]]*).*)re", 1,
+     "after the closing quote stands $1; remove it, or put all of the text in quotes of the other "
+     "kind"},
 });
 
 using Match = std::match_results<std::string_view::const_iterator>;
@@ -180,7 +170,7 @@ std::optional<Finding> tried(const Scanned& text, std::size_t token, std::size_t
     }();
     constexpr std::size_t kLongest = 200;
     const Slip& slip = kSlips[row];
-    const bool is_token = slip.on == On::any || slip.on == On::token || slip.on == On::alias;
+    const bool is_token = slip.on == On::any || slip.on == On::token;
     const std::string_view word = text.text(token);
     if (!slip.holds.empty() && word.find_first_of(slip.holds) == word.npos) return std::nullopt;
     const std::string_view on = is_token ? word : text.rest(token);
@@ -214,16 +204,13 @@ bool has_two_keys(const Scanned& text, std::size_t key) {
 /// Looks for all rows but those of lines without a colon.
 void find_slips(const Scanned& text, bool refused, Findings& findings) {
     constexpr std::size_t kTyped = 100;  // tokens of a line; longer ones are made by programs
-    std::set<std::string_view> anchors;
     std::size_t on_line = 0;
     for (std::size_t i = 0; i < text.tokens.size(); ++i) {
         const Token& token = text.tokens[i];
         on_line = token.first ? 0 : on_line + 1;
         const std::string_view word = text.text(i);
-        if (token.kind == Kind::anchor) anchors.insert(word.substr(1));
         const bool is_open_quote = token.kind == Kind::quoted && token.state == State::unclosed;
         if (word.empty() || is_open_quote) continue;
-        const bool is_known = token.kind == Kind::alias && anchors.contains(word.substr(1));
         const bool behind_quote =
             text.follows(i) && i > 0 && text.tokens[i - 1].kind == Kind::quoted;
         const bool tries_all = refused && on_line < kTyped;
@@ -232,7 +219,7 @@ void find_slips(const Scanned& text, bool refused, Findings& findings) {
             if (on == On::any) return !behind_quote;
             if (on == On::begin) return tries_all && token.first;
             if (on == On::two_keys) return twice;
-            return tries_all && on != On::alone && (on != On::alias || !is_known);
+            return tries_all && on != On::alone;
         };
         for (const std::size_t row : rows_of(token.kind)) {
             if (!may_be_on(kSlips[row].on)) continue;

@@ -68,7 +68,8 @@ struct Reader {
         }
         bool begins = true;
         for (const std::size_t dash : row.dashes) {
-            if (!enter({dash, true, number, number, row.name}, begins)) return false;
+            const std::string_view first = row.key ? row.name : " ";  // one text is like another
+            if (!enter({dash, true, number, number, first}, begins)) return false;
             begins = false;
         }
         if (!row.word) return true;
@@ -402,25 +403,13 @@ class Columns {
         const Edit& edit = cause.edit;
         const bool left = edit.by > 0;
         const auto near = neighbour(cause, false);
-        const auto& levels = cause.before.levels;
         const bool list = near && !rows_[edit.row].dashes.empty();
-        const bool below_value = !left && !list && near && !levels.empty() &&
-                                 levels.back().first == *near && !levels.back().list;
-        const std::size_t by = near ? (below_value ? levels.back().last : *near) : 0;
-        const bool wide = left && near && !list && !rows_[*near].dashes.empty() &&
-                          rows_[*near].column > rows_[*near].dashes.back() + 2;
-        const std::string like = !near ? " of the column of its neighbours"
-                                       : (below_value ? ""
-                                          : list      ? " of the '-'"
-                                                      : " of ") +
-                                             (list ? "" : word(by)) + on_line(by);
+        const std::string like = !near  ? " of the column of its neighbours"
+                                 : list ? " of the '-'" + on_line(*near)
+                                        : " of " + word(*near) + on_line(*near);
         tell(rows_[edit.row].token, "indentation: " + name(edit.row) + " is " + blanks(edit.by) +
-                                        (left          ? " left"
-                                         : below_value ? " deeper than "
-                                                       : " right") +
-                                        like + (below_value ? ", which has a value already" : "") +
-                                        (left ? "; add " : "; take away ") + blanks(edit.by) +
-                                        (wide ? ", or take it away behind the '-' there" : ""));
+                                        (left ? " left" : " right") + like +
+                                        (left ? "; add " : "; take away ") + blanks(edit.by));
     }
 
     const Scanned& text_;

@@ -1,7 +1,7 @@
 #include <cstdlib>
 
 #include "panelgate/config/config.hpp"
-#include "panelgate/config/mbusd_conf.hpp"
+#include "panelgate/mbusd/conf.hpp"
 
 using namespace panelgate;
 
@@ -20,7 +20,7 @@ struct NoFiles final : config::Files {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     yaml::Problems problems("mbusd.conf");
     const std::string_view text(reinterpret_cast<const char*>(data), size);
-    const auto imported = config::import_mbusd(text, problems);
+    const auto imported = mbusd::import_conf(text, problems);
     if (imported.has_value() != problems.empty()) std::abort();
     if (!imported) return 0;
     yaml::Problems own("made.yaml");

@@ -332,6 +332,33 @@ class Explain(unittest.TestCase):
                 done = harness.run("check", "-c", file, "--explain", question)
                 self.assertEqual(done.returncode, 64, (question, done.stdout, done.stderr))
 
+    def test_a_broadcast_through_a_listener_goes_to_all_its_lines(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            token = pathlib.Path(folder) / "old"
+            token.write_text("j" * 40)
+            token.chmod(0o600)
+            file.write_text("""
+lines:
+  - {name: l1, device: sim, stations: [{id: 1, name: aaa}]}
+  - {name: l2, device: sim, stations: [{id: 2, name: bbb}]}
+modbus_tcp:
+  - {listen: "127.0.0.1:18098"}
+  - {listen: "127.0.0.1:18099", lines: [l2]}
+http: {listen: "127.0.0.1:0", anonymous: none, tokens: [{name: va, role: viewer, file: %s}]}
+access:
+  rules:
+    - {name: not-one, deny: [broadcast], faces: [modbus_tcp], stations: [aaa]}
+""" % token)
+            for question, code, text in (
+                    ("listener=127.0.0.1:18098 broadcast bbb/400001", 1, "rule 'not-one'"),
+                    ("listener=127.0.0.1:18099 broadcast bbb/400001", 0, "allowed"),
+                    ("face=modbus_tcp broadcast bbb/400001", 0, "allowed"),
+                    ("token=va role=admin read bbb/400001", 64, ""), ("token=va role=viewer read bbb/400001", 0, "")):
+                done = harness.run("check", "-c", file, "--explain", question)
+                self.assertEqual(done.returncode, code, (question, done.stdout, done.stderr))
+                self.assertIn(text, done.stdout, question)
+
     def test_check_names_rules_that_can_never_match_and_what_has_ended(self):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "panelgate.yaml"

@@ -386,6 +386,20 @@ class Refusing(Case):
         self.assertEqual((of_meter[-1]["count"], of_meter[-1]["at"], of_meter[-1]["rule"]), (100, of_meter[7]["at"], "access"))
         self.assertEqual([one["count"] for one in kept if one.get("at") == "other places"], [136])
 
+    def test_a_write_that_leads_to_no_station_is_recorded_once(self):
+        self.write_config()
+        self.folder.mkdir()
+        with self.gateway() as program, program.client() as client:
+            for unit, code in ((250, 0x0A), (255, 0x01)):
+                for _ in range(3):
+                    self.assertEqual(client.ask(unit, write_register(4, 5)), bytes([0x86, code]))
+                client.ask(unit, read_registers(1))
+        stray = [(one["kind"], one["unit"], one["function"], one.get("pdu"), one.get("count"), one["outcome"])
+                 for one in records(self.folder) if "unit" in one]
+        self.assertEqual(sorted(stray, key=str), sorted(
+            (row for unit in (250, 255) for row in (("refusal", unit, 6, "0600040005", None, "refused"),
+                                                   ("repeats", unit, 6, None, 2, "refused"))), key=str))
+
     def test_reload_tells_who_changed_what_and_goes_on_in_another_file(self):
         self.write_config(anonymous="admin")
         self.folder.mkdir()
@@ -403,6 +417,42 @@ class Refusing(Case):
         self.assertEqual(harness.run("audit", "verify", str(other)).returncode, 0)
         shown = harness.run("audit", "show", "-c", str(self.file), "--kind", "end")
         self.assertEqual(shown.returncode, 0, shown.stderr)
+
+    def test_show_finds_what_was_done_to_a_station_however_it_is_named(self):
+        self.write_config()
+        self.folder.mkdir()
+        with self.gateway() as program, program.client() as client:
+            for unit in (STATION, 77, 8):
+                client.ask(unit, write_register(1, 2))
+            client.ask(0, write_register(2, 3))
+
+        def shown(*more, files=("-c", str(self.file))):
+            done = harness.run("audit", "show", *files, "--json", *more)
+            return done.returncode, [json.loads(one)["id"] for one in done.stdout.splitlines()], done.stderr
+
+        for typed in ("press", "7", "floor1/7", "floor1:7"):
+            self.assertEqual(shown("--station", typed)[:2], (0, [7, 0]), typed)
+        self.assertEqual(shown("--station", "floor1/77")[:2], (0, [77, 0]))
+        self.assertEqual(shown("--station", "floor1/77", files=(str(self.folder / "audit.jsonl"),))[:2], (0, [77, 0]))
+        code, ids, said = shown("--station", "pres")
+        self.assertEqual((code, ids), (1, []))
+        self.assertIn("did you mean 'press'?", said)
+        code, _, said = shown("--kind", "wirte")
+        self.assertEqual(code, 64)
+        self.assertIn("did you mean 'write'?", said)
+
+    def test_each_unknown_token_is_told_beside_other_refusals(self):
+        self.write_config(anonymous="none")
+        self.folder.mkdir()
+        with self.gateway() as program:
+            for i in range(80):
+                program.get(f"/api/v1/stations/press/holding-registers/{i}")
+            link = http.client.HTTPConnection("127.0.0.1", program.http_port(), timeout=5)
+            link.request("GET", "/api/v1/lines", headers={"Authorization": "Bearer guessed"})
+            self.assertEqual(link.getresponse().status, 401)
+            link.close()
+        kinds = [one["kind"] for one in records(self.folder)]
+        self.assertEqual((kinds.count("refusal"), kinds.count("login")), (64, 1))
 
     def test_commands_say_what_is_wrong(self):
         missing = str(self.folder / "none")

@@ -78,6 +78,7 @@ class CommandLine(unittest.TestCase):
             self.assertIn("there is no setting", self.expect(USAGE, "config", "get", path, "-c", example).stderr)
         self.assertIn("did you mean 'lines.floor1.retries'",
                       self.expect(USAGE, "config", "get", "lines.floor1.retires", "-c", example).stderr)
+        self.assertIn("config does not take 'gte'; did you mean 'get'?", self.expect(USAGE, "config", "gte").stderr)
         self.assertIn("is changed in the file, with an editor",
                       self.expect(USAGE, "config", "set", "lines.floor1.retries", "3", "--dry-run").stderr)
 

@@ -1,6 +1,7 @@
 """The HTTP server's doors: who gets in, under which name, from where, and how many."""
 import contextlib
 import json
+import pathlib
 import socket
 import struct
 import tempfile
@@ -43,6 +44,9 @@ class Connection:
         if data:
             lines.append(f"Content-Length: {len(data)}")
         self.socket.sendall("\r\n".join([*lines, "", ""]).encode("latin-1") + data)
+
+    def wait_for_end(self):
+        self._file.read()
 
     def end_input(self):
         self.socket.shutdown(socket.SHUT_WR)
@@ -286,6 +290,18 @@ class OtherSites(Doors):
                 answer = self.ask(method, PRESS + "UW0", f"Origin: {site}")
                 self.assertIsNone(self.shared(answer), site)
             self.assertEqual(self.status("GET", PRESS + "UW0", f"Origin: {site}"), 403, site)
+
+    def test_its_stream_ends_where_a_reload_takes_it_out(self):
+        with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            file.write_text(self.CONFIG)
+            program = stack.enter_context(harness.Program("run", "-c", str(file)))
+            stream = stack.enter_context(Connection(program.http_port()))
+            stream.send("GET", "/api/v1/events?types=transaction", f"Origin: {self.SITE}")
+            self.assertEqual(stream.receive().status, 200)
+            file.write_text(self.CONFIG.replace('"https://SCADA.plant.example:443", ', ""))
+            self.assertEqual(program.rest("POST", "/api/v1/reload", {})[0], 200)
+            stream.wait_for_end()
 
     def test_without_an_origin_nothing_is_added(self):
         self.assertIsNone(self.shared(self.ask("GET", "/api/v1/lines")))

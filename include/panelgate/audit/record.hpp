@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
@@ -27,6 +28,7 @@ enum class Kind : std::uint8_t {
 };
 /// Returns "start", "end", "write", ...: stable identifiers.
 std::string_view label(Kind kind);
+std::vector<std::string> kind_labels();
 
 /// Appends `text` as a JSON string. Bytes that are no UTF-8 become U+FFFD.
 void append_json(std::string& out, std::string_view text);
@@ -43,6 +45,8 @@ class Composer {
     Composer& begin(WallTime time, Kind kind);
     /// An empty text is left out.
     Composer& text(std::string_view key, std::string_view value);
+    /// A text of ours, in which nothing needs to be escaped: an identifier.
+    Composer& word(std::string_view key, std::string_view value);
     Composer& number(std::string_view key, std::uint64_t value);
     Composer& flag(std::string_view key, bool value);
     Composer& time(std::string_view key, WallTime value);

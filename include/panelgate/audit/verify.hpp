@@ -30,6 +30,7 @@ struct Anchors {
     bool is_read = false;  ///< a log was read, whatever it says
     /// Records that it names, by their chain: number and hash, or its beginning.
     std::map<std::string, std::map<std::uint64_t, std::string>, std::less<>> chains{};
+    std::map<std::string, std::string, std::less<>> files{};  ///< of chains, where it is said
     std::uint64_t lost = 0;  ///< records that could not be written when a run ended
 };
 /// Adds what a line of the log says, of format text or json, whatever a collector has put before
@@ -54,9 +55,10 @@ class Verifier {
   public:
     static constexpr std::size_t kRemarks = 1000;
 
-    /// `all`: these are all files of the audit, so that what is missing before them was removed.
-    explicit Verifier(Anchors anchors = {}, bool all = false)
-        : anchors_(std::move(anchors)), all_(all) {}
+    /// `all_of`: these are all files of the audit that is written to this one, so that what is
+    /// missing before them was removed; empty: they may be some.
+    explicit Verifier(Anchors anchors = {}, std::string all_of = {})
+        : anchors_(std::move(anchors)), all_of_(std::move(all_of)) {}
 
     /// A file begins; lines that follow are its.
     void begin_file(std::string name);
@@ -94,9 +96,10 @@ class Verifier {
     void check_end();
     void check_anchors();
     void tell_of_log();
+    void check_other_chain(const std::string& chain, std::uint64_t last);
 
     Anchors anchors_;
-    bool all_;
+    std::string all_of_;
     bool has_chain_ = false;       ///< report_.chain is known
     std::uint64_t kept_from_ = 0;  ///< the first record that was not dropped by rotation
     Sha256 digest_;

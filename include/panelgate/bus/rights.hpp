@@ -102,8 +102,8 @@ struct Admission {
     std::string_view rule{};  ///< what keeps him out: "token", "allow", "access"; empty: his role
     std::string_view why{};   ///< a clause for the user
 };
-/// Nothing: he may what he could when he came in.
-using Admit = std::function<std::optional<Admission>(const WhoRef&)>;
+/// What somebody may do at a station, 0 all of them. Nothing: what he could when he came in.
+using Admit = std::function<std::optional<Admission>(const WhoRef&, std::uint8_t station)>;
 
 /// Returns why the door would not let this request in any more, if so.
 std::optional<Refusal> refusal_at_door(const Admission& now, access::Acts acts,

@@ -11,11 +11,13 @@ namespace panelgate::cli {
 
 /// Which records are shown; empty texts: all.
 struct AuditFilter {
-    std::string station;
-    std::string kind;
-    std::string client;  ///< part of its name, address, token or user
-    std::string since;   ///< RFC 3339, as in records; from
-    std::string until;   ///< ... and before
+    std::string station{};  ///< its name; empty: it has none, or none is asked for
+    std::string line{};     ///< of that station; its broadcasts are the station's, too
+    std::string id{};       ///< of that station, where its line is known
+    std::string kind{};
+    std::string client{};  ///< part of its name, address, token or user
+    std::string since{};   ///< RFC 3339, as in records; from
+    std::string until{};   ///< ... and before
 };
 bool is_shown(const boost::json::object& record, const AuditFilter& filter);
 

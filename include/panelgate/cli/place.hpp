@@ -41,6 +41,12 @@ struct Named {
 };
 /// `typed`: a name, an id that only one line has, or LINE/ID, listed or not.
 Named find_station(std::span<const Station> all, const std::string& typed);
+/// The same as a station; of one that is not listed `name` is empty.
+struct FoundStation {
+    Station station;
+    std::string wrong;
+};
+FoundStation station_of(std::span<const Station> all, const std::string& typed);
 
 enum class PlaceKind : std::uint8_t { point, table, device };
 struct Target {

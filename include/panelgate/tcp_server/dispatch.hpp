@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -99,6 +100,11 @@ class Caller {
     bool by_certificate_ = false;  ///< its role is its certificate's
     std::set<bus::RequestPort*> used_;
 };
+
+/// Hears of a client's write that comes to no line, whose bus would tell of it: to a unit that
+/// leads nowhere or to the gateway's own registers, where nothing is writable, or malformed beyond
+/// that.
+using StrayWrite = std::function<void(const WhoRef& who, std::uint8_t unit, ByteView pdu)>;
 
 /// What to do with a request.
 struct Refuse {

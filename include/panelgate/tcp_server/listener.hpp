@@ -25,10 +25,10 @@ namespace panelgate::tcp_server {
 /// after its end are dropped.
 class Listener {
   public:
-    /// `version` is the program's, for the device identification. Throws std::invalid_argument for
-    /// an unreadable allow list.
+    /// `version` is the program's, for the device identification. `stray` may be empty. Throws
+    /// std::invalid_argument for an unreadable allow list.
     Listener(const boost::asio::any_io_executor& executor, rt::Clock& clock, Settings settings,
-             UnitMap units, std::string version);
+             UnitMap units, std::string version, StrayWrite stray = {});
     ~Listener();  ///< as close_now()
     Listener(const Listener&) = delete;
     Listener& operator=(const Listener&) = delete;

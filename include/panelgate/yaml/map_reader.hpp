@@ -39,6 +39,10 @@ class MapReader {
     MapReader(const MapReader&) = delete;
     MapReader& operator=(const MapReader&) = delete;
 
+    static constexpr std::size_t kAnyNumber = 0;
+    /// Returns more about a wrong value, for the end of the message.
+    using Hint = std::function<std::string(std::string_view typed)>;
+
     bool has(std::string_view key);
     /// True if finish() will report a key that is probably this one, or belongs below it, which
     /// says more than that this key is missing.
@@ -64,15 +68,14 @@ class MapReader {
     /// nearest).
     template <class T>
     std::optional<T> choice(std::string_view key,
-                            std::span<const std::pair<std::string_view, T>> words) {
+                            std::span<const std::pair<std::string_view, T>> words,
+                            const Hint& hint = {}) {
         std::vector<std::string_view> names;
         for (const auto& [name, value] : words) names.push_back(name);
-        const std::optional<std::size_t> i = choice_index(key, names);
+        const std::optional<std::size_t> i = choice_index(key, names, hint);
         if (!i) return std::nullopt;
         return words[*i].second;
     }
-    /// Returns more about a wrong value, for the end of the message.
-    using Hint = std::function<std::string(std::string_view typed)>;
     std::optional<std::size_t> choice_index(std::string_view key,
                                             std::span<const std::string_view> words,
                                             const Hint& hint = {});
@@ -85,6 +88,9 @@ class MapReader {
     /// Like child(), but another kind is a problem, shown with an example such as "{mode: off}".
     const Node* map(std::string_view key, std::string_view example = {});
     const Node* sequence(std::string_view key, std::string_view example = {});
+    /// The entries of a list, at most so many: "at most 64 relays, not 65". None if it is absent.
+    std::span<const Node> entries(std::string_view key, std::string_view example,
+                                  std::size_t most = kAnyNumber, std::string_view what = {});
     /// The scalars of a list that has one at least, as an empty one could mean all or none; `any`
     /// says what leaving it out means.
     std::vector<const Node*> items(std::string_view key, std::string_view example,
@@ -99,18 +105,19 @@ class MapReader {
     /// The text, or those in a list or map, must match this regular expression (ECMA 262);
     /// `number`: it may look like a number to YAML.
     void looks_like(std::string_view key, std::string_view pattern, bool number = false);
+    /// The same for one of these words.
+    void looks_like_one_of(std::string_view key, std::span<const std::string_view> words);
     /// What the key is for, what leaving it out means in the file's notation, and what a change of
     /// it needs. The keys of a map are in the order of these calls.
     void about(std::string_view key, std::string_view initial, std::string_view text,
                std::string_view change);
     /// What a Description records of a key, to be modified at once.
     KeyShape& schema(std::string_view key);
-    /// Reports a list with more entries, "at most 64 relays, not 65", and returns false.
-    bool at_most(std::string_view key, std::size_t most, std::string_view what);
     /// True if `key` has this word and `other`, which it then needs, is absent.
     bool lacks(std::string_view key, std::string_view word, std::string_view other);
-    /// `key` is allowed only if `other` has one of these words, or, with `absent`, is missing.
-    void belongs(std::string_view key, std::string_view other,
+    /// `key` is allowed only if `other` has one of these words, or, with `absent`, is missing. True
+    /// if it is there all the same.
+    bool belongs(std::string_view key, std::string_view other,
                  std::span<const std::string_view> words, bool absent = false);
 
     /// Adds keys that belong in another map, which finish() then names. Must outlive this.
@@ -164,6 +171,13 @@ class MapReader {
     std::vector<std::span<const Elsewhere>> elsewhere_;
     int order_ = 0;  ///< of about()
 };
+
+/// Returns "; did you mean 'x'?" if one of `known` is near, else "; known NOUN are a, b, c".
+std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
+                         std::string_view noun);
+/// Returns "there is no WHAT 'typed'", with the same behind it.
+std::string no_such(std::string_view what, std::string_view typed,
+                    std::span<const std::string_view> known);
 
 /// Parse the text forms above for scalars that are not map values; nothing for other text. Units:
 /// us, ms, s, min.

@@ -9,8 +9,11 @@ namespace panelgate::web {
 std::string listed_origin(const HttpRequest& request, const std::vector<std::string>& origins) {
     const auto found = request.headers.find("origin");
     if (found == request.headers.end()) return {};
-    const bool listed = std::ranges::find(origins, to_lower(found->second)) != origins.end();
-    return listed ? found->second : std::string();
+    return is_listed(found->second, origins) ? found->second : std::string();
+}
+
+bool is_listed(const std::string& origin, const std::vector<std::string>& origins) {
+    return std::ranges::find(origins, to_lower(origin)) != origins.end();
 }
 
 bool is_reading(const HttpRequest& request) {

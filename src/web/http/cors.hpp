@@ -13,6 +13,7 @@ namespace panelgate::web {
 /// The origin of the page that asks, as its browser wrote it, if `origins` (lower case) lists it;
 /// else "".
 std::string listed_origin(const HttpRequest& request, const std::vector<std::string>& origins);
+bool is_listed(const std::string& origin, const std::vector<std::string>& origins);
 /// True for what such a page may do: read, and ask beforehand whether it may.
 bool is_reading(const HttpRequest& request);
 

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "cors.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tls/handshakes.hpp"
 #include "panelgate/tls/roles.hpp"
@@ -71,9 +72,12 @@ void HttpListener::apply(std::shared_ptr<const Site> site) {
     for (const auto& [id, session] : sessions) {
         if (!allowed_.allows(session->peer())) {
             session->stop(shared_->site->settings.request_timeout);
-        } else if (!has_same_right(session->caller(), before->settings, shared_->site->settings)) {
-            session->end_events();
+            continue;
         }
+        const Settings& now = shared_->site->settings;
+        const bool may_read = session->reader().empty() || is_listed(session->reader(), now.cors);
+        if (!may_read || !has_same_right(session->caller(), before->settings, now))
+            session->end_events();
     }
     if (handshakes_) apply_roles(before->settings);
     if (others) review();

@@ -242,11 +242,11 @@ asio::awaitable<HttpResponse> HttpSession::answer(BeastRequest message) {
     HttpRequest request =
         to_request(std::move(message), std::move(*target), host ? *host : std::string());
     request.caller = caller_;
-    const std::string reader = listed_origin(request, shared_->site->settings.cors);
+    reader_ = listed_origin(request, shared_->site->settings.cors);
     const bool preflight = request.method == "OPTIONS";
     asio::awaitable<HttpResponse> handling = handle(std::move(request), std::move(barred));
     HttpResponse response = co_await std::move(handling);
-    if (!reader.empty()) share_with(reader, preflight, response);
+    if (!reader_.empty()) share_with(reader_, preflight, response);
     co_return response;
 }
 

@@ -74,6 +74,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     /// has at most `reading` to take a reply.
     void stop(Duration reading);
     const Caller& caller() const { return *caller_; }
+    /// The origin of the other site's page that asked last; empty: it was none that is listed.
+    const std::string& reader() const { return reader_; }
     const tls::Stream& stream() const { return stream_; }
     /// Takes over what its certificate says, by the listener's present settings.
     void take_certificate();
@@ -116,6 +118,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     std::shared_ptr<Caller> caller_;
     boost::asio::ip::address local_;  ///< local address
     std::function<bool()> take_place_;
+    std::string reader_;
     bool probes_only_ = false;
     boost::beast::flat_buffer buffer_;
     std::optional<Parser> parser_;

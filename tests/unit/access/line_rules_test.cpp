@@ -228,6 +228,9 @@ TEST(LineRules, ConditionsOnWhoAsks) {
     Rule lead = empty;
     lead.roles = {"line-lead"};
     EXPECT_TRUE(is_about(lead, {.standing = Role::viewer, .certificate_role = "line-lead"}));
+    EXPECT_FALSE(
+        is_about(lead, {.token = "ops", .standing = Role::viewer, .certificate_role = "line-lead"}))
+        << "a token counts more";
     Rule near = empty;
     near.from = {{"::", 0}};
     EXPECT_FALSE(is_about(near, {.face = Face::mqtt})) << "it has no address";

@@ -50,8 +50,8 @@ inline bool speaks_of(const Rule& rule, const Who& who, const Place& place) {
     bool near = rule.from.empty();
     for (const Network& network : rule.from) near = near || in_network(who.address, network);
     const std::string role(label(who.standing.role));
-    const bool role_fits =
-        rule.roles.empty() || lists(rule.roles, role) || lists(rule.roles, who.certificate_role);
+    const bool role_fits = rule.roles.empty() || lists(rule.roles, role) ||
+                           (who.token.empty() && lists(rule.roles, who.certificate_role));
     const Face face = who.face == Face::udp ? Face::modbus_tcp : who.face;
     return near && role_fits && (rule.tokens.empty() || lists(rule.tokens, who.token)) &&
            (rule.faces.empty() || lists(rule.faces, face)) &&

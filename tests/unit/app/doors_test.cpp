@@ -16,6 +16,13 @@ config::Config plant() {
     config.http->anonymous = Role::viewer;
     config.http->tokens = {{.name = "ops", .standing = Role::operator_, .hash = "one"}};
     config.modbus_tcp.emplace_back();
+    config::Line floor1;
+    floor1.name = "floor1";
+    floor1.stations.resize(1);
+    floor1.stations[0].id = 7;
+    config.lines = {floor1};
+    config.lines.push_back(floor1);
+    config.lines.back().name = "floor2";
     return config;
 }
 
@@ -32,7 +39,7 @@ class DoorsTest : public testing::Test {
         config::Config now = before;
         change(now);
         doors.change(std::make_shared<const config::Config>(now));
-        const auto met = doors.admit(who, at);
+        const auto met = doors.admit(who, "floor1", station, at);
         doors.settle();
         doors.open(std::make_shared<const config::Config>(before));
         if (!met) return "";
@@ -42,6 +49,7 @@ class DoorsTest : public testing::Test {
     }
 
     config::Config before = plant();
+    std::uint8_t station = 7;  ///< that is asked, on floor1
     Doors doors;
     WallTime at{};
 };
@@ -68,9 +76,9 @@ TEST_F(DoorsTest, ANewTextIsNewOnlyToThoseWhoHaveShownTheOldOne) {
     config::Config now = before;
     now.http->tokens[0].hash = "two";
     doors.change(std::make_shared<const config::Config>(now));
-    EXPECT_TRUE(doors.admit(with_token(), at).has_value());
+    EXPECT_TRUE(doors.admit(with_token(), "floor1", 7, at).has_value());
     doors.settle();
-    EXPECT_FALSE(doors.admit(with_token(), at).has_value());
+    EXPECT_FALSE(doors.admit(with_token(), "floor1", 7, at).has_value());
 }
 
 TEST_F(DoorsTest, ClientsWithoutATokenAreWhatAnonymousIsNow) {
@@ -109,12 +117,30 @@ TEST_F(DoorsTest, AModbusClientMeetsItsListenersNewDoor) {
     EXPECT_EQ(change([](auto& one) { one.broadcast = BroadcastMode::deny; }), "access rw");
     EXPECT_EQ(change([](auto& one) { one.allow = {{"10.0.1.0", 24}}; }), "allow");
     EXPECT_EQ(change([](auto& one) { one.allow = {{"10.0.0.0", 24}}; }), "");
+    EXPECT_EQ(change([](auto& one) { one.lines = {"floor1"}; }), "");
+    EXPECT_EQ(change([](auto& one) { one.lines = {"floor2"}; }), "access");
+}
+
+TEST_F(DoorsTest, WhereAListenerLeadsIsWhereItsUnitsGo) {
+    tcp_server::Settings listener;
+    listener.lines = {"floor1"};
+    EXPECT_TRUE(leads_to(destinations_of(listener, before), "floor1", 0));
+    EXPECT_TRUE(leads_to(destinations_of(listener, before), "floor1", 77)) << "a line of its own";
+    EXPECT_FALSE(leads_to(destinations_of(listener, before), "floor2", 7));
+    before.lines[0].refuse_unlisted = true;
+    EXPECT_TRUE(leads_to(destinations_of(listener, before), "floor1", 7));
+    EXPECT_FALSE(leads_to(destinations_of(listener, before), "floor1", 77));
+    listener.units[50] = {"floor2", 9};
+    EXPECT_TRUE(leads_to(destinations_of(listener, before), "floor2", 9));
+    EXPECT_FALSE(leads_to(destinations_of(listener, before), "floor2", 0)) << "an alias is no line";
+    listener.lines.clear();
+    EXPECT_FALSE(leads_to(destinations_of(listener, before), "floor2", 8)) << "which of two lines?";
 }
 
 TEST_F(DoorsTest, TheGatewayItselfAndNobodyAreNotAsked) {
-    EXPECT_FALSE(doors.admit(own_task("poll"), at).has_value());
-    EXPECT_FALSE(doors.admit(nullptr, at).has_value());
-    EXPECT_FALSE(Doors().admit(with_token(), at).has_value());
+    EXPECT_FALSE(doors.admit(own_task("poll"), "floor1", 7, at).has_value());
+    EXPECT_FALSE(doors.admit(nullptr, "floor1", 7, at).has_value());
+    EXPECT_FALSE(Doors().admit(with_token(), "floor1", 7, at).has_value());
 }
 
 }  // namespace

@@ -225,6 +225,23 @@ TEST(AuditVerify, OnlyAnchorsOfTheSameChainAreCompared) {
                      "audit, or of one that was removed"}));
 }
 
+TEST(AuditVerify, AnotherChainThatWasWrittenToTheSameFileWasRemoved) {
+    std::string line;
+    Chain().append(line, R"("time":"T","kind":"file","previous":"0","chain":"0c","from":1)");
+    line.pop_back();
+    const std::string anchor = "info audit anchor number=2 hash=" + kHash + " chain=0d file=";
+    for (const auto& [file, fault] :
+         {std::pair{"/a.jsonl",
+                    "removed 2: the log names records of another chain too, 0d, up to record 2, "
+                    "which were written to this file and are not there"},
+          std::pair{"/b.jsonl", "right"}}) {
+        Verifier verifier(named_by(anchor + file), "/a.jsonl");
+        verifier.begin_file("/a.jsonl");
+        verifier.take(line, true);
+        EXPECT_EQ(said(verifier.finish()), fault);
+    }
+}
+
 TEST(AuditVerify, FilesThatTheChainSaysAreKeptMustBeThere) {
     Chain chain(Position{9, no_hash()});
     std::string line;
@@ -232,7 +249,7 @@ TEST(AuditVerify, FilesThatTheChainSaysAreKeptMustBeThere) {
                            std::string(text_of(no_hash())) + R"(","chain":"0c","from":4,"gone":7)");
     line.pop_back();
     for (const bool all : {true, false}) {
-        Verifier verifier({}, all);
+        Verifier verifier({}, all ? "audit.jsonl" : "");
         verifier.begin_file("audit.jsonl");
         verifier.take(line, true);
         const Report report = verifier.finish();
@@ -242,7 +259,7 @@ TEST(AuditVerify, FilesThatTheChainSaysAreKeptMustBeThere) {
                                     : "right");
         ASSERT_EQ(report.remarks.size(), all ? 1U : 2U);
         EXPECT_EQ(report.remarks[0],
-                  "record 10 (T): the file before was removed while it was written, with the "
+                  "record 10 (T): the file before was removed, or changed by others, while it was written, with the "
                   "records from 7 on");
     }
 }

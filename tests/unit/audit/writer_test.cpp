@@ -193,7 +193,7 @@ TEST_F(AuditWriter, AFileThatWasRemovedIsAFailureAndTheNextOneSaysSo) {
     const auto lines = lines_of(file);
     ASSERT_EQ(lines.size(), 2U);
     EXPECT_NE(lines[0].find(R"(,"from":1,"gone":1,)"), std::string::npos) << lines[0];
-    Verifier all({}, true);
+    Verifier all({}, "audit.jsonl");
     all.begin_file(file);
     for (const std::string& line : lines) all.take(line, true);
     const Report report = all.finish();
@@ -209,7 +209,7 @@ TEST_F(AuditWriter, WhatRotationDropsIsNotCalledRemovedAndWhatIsRemovedIs) {
     const auto writer = make(small);
     for (int i = 0; i < 60; ++i) ASSERT_TRUE(write(*writer, i, i + 1));
     const auto verify_all = [&] {
-        Verifier all({}, true);
+        Verifier all({}, "audit.jsonl");
         for (const std::string& one : files()) {
             all.begin_file(one);
             for (const std::string& line : lines_of(one)) all.take(line, true);
@@ -224,6 +224,26 @@ TEST_F(AuditWriter, WhatRotationDropsIsNotCalledRemovedAndWhatIsRemovedIs) {
     const Report less = verify_all();
     ASSERT_TRUE(less.fault);
     EXPECT_EQ(less.fault->number, report.first);
+}
+
+TEST_F(AuditWriter, AFileThatOthersChangeIsAFailureAndAnotherOneFollows) {
+    for (const bool longer : {false, true}) {
+        const auto writer = make(settings());
+        ASSERT_TRUE(write(*writer, 1, 3));
+        const auto size = fs::file_size(file);
+        if (longer)
+            std::ofstream(file, std::ios::app) << "something else\n";
+        else
+            fs::resize_file(file, size / 2);
+        EXPECT_FALSE(writer->work());
+        EXPECT_NE(writer->why().find(" was changed by another program while it was written, with "),
+                  std::string::npos)
+            << writer->why();
+        ASSERT_TRUE(write(*writer, 5, 6));
+        EXPECT_NE(writer->remark().find(" is kept as " + file + ".aside"), std::string::npos);
+        EXPECT_NE(lines_of(file).at(0).find("\"gone\":"), std::string::npos);
+        fs::remove(file);
+    }
 }
 
 TEST_F(AuditWriter, CountsWhatTheDiskHasNotTaken) {
@@ -304,6 +324,35 @@ TEST_F(AuditWriter, WhatAFullDiskDidNotTakeIsWrittenToAnotherFile) {
     EXPECT_GE(report.records, 2U + 36U);  // one or two fitted
     EXPECT_NE(read(other.file).find(R"("value":39)"), std::string::npos);
     EXPECT_FALSE(verify({other.file}).fault);
+}
+
+TEST_F(AuditWriter, ARotationThatIsCutOffHasDroppedNothingYet) {
+    Settings small = settings();
+    small.rotate = 1000;
+    small.keep = 1;
+    const auto writer = make(small);
+    for (int i = 0; writer->rotations() < 2 || fs::file_size(file) < small.rotate; ++i)
+        ASSERT_TRUE(write(*writer, i, i + 1));
+    const auto verify_all = [&] {
+        Verifier all({}, "audit.jsonl");
+        auto names = rotated_files(file);
+        names.push_back(file);
+        for (const std::string& one : names) {
+            all.begin_file(one);
+            for (const std::string& line : lines_of(one)) all.take(line, true);
+        }
+        return all.finish();
+    };
+    {
+        const FullDisk full(0);  // the new file stays empty, as it does where the power is cut
+        EXPECT_FALSE(write(*writer, 200, 201));
+    }
+    ASSERT_EQ(writer->rotations(), 3U);
+    ASSERT_EQ(fs::file_size(file), 0U);
+    const Report cut = verify_all();
+    EXPECT_FALSE(cut.fault) << cut.fault->text;
+    ASSERT_TRUE(writer->work());
+    EXPECT_FALSE(verify_all().fault);
 }
 
 TEST_F(AuditWriter, SaysWhyAFileCannotBeOpened) {

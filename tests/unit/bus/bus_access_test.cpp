@@ -120,7 +120,7 @@ TEST_F(BusAccessTest, P2AWriteThatWasSentIsNotRepeatedAfterItIsForbidden) {
 
 TEST_F(BusAccessTest, P2WhatWaitsIsJudgedByWhatItsDoorSaysNow) {
     std::optional<Admission> now;
-    settings.admit = [&](const WhoRef& asker) {
+    settings.admit = [&](const WhoRef& asker, std::uint8_t) {
         return asker == kOperator ? now : std::optional<Admission>();
     };
     bus->apply(settings, nullptr, nullptr);

@@ -57,12 +57,15 @@ TEST(AuditLine, OtherKindsShowWhatTheyHave) {
 TEST(AuditFilter, TakesWhatIsAskedFor) {
     const json::object one = record(kWrite);
     EXPECT_TRUE(is_shown(one, {}));
-    EXPECT_TRUE(is_shown(one, {"press", "write", "ops", "2026-11-26T09:00:00.123Z", ""}));
-    EXPECT_FALSE(is_shown(one, {"mixer", "", "", "", ""}));
-    EXPECT_FALSE(is_shown(one, {"", "login", "", "", ""}));
-    EXPECT_FALSE(is_shown(one, {"", "", "ivan", "", ""}));
-    EXPECT_FALSE(is_shown(one, {"", "", "", "2026-11-26T09:00:01", ""}));
-    EXPECT_FALSE(is_shown(one, {"", "", "", "", "2026-11-26"}));
+    EXPECT_TRUE(is_shown(one, {.station = "press",
+                               .kind = "write",
+                               .client = "ops",
+                               .since = "2026-11-26T09:00:00.123Z"}));
+    EXPECT_FALSE(is_shown(one, {.station = "mixer"}));
+    EXPECT_FALSE(is_shown(one, {.kind = "login"}));
+    EXPECT_FALSE(is_shown(one, {.client = "ivan"}));
+    EXPECT_FALSE(is_shown(one, {.since = "2026-11-26T09:00:01"}));
+    EXPECT_FALSE(is_shown(one, {.until = "2026-11-26"}));
 }
 
 TEST(AuditTime, IsASpanOrATime) {

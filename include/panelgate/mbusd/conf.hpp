@@ -7,11 +7,11 @@
 
 #include "panelgate/yaml/document.hpp"
 
-namespace panelgate::config {
+namespace panelgate::mbusd {
 
 /// An mbusd configuration (0.5.3, its conf/mbusd.conf.example and cfg.c) in this program's terms.
 struct Imported {
-    std::string yaml;  ///< for load(); its comments list what is not taken over unchanged
+    std::string yaml;  ///< for config::load(); its comments list what is not taken over unchanged
     /// The same as one sentence each: "FILE:LINE: pause = 100: ...".
     std::vector<std::string> notes;
 };
@@ -19,6 +19,6 @@ struct Imported {
 /// Converts an mbusd configuration. Returns nothing if it adds anything to `problems`: lines other
 /// than NAME = VALUE, unknown names, values that mbusd would reject too. Missing settings get
 /// mbusd's defaults.
-std::optional<Imported> import_mbusd(std::string_view text, yaml::Problems& problems);
+std::optional<Imported> import_conf(std::string_view text, yaml::Problems& problems);
 
-}  // namespace panelgate::config
+}  // namespace panelgate::mbusd

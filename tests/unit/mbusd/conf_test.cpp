@@ -1,16 +1,19 @@
-#include "panelgate/config/mbusd_conf.hpp"
+#include "panelgate/mbusd/conf.hpp"
 
 #include <gmock/gmock.h>
 
 #include <string>
 #include <utility>
 
-#include "memory_files.hpp"
+#include "unit/config/memory_files.hpp"
 #include "panelgate/config/config.hpp"
 
-namespace panelgate::config::mbusd_conf_test {
+namespace panelgate::mbusd::conf_test {
 namespace {
 
+using config::Config;
+using config::Line;
+using config::load_valid;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -18,7 +21,7 @@ using Rs485 = line::Rs485::Mode;
 
 Imported imported_of(const std::string& text) {
     yaml::Problems problems("mbusd.conf");
-    const auto imported = import_mbusd(text, problems);
+    const auto imported = import_conf(text, problems);
     EXPECT_TRUE(imported) << problems.text();
     return imported.value_or(Imported{});
 }
@@ -28,7 +31,7 @@ Rs485 rs485_of(const Imported& imported) { return load(imported).lines[0].device
 
 std::string faults(const std::string& text) {
     yaml::Problems problems("mbusd.conf");
-    EXPECT_FALSE(import_mbusd(text, problems));
+    EXPECT_FALSE(import_conf(text, problems));
     return problems.text();
 }
 
@@ -167,4 +170,4 @@ TEST(MbusdConf, ReportsAllFaultsWithTheirPlaces) {
 }
 
 }  // namespace
-}  // namespace panelgate::config::mbusd_conf_test
+}  // namespace panelgate::mbusd::conf_test

@@ -1,4 +1,4 @@
-#include "panelgate/config/mbusd_conf.hpp"
+#include "panelgate/mbusd/conf.hpp"
 
 #include <algorithm>
 #include <array>
@@ -14,16 +14,17 @@
 #include <utility>
 #include <vector>
 
-#include "loader.hpp"
 #include "panelgate/base/network.hpp"
 #include "panelgate/base/text.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/yaml/document.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
-namespace panelgate::config {
+namespace panelgate::mbusd {
 
-struct MbusdNumber {
+using config::Endpoint;
+
+struct Number {
     std::int64_t value = 0;
     bool plain = true;  ///< decimal and nothing after it: other programs read the same
 };
@@ -31,10 +32,10 @@ struct MbusdNumber {
 /// Parses a number as mbusd does (strtoul() with base 0; cfg.c, cfg_handle_param()): 0x1F6, 010 for
 /// 8; text after the digits is ignored. Nothing without a digit (0 to mbusd), if negative or beyond
 /// 2^31 - 1.
-std::optional<MbusdNumber> mbusd_number(std::string_view text);
+std::optional<Number> parse_number(std::string_view text);
 
 /// One NAME = VALUE of an mbusd.conf.
-struct MbusdLine {
+struct Line {
     std::string name;
     std::string value;
     yaml::Mark mark;        ///< of the name
@@ -44,7 +45,7 @@ struct MbusdLine {
 /// Only a line that begins with '#' is a comment: text after a value belongs to the value. Lines
 /// end with LF, CR or both; a leading byte order mark is skipped. Invalid lines are added to
 /// `problems`.
-std::vector<MbusdLine> mbusd_lines(std::string_view text, yaml::Problems& problems);
+std::vector<Line> lines_of(std::string_view text, yaml::Problems& problems);
 
 namespace {
 
@@ -61,7 +62,7 @@ int base_of(std::string_view digits) {
 
 }  // namespace
 
-std::optional<MbusdNumber> mbusd_number(std::string_view text) {
+std::optional<Number> parse_number(std::string_view text) {
     std::string_view digits = text.substr(text.starts_with('+') ? 1 : 0);
     const int base = base_of(digits);
     if (base == 16) digits.remove_prefix(2);
@@ -70,7 +71,7 @@ std::optional<MbusdNumber> mbusd_number(std::string_view text) {
     const auto [stop, error] = std::from_chars(digits.data(), end, value, base);
     constexpr std::uint32_t kMost = std::numeric_limits<std::int32_t>::max();
     if (error != std::errc() || value > kMost) return std::nullopt;
-    return MbusdNumber{value, base == 10 && stop == end};
+    return Number{value, base == 10 && stop == end};
 }
 
 namespace {
@@ -87,7 +88,7 @@ bool has_control_character(std::string_view text) {
     return std::ranges::any_of(text, [](unsigned char c) { return c < ' ' || c == 0x7f; });
 }
 
-void take_line(std::string_view whole, int number, std::vector<MbusdLine>& lines,
+void take_line(std::string_view whole, int number, std::vector<Line>& lines,
                yaml::Problems& problems) {
     const std::string_view typed = without_blanks(whole);
     if (typed.empty() || typed[0] == '#') return;
@@ -116,8 +117,8 @@ void take_line(std::string_view whole, int number, std::vector<MbusdLine>& lines
 
 }  // namespace
 
-std::vector<MbusdLine> mbusd_lines(std::string_view text, yaml::Problems& problems) {
-    std::vector<MbusdLine> lines;
+std::vector<Line> lines_of(std::string_view text, yaml::Problems& problems) {
+    std::vector<Line> lines;
     text.remove_prefix(byte_order_mark(text));
     for (int number = 1; !text.empty(); ++number) {
         const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
@@ -131,7 +132,7 @@ std::vector<MbusdLine> mbusd_lines(std::string_view text, yaml::Problems& proble
 namespace {
 
 /// mbusd's settings, with its defaults (cfg.c, cfg_init(); README).
-struct Mbusd {
+struct Settings {
     std::string device = "/dev/ttyS0";
     std::int64_t speed = 19200;
     std::string mode = "8N1";
@@ -168,14 +169,14 @@ std::string quoted(std::string_view text) {
 std::optional<Endpoint> endpoint_of(const std::string& address, std::int64_t port) {
     const std::string end = ':' + std::to_string(port);
     const bool bare = address.find(':') != address.npos && address[0] != '[';
-    return parse_endpoint(bare ? '[' + address + ']' + end : address + end);
+    return config::parse_endpoint(bare ? '[' + address + ']' + end : address + end);
 }
 
 class Reader {
   public:
     explicit Reader(yaml::Problems& problems) : problems_(problems) {}
 
-    void take(const MbusdLine& line) {
+    void take(const Line& line) {
         line_ = &line;
         constexpr auto kKeys = std::to_array<std::pair<std::string_view, void (Reader::*)()>>(
             {{"device", &Reader::device},
@@ -208,7 +209,7 @@ class Reader {
             return;
         }
         problems_.add(line.mark, "mbusd has no setting " + yaml::quote(line.name) +
-                                     did_you_mean(line.name, names, "settings"));
+                                     yaml::did_you_mean(line.name, names, "settings"));
     }
 
     /// Combines the settings, in whichever order they were.
@@ -224,7 +225,7 @@ class Reader {
             rts_text_);
     }
 
-    const Mbusd& mbusd() const { return mbusd_; }
+    const Settings& mbusd() const { return mbusd_; }
     const std::vector<std::string>& notes() const { return notes_; }
     const std::vector<std::string>& comments() const { return comments_; }
 
@@ -236,7 +237,7 @@ class Reader {
         wrong("must be " + wanted + ", not " + yaml::quote(line_->value));
     }
     /// mbusd uses the last of repeated settings.
-    void note_overridden(const MbusdLine& line) {
+    void note_overridden(const Line& line) {
         const auto [first, added] = seen_.emplace(line.name, line);
         if (added) return;
         line_ = &first->second;
@@ -251,7 +252,7 @@ class Reader {
         notes_.push_back(problems_.file() + ':' + std::to_string(line_->mark.line) + ": " + told);
     }
     std::int64_t integer(std::int64_t otherwise, std::int64_t min, std::int64_t max) {
-        const auto number = mbusd_number(line_->value);
+        const auto number = parse_number(line_->value);
         if (number && number->value >= min && number->value <= max) {
             if (!number->plain) note("mbusd reads this as " + std::to_string(number->value));
             return number->value;
@@ -357,17 +358,17 @@ class Reader {
     }
 
     yaml::Problems& problems_;
-    const MbusdLine* line_ = nullptr;
-    Mbusd mbusd_;
+    const Line* line_ = nullptr;
+    Settings mbusd_;
     bool kernel_ = false;
-    std::optional<MbusdLine> rts_;  ///< the trx_control that selects RTS
-    std::string rts_text_;          ///< its equivalent here
-    std::map<std::string, MbusdLine> seen_;
+    std::optional<Line> rts_;  ///< the trx_control that selects RTS
+    std::string rts_text_;     ///< its equivalent here
+    std::map<std::string, Line> seen_;
     std::vector<std::string> notes_;
     std::vector<std::string> comments_;
 };
 
-std::string serial_text(const Mbusd& mbusd) {
+std::string serial_text(const Settings& mbusd) {
     const int parity = std::tolower(static_cast<unsigned char>(mbusd.mode[1]));
     const char* word = parity == 'n' ? "none" : parity == 'e' ? "even" : "odd";
     return "{baud: " + std::to_string(mbusd.speed) + ", data_bits: 8, parity: " + word +
@@ -375,7 +376,7 @@ std::string serial_text(const Mbusd& mbusd) {
 }
 
 /// All attempts must fit; empty if the default is enough.
-std::string deadline_text(const Mbusd& mbusd) {
+std::string deadline_text(const Settings& mbusd) {
     constexpr std::int64_t kDefault = 2000;
     const std::int64_t needed = (mbusd.retries + 1) * (mbusd.wait + 100) + 100;
     if (needed <= kDefault) return "";
@@ -385,12 +386,12 @@ std::string deadline_text(const Mbusd& mbusd) {
            "s}   # all tries fit into it; clients have to wait for longer\n";
 }
 
-std::string listen_text(const Mbusd& mbusd) {
+std::string listen_text(const Settings& mbusd) {
     const auto at = endpoint_of(mbusd.address, mbusd.port);
     return at ? endpoint_text(at->address, at->port) : "";
 }
 
-std::string line_text(const Mbusd& mbusd) {
+std::string line_text(const Settings& mbusd) {
     return "lines:\n  - name: line1\n    device: " + quoted(mbusd.device) +
            "\n    serial: " + serial_text(mbusd) + "\n    rs485: " + mbusd.rs485 +
            "\n    timing: {response_timeout: " + std::to_string(mbusd.wait) +
@@ -402,7 +403,7 @@ std::string line_text(const Mbusd& mbusd) {
            "    #   - {id: 1, name: press, profile: autonics-gplp-s}   # limits: panelgate init\n";
 }
 
-std::string servers_text(const Mbusd& mbusd) {
+std::string servers_text(const Settings& mbusd) {
     std::string text = "modbus_tcp:\n  - listen: '" + listen_text(mbusd) +
                        "'\n    broadcast: " + (mbusd.replies_to_broadcasts ? "reply" : "silent") +
                        "\n    max_connections: " + std::to_string(mbusd.connections) + '\n';
@@ -413,7 +414,7 @@ std::string servers_text(const Mbusd& mbusd) {
     return text;
 }
 
-std::string yaml_of(const Mbusd& mbusd, const std::vector<std::string>& comments) {
+std::string yaml_of(const Settings& mbusd, const std::vector<std::string>& comments) {
     std::string text = "# made of an mbusd.conf by panelgate import\n" + line_text(mbusd) +
                        servers_text(mbusd) + "log: {level: " + mbusd.level + "}\n";
     if (!comments.empty()) text += "\n# Without a counterpart, or not as it was written:\n";
@@ -423,12 +424,12 @@ std::string yaml_of(const Mbusd& mbusd, const std::vector<std::string>& comments
 
 }  // namespace
 
-std::optional<Imported> import_mbusd(std::string_view text, yaml::Problems& problems) {
+std::optional<Imported> import_conf(std::string_view text, yaml::Problems& problems) {
     Reader reader(problems);
-    for (const MbusdLine& line : mbusd_lines(text, problems)) reader.take(line);
+    for (const Line& line : lines_of(text, problems)) reader.take(line);
     reader.finish();
     if (!problems.empty()) return std::nullopt;
     return Imported{yaml_of(reader.mbusd(), reader.comments()), reader.notes()};
 }
 
-}  // namespace panelgate::config
+}  // namespace panelgate::mbusd
