@@ -265,8 +265,9 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
         return Verdict::replied;
     }
     if (instead_ == Instead::reply) return Verdict::wrong;
+    beheaded_ = beheaded_ || framer_.ends_beheaded(damaged_bytes_);
     const bool damaged = framer_.was_damaged() || echo_.mismatch() || contested_;
-    if (framer_.was_damaged_whole()) return Verdict::damaged;
+    if (framer_.was_damaged_whole() || beheaded_) return Verdict::damaged;
     const Duration wait = in_doubt() ? timing_.usual : timing_.patience;
     if (now < timing_.sent + wait) return Verdict::open;
     if (instead_ == Instead::unrelated) return Verdict::wrong;
@@ -311,7 +312,7 @@ void Attempt::teach(EchoMemory& memory) const {
 Duration Attempt::waited(TimePoint now) const {
     if (pace_.is_shorter()) return std::max(first_byte_ - timing_.sent, Duration::zero());
     const Duration reply = frame_time(timing_.serial, reply_->size() + modbus::kAduOverhead);
-    return std::max(believed_.value_or(now) - timing_.sent - reply, Duration::zero());
+    return std::max(came_at(now) - timing_.sent - reply, Duration::zero());
 }
 
 TimePoint Attempt::first_byte() const {

@@ -189,6 +189,11 @@ ReplyHabits::Heard ReplyHabits::on_unsolicited(OutstandingRequests& book, TimePo
     const bool may_repeat =
         now < std::exchange(again_until_, TimePoint{}) || book.given(id_, now, pdu) != TimePoint{};
     if (modbus::exception_of(pdu)) book.on_refusal(id_, now, pdu);
+    // Right behind the last reply and answering the same: one of the two is surplus.
+    const Asked* const last = book.last_reply(id_);
+    if ((done == Done::second || done == Done::disorder) && last != nullptr &&
+        modbus::answers(last->pdu, pdu))
+        duplicates_.on_surplus(now, now - last->replied);
     if (done == Done::late) return on_late(book, now, pdu, asked, may_repeat);
     if (done == Done::disorder) return on_disorder(book, now, pdu);
     on_unasked(book, now, done, pdu);
@@ -199,10 +204,8 @@ ReplyHabits::Heard ReplyHabits::on_unsolicited(OutstandingRequests& book, TimePo
 void ReplyHabits::on_unasked(OutstandingRequests& book, TimePoint now, Done done, ByteView pdu) {
     if (const TimePoint given = book.given(id_, now, pdu); given != TimePoint{}) {
         duplicates_.learn(now, now - given);
-    } else if (done == Done::second) {
-        const Duration delay = now - book.last_reply(id_)->replied;
-        duplicates_.on_surplus(now, delay);
-        if (book.on_followed(id_)) duplicates_.learn(now, delay);
+    } else if (done == Done::second && book.on_followed(id_)) {
+        duplicates_.learn(now, now - book.last_reply(id_)->replied);
     }
     not_before_ = std::max(not_before_, duplicates_.rest_until());
 }

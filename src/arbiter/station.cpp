@@ -38,6 +38,8 @@ Station::Heard Station::on_unsolicited_frame(OutstandingRequests& book, TimePoin
                                              ByteView pdu, bool asked) {
     Heard heard{replies_.on_unsolicited(book, now, done, pdu, asked)};
     if (done == Done::duplicate) trail_.on_unsolicited(now);
+    // It may be the true answer to the last request: then the one before it shows no pace.
+    if (done == Done::second) quickest_ = quickest_before_;
     if (!is_late(done)) return heard;
     if (heard.needed) slowest_.add(*heard.needed);
     heard.back = health_.on_late_reply(now);
@@ -61,6 +63,7 @@ Station::Replied Station::on_reply(OutstandingRequests& book, TimePoint now, con
     lately_ = result.back ? 0 : static_cast<std::uint8_t>(lately_ << 1);
     if (group.shows_pace()) {
         slowest_.add(waited);
+        quickest_before_ = quickest_;
         quickest_.add(waited);
     }
     turnaround_.add(think);
@@ -68,8 +71,9 @@ Station::Replied Station::on_reply(OutstandingRequests& book, TimePoint now, con
     if (drift_.check(turnaround_, settings_.response_timeout))
         result.drift = turnaround_.quantile(0.95);
     result.trailed = trail_.seen();
-    trail_.on_reply(now);
-    replies_.on_answered(book, now, attempt, waited);
+    const TimePoint came = attempt.came_at(now);
+    trail_.on_reply(came);
+    replies_.on_answered(book, came, attempt, waited);
     result.trail = trail_.take_report();
     const bool exception = modbus::exception_of(attempt.reply()).has_value();
     hole_.on_reply(now, attempt.longest_pause());

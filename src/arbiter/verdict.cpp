@@ -271,6 +271,8 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
         attempt.keep_candidate(station.replies().holds_answers(now), Attempt::Candidate::held);
     if (done == Done::suspect_echo) attempt.suspect_echo();
     if (done != Done::accept && (facts & fact::before_end) != 0) attempt.mark_candidate_early();
+    attempt.group().odd_pace =
+        early && !settings_.paced && !pace_.unbound() && attempt.group().attempts <= 1;
     return done == Done::accept;
 }
 
@@ -279,8 +281,6 @@ void Arbiter::settle(TimePoint now) {
     Station& station = stations_.of(active_->group().station);
     const bool early = active_->replied_early();
     if (!takes_reply(now, station, early)) return;
-    active_->group().odd_pace =
-        early && !settings_.paced && !pace_.unbound() && active_->group().attempts <= 1;
     pace_.on_reply(early);
     pace_.on_rate(active_->pace().hasty());
     unusual_ = active_->pace().is_shorter() ? Station::kUnusualReplies : std::max(unusual_ - 1, 0);

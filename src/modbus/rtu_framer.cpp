@@ -1,7 +1,6 @@
 #include "panelgate/modbus/rtu_framer.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <utility>
 
@@ -303,17 +302,23 @@ bool ReplyFramer::is_own_reply(ByteView damaged) const {
            damaged[1] == request_[0] && damaged[2] == count && request_[1] != count;
 }
 
-/// True for the reply to our read, without its first one to three bytes: an adapter that opens its
-/// receiver too late loses them. What they were is known, and the CRC tells.
-bool ReplyFramer::is_beheaded(ByteView damaged) const {
-    if (!is_read(request_[0]) || !expected_ || damaged.size() >= *expected_) return false;
-    const std::size_t lost = *expected_ - damaged.size();
-    if (lost > kHeader) return false;
-    const std::array head{station_, request_[0],
-                          static_cast<std::uint8_t>(*expected_ - kReadReplyOverhead)};
-    Bytes whole(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(lost));
-    whole.insert(whole.end(), damaged.begin(), damaged.end());
-    return crc_ok(whole, orders_);
+bool ReplyFramer::ends_beheaded(ByteView damaged) const {
+    if (ends_ == Ends::told || !expected_) return false;
+    const bool writes = is_broadcastable(request_[0]);
+    if (!writes && !is_read(request_[0])) return false;
+    Bytes head{station_};
+    const Bytes reply =
+        writes ? normal_write_reply(request_)
+               : Bytes{request_[0], static_cast<std::uint8_t>(*expected_ - kReadReplyOverhead)};
+    head.insert(head.end(), reply.begin(), reply.begin() + kHeader - 1);
+    for (std::size_t lost = 1; lost <= kHeader; ++lost) {
+        const std::size_t rest = *expected_ - lost;
+        if (rest > damaged.size()) continue;
+        Bytes whole(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(lost));
+        whole.insert(whole.end(), damaged.end() - static_cast<std::ptrdiff_t>(rest), damaged.end());
+        if (crc_ok(whole, orders_) && answers(request_, pdu_of(whole))) return true;
+    }
+    return false;
 }
 
 void ReplyFramer::classify(ByteView bytes) {
@@ -330,8 +335,6 @@ void ReplyFramer::step_over(Unused part) {
         damaged_whole_ = damaged_whole_ || part.bytes.size() >= expected_.value_or(0);
         own_header_ = own_header_ || is_own_reply(part.bytes);
     }
-    if (part.kind == Unused::Kind::damaged && is_beheaded(part.bytes))
-        damaged_ = damaged_whole_ = own_header_ = true;
     constexpr std::size_t kKept = 64;  // parts; further bytes go to the last one
     if (unused_.size() < kKept) {
         unused_.push_back(std::move(part));

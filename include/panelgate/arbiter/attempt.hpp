@@ -189,6 +189,8 @@ class Attempt {
     bool replied_early() const { return first_byte_ < timing_.sent && noise_in_front_ == 0; }
     /// ... and earlier than a clock difference of kRatesDiffer explains.
     bool replied_too_early() const { return replied_early() && first_byte_ < earliest_end(); }
+    /// When the reply came that is judged now: before, if it was a candidate.
+    TimePoint came_at(TimePoint now) const { return believed_.value_or(now); }
     /// Time from the end of the request to the start of the reply, whose last byte came now.
     Duration waited(TimePoint now) const;
     /// Time from the end of the request to the first sign of a reply, as received: adapters buffer
@@ -266,8 +268,8 @@ class Attempt {
     bool heard_itself() const { return own_.came_back; }
     /// Updates what is known of the line's echo from this reply.
     void teach(EchoMemory& memory) const;
-    /// True if its own reply came damaged, but with the header intact.
-    bool came_damaged() const { return framer_.had_own_header(); }
+    /// True if its own reply came damaged, but with the header intact, or without its beginning.
+    bool came_damaged() const { return framer_.had_own_header() || beheaded_; }
     /// True if what may have been its own reply broke off before its full length.
     bool was_cut_off() const { return framer_.was_damaged() && !framer_.was_damaged_whole(); }
     /// True if the station sent an exception for another function than was asked.
@@ -347,6 +349,7 @@ class Attempt {
     bool candidate_early_ = false;
     bool begins_anew_ = false;  ///< the next byte is not the candidate's
     bool contradicted_ = false;
+    bool beheaded_ = false;  ///< the reply lost its first bytes
     std::vector<modbus::Unused> set_aside_;
     std::optional<TimePoint> first_reply_at_;
     std::vector<modbus::Unused> unsolicited_;

@@ -130,7 +130,7 @@ class Pace {
   private:
     static constexpr int kEnough = 3;
     static constexpr int kHasty = 3;
-    static constexpr int kAgain = 16;
+    static constexpr int kAgain = 8;
     static constexpr int kDoubts = 2;
     static constexpr int kWeight = 8;
 

@@ -165,7 +165,9 @@ class DuplicateHabit {
     /// How long an answer is to be held, because another one may follow that differs.
     Duration hold(TimePoint now) const {
         const bool known = surplus_ >= kSurplus && now - surplus_at_ <= timing::kForgetDuplicates;
-        return known && always_two_ < kConfirmations ? surplus_delay_ * 3 / 2 : Duration::zero();
+        return known && always_two_ < kConfirmations
+                   ? surplus_delay_ * 3 / 2 + timing::kReceiveMargin
+                   : Duration::zero();
     }
     /// Time for which the station is not asked after a reply.
     Duration settle_time() const { return learned_ * 3 / 2; }

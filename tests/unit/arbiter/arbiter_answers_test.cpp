@@ -117,7 +117,7 @@ TEST_F(ArbiterAnswersTest, P1APanelThatSendsASurplusAnswerIsBelievedWhenNoneFoll
     EXPECT_FALSE(script.answered(ticket)) << "one of two";
     EXPECT_EQ(script.next_sent(100ms).value().adu, encode_adu(17, read_at(50)));
     answer(script, 17, reply_number(51), 12ms);
-    script.run_for(10ms);
+    script.run_for(20ms);
     EXPECT_EQ(value(ticket), reply_number(51));
 }
 
