@@ -7,36 +7,17 @@
 #include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 
-void Admission::stamp(TimePoint now, Job& job) {
+TimePoint latest_start(const SerialFormat& serial, const Job& job) {
     const std::size_t request = job.request.pdu().size() + modbus::kAduOverhead;
     const std::size_t reply =
         std::max(job.request.reply_length().value_or(0), modbus::kExceptionAdu);
-    const Duration needed = job.station == kBroadcast ? frame_time(serial_, request)
-                                                      : frame_time(serial_, request + reply, 2) +
-                                                            silent_interval(serial_);
-    job.ticket = ++last_ticket_;
-    job.arrived = now;
-    job.deadline = now + std::min(deadline_, job.within);
-    job.start_by = job.deadline - needed;
-}
-
-std::optional<Admission::FromMemory> Admission::from_memory(TimePoint now, const Job& job,
-                                                            Duration max_age) {
-    if (max_age <= Duration::zero() || job.priority == PriorityClass::poll) return std::nullopt;
-    const auto& span = job.request.span();
-    if (!span) return std::nullopt;
-    auto hit = memory_.find({job.station, *span}, now, max_age);
-    if (!hit) return std::nullopt;
-    return FromMemory{++last_ticket_, std::move(*hit)};
-}
-
-void Admission::on_read(const Group& group, const Bytes& reply, Duration max_age) {
-    if (group.span && max_age > Duration::zero())
-        memory_.store({group.station, *group.span}, reply, group.started);
+    const Duration needed = job.station == kBroadcast
+                                ? frame_time(serial, request)
+                                : frame_time(serial, request + reply, 2) + silent_interval(serial);
+    return job.deadline - needed;
 }
 
 namespace {
@@ -51,8 +32,31 @@ Settings completed(Settings settings) {
     return settings;
 }
 
+std::optional<modbus::AsciiTranscript> transcript_of(const Settings& settings) {
+    if (settings.serial.mode != SerialMode::ascii) return std::nullopt;
+    return modbus::AsciiTranscript(settings.ascii_digits, settings.reply_hole);
+}
+
 Quiet quiet_of(const Settings& settings) {
     return Quiet(frame_time(settings.serial, modbus::kMaxRtuAdu), silent_interval(settings.serial));
+}
+
+/// Why this group is sent now.
+Reason reason_of(TimePoint now, const Group& group, const JobQueue& queue) {
+    if (group.probe) return {.kind = Reason::Kind::probe};
+    if (group.learns_for != 0 || !group.confirms.empty())
+        return {.kind = Reason::Kind::learns_echo};
+    const Job& leader = group.jobs.front();
+    return {.kind = group.attempts > 1 ? Reason::Kind::again : Reason::Kind::turn,
+            .priority = leader.priority,
+            .station = leader.station,
+            .asked_function = leader.asked_function,
+            .passed_over = queue.last_was_passed_over(),
+            .attempt = group.attempts,
+            .answers = static_cast<std::uint32_t>(group.jobs.size()),
+            .waited = now - leader.arrived,
+            .waiting = queue.waiting(),
+            .client = leader.client};
 }
 
 }  // namespace
@@ -60,16 +64,13 @@ Quiet quiet_of(const Settings& settings) {
 Arbiter::Arbiter(Settings settings)
     : settings_(completed(std::move(settings))),
       orders_(crc_orders(settings_)),
+      ascii_(transcript_of(settings_)),
       stations_(settings_),
       schedule_(settings_),
       quiet_(quiet_of(settings_)),
       unsolicited_(settings_.serial, orders_),
-      admission_(settings_),
       echo_memory_(settings_.echo),
-      outbox_(settings_) {
-    if (settings_.serial.mode == SerialMode::ascii)
-        ascii_.emplace(settings_.ascii_digits, settings_.reply_hole);
-}
+      outbox_(settings_) {}
 
 void Arbiter::apply(Settings settings) {
     settings = completed(std::move(settings));
@@ -77,38 +78,35 @@ void Arbiter::apply(Settings settings) {
     settings_ = std::move(settings);
     stations_.apply(settings_);
     schedule_.apply(settings_);
-    admission_.apply(settings_);
     outbox_.apply(settings_);
     if (same_wire) return;
     orders_ = crc_orders(settings_);
     quiet_ = quiet_of(settings_);
     unsolicited_ = UnsolicitedFrames(settings_.serial, orders_);
     echo_memory_ = EchoMemory(settings_.echo);
-    ascii_.reset();
-    if (settings_.serial.mode == SerialMode::ascii)
-        ascii_.emplace(settings_.ascii_digits, settings_.reply_hole);
+    ascii_ = transcript_of(settings_);
 }
 
 Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     if ((!up_ && !suspended_) || resetting_) return Fault::line_down;
-    // Not while the client has a request open there: it must not read values older than its own
-    // write.
-    const bool waits = schedule_.backlog().has(job.client, job.station);
-    const bool open = waits || (active_ && active_->group().has(job.client, job.station));
-    const Duration max_age = open ? Duration::zero() : stations_.settings(job.station).max_age;
-    if (auto known = admission_.from_memory(now, job, max_age)) {
-        outbox_.finish_from_memory(known->ticket, std::move(known->hit.pdu), known->hit.age);
-        return known->ticket;
+    if (auto known = from_memory(now, job)) {
+        outbox_.finish_from_memory(++last_ticket_, std::move(known->pdu), known->age);
+        return last_ticket_;
     }
     if (stations_.refuses(now, job)) {
-        outbox_.decide(now,
-                       [&] { return explain::offline(now, job, health(job.station), names_); });
+        const StationHealth is = health(job.station);
+        outbox_.decide(now, Decision::Kind::offline, job, is.next_probe() - now,
+                       static_cast<std::size_t>(is.silent_in_a_row()));
         return Fault::offline;
     }
-    admission_.stamp(now, job);
+    job.ticket = ++last_ticket_;
+    job.arrived = now;
+    job.deadline = now + std::min(settings_.queue.deadline, job.within);
+    job.start_by = latest_start(settings_.serial, job);
     job.alone = job.alone || !settings_.share_reads;
     const Ticket ticket = job.ticket;
-    if (active_ && !waits && active_->can_join(now, job)) {
+    if (active_ && active_->can_join(now, job) &&
+        !schedule_.backlog().has(job.client, job.station)) {
         job.attempts = 1;
         job.transactions.add(active_->group().transaction);
         outbox_.on_started(now, job);
@@ -117,32 +115,45 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     }
     const JobQueue::PushResult pushed = schedule_.backlog().queue().push(job);
     for (const Job& shed : pushed.shed) {
-        outbox_.decide(now, [&] { return explain::shed(shed, names_); });
+        outbox_.decide(now, Decision::Kind::shed, shed);
         const bool sent = shed.attempts > 0;  // in a joined read that failed
         outbox_.finish(shed, sent ? Fault::timeout : Fault::busy);
     }
     if (!pushed.taken) {
-        outbox_.decide(now,
-                       [&] { return explain::full(job, settings_.queue, queue_depth(), names_); });
+        outbox_.decide(now, Decision::Kind::full, job, {}, queue_depth());
         return Fault::busy;
     }
     step(now);
     return ticket;
 }
 
+/// A recently read value, where the station's max_age allows it. Never for polls, which must read
+/// new values, nor while the client has a request open there: it must not read values older than
+/// its own write.
+std::optional<ReadCache::Hit> Arbiter::from_memory(TimePoint now, const Job& job) const {
+    const Duration max_age = stations_.settings(job.station).max_age;
+    const auto& span = job.request.span();
+    if (max_age <= Duration::zero() || job.priority == PriorityClass::poll || !span)
+        return std::nullopt;
+    if (schedule_.backlog().has(job.client, job.station) ||
+        (active_ && active_->group().has(job.client, job.station)))
+        return std::nullopt;
+    return memory_.find({job.station, *span}, now, max_age);
+}
+
 void Arbiter::deny(TimePoint now, const JobQueue::Test& match) {
-    for (const Job& job : schedule_.backlog().remove_if(match)) outbox_.finish(job, Fault::denied);
+    for (const Job& job : schedule_.backlog().queue().remove_if(match))
+        outbox_.finish(job, Fault::denied);
     // What became of these nobody knows: they were sent.
     for (const Job& job : schedule_.backlog().remove_retries(match))
         outbox_.finish(job, Fault::timeout);
-    if (!active_) return step(now);
-    for (Job& job : active_->group().jobs) job.barred = job.barred || match(job);
+    if (active_)
+        for (Job& job : active_->group().jobs) job.barred = job.barred || match(job);
     step(now);
 }
 
 void Arbiter::cancel(TimePoint now, Client client) {
     outbox_.on_client_gone(client);
-    names_.forget(client);
     for (const Job& job : schedule_.backlog().cancel(client)) outbox_.finish(job, Fault::cancelled);
     if (active_) active_->group().on_client_gone(client);
     step(now);
@@ -164,13 +175,16 @@ void Arbiter::rest_until(TimePoint until) {
 
 void Arbiter::on_line_left() {
     rest_ = std::max(rest_, quiet_.free_at(Duration::zero()));
+    forget_line();
     suspended_ = true;
-    up_ = false;
-    resetting_ = false;
+}
+
+/// What was heard and read over the line is of no use any more.
+void Arbiter::forget_line() {
+    up_ = suspended_ = resetting_ = false;
     stations_.on_line_down();
     unsolicited_.forget();
-    stations_.book().forget_foreign();
-    admission_.memory().clear();
+    memory_.clear();
 }
 
 void Arbiter::on_line_up(TimePoint now) {
@@ -189,13 +203,7 @@ void Arbiter::on_line_up(TimePoint now) {
 
 /// A sent request stays outstanding: a device server may hand its reply to the next connection.
 void Arbiter::on_line_down(TimePoint now) {
-    up_ = false;
-    suspended_ = false;
-    resetting_ = false;
-    stations_.on_line_down();
-    unsolicited_.forget();
-    stations_.book().forget_foreign();
-    admission_.memory().clear();
+    forget_line();
     if (active_) {
         note(now, active_->take_unsolicited());
         const Attempt attempt = take_active(now);
@@ -284,7 +292,8 @@ void Arbiter::expire(TimePoint now) {
     expire_active(now);
     for (const Job& job : schedule_.backlog().expire(now)) {
         const bool sent = job.attempts > 0;
-        outbox_.decide(now, [&] { return explain::expired(now, job, sent, names_); });
+        outbox_.decide(now, sent ? Decision::Kind::unanswered : Decision::Kind::expired, job,
+                       now - job.arrived);
         outbox_.finish(job, sent ? Fault::timeout : Fault::expired);
     }
     for (const Group& group : schedule_.backlog().take_dropped()) {
@@ -365,15 +374,14 @@ void Arbiter::start(TimePoint now, Group group) {
         timing.echoes = echo_memory_.expects_one();
         timing.as_asked = unusual_ == 0 && station.answers_as_asked() && echo_memory_.known();
     }
-    if (!group.request.is_read()) admission_.memory().on_write(now, group.station, group.request);
+    if (!group.request.is_read()) memory_.on_write(now, group.station, group.request);
     outbox_.written(group, false);
-    Reason why;
-    if (outbox_.explains()) why = explain::start(now, group, schedule_.backlog().queue(), names_);
+    const Reason why = reason_of(now, group, schedule_.backlog().queue());
     quiet_.on_sent(timing.sent, group.station);
     unsolicited_.on_sent(adu);
     EchoFilter echo(adu, echo_memory_.expect(group.request));
     active_.emplace(std::move(group), timing, std::move(echo), orders_);
-    outbox_.transmit(now, *active_, std::move(adu), std::move(wire), std::move(why));
+    outbox_.transmit(now, *active_, std::move(adu), std::move(wire), why);
 }
 
 std::optional<TimePoint> Arbiter::next_deadline() const {
@@ -410,11 +418,11 @@ void Arbiter::check_invariants() const {
     must(up_ || !active_, "a line that is down carries nothing");
     must(up_ || backlog.empty(), "a line that is down has nothing waiting");
     must(up_ || !resetting_, "a line that is down is not to be reset");
-    backlog.each_retry([&](const Group& group) {
+    for (const Group& group : backlog.retries()) {
         must(!group.abandoned(), "a request waits for each retry");
         must(group.attempts > 0, "what is repeated was sent before");
         must(stations_.find(group.station) != nullptr, "its station is known");
-    });
+    }
     if (active_) {
         const Group& group = active_->group();
         must(group.attempts > 0, "what is on the wire was sent");

@@ -11,7 +11,6 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 
@@ -53,8 +52,10 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo,
 
 bool Attempt::can_join(TimePoint now, const Job& job) const {
     const bool leaving = timing_.tolerance && now < earliest_end();
+    const auto& items = job.request.span();
     return leaving && !group_.probe && group_.attempts == 1 && job.station == group_.station &&
-           contained_in(group_.span, job) && group_.jobs.size() < JobQueue::kMost;
+           group_.span && items && !job.alone && group_.span->contains(*items) &&
+           group_.jobs.size() < JobQueue::kMost;
 }
 
 Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
@@ -257,7 +258,7 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
         judge_unsolicited(before, ends);
     }
     const bool usual_is_over = now >= timing_.sent + timing_.usual;
-    if (candidate_ && usual_is_over && kept_ == Candidate::doubted) return Verdict::doubtful;
+    if (candidate_ && usual_is_over && is_doubted()) return Verdict::doubtful;
     if (candidate_ && usual_is_over) {
         reply_ = std::exchange(candidate_, std::nullopt);
         first_byte_ = candidate_began_;
@@ -347,7 +348,7 @@ void Attempt::keep_candidate(Duration needed, Candidate kind) {
     kept_ = kind;
     timing_.usual = std::min(timing_.usual, needed);
     // The reply that the duplicate has delayed comes after it.
-    if (kind != Candidate::believed)
+    if (is_doubted() || kind == Candidate::held)
         timing_.usual = std::min(last_byte_ - timing_.sent + needed, timing_.patience);
     candidate_ = std::exchange(reply_, std::nullopt);
     candidate_at_ = last_byte_;

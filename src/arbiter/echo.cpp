@@ -53,6 +53,12 @@ bool holds_written(ByteView write, ByteView reply) {
     return std::ranges::equal(write.subspan(values), reply.subspan(2));
 }
 
+bool begins_with_request(ByteView heard, ByteView own, const modbus::CrcOrders& orders) {
+    const std::size_t size = modbus::request_adu_length(heard);
+    return size != 0 && size <= heard.size() && modbus::crc_ok(heard.first(size), orders) &&
+           !std::ranges::equal(heard.first(size), own);
+}
+
 bool holds_fragment(ByteView heard, ByteView frame) {
     for (std::size_t i = 0; i + 1 < heard.size(); ++i) {
         if (!std::ranges::search(frame, heard.subspan(i, 2)).empty()) return true;

@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <iterator>
+#include <ranges>
 #include <utility>
-
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 
@@ -22,53 +21,59 @@ std::size_t JobQueue::rank_of(const Job& job) {
     return std::min(static_cast<std::size_t>(job.priority), kPoll);
 }
 
-const JobQueue::Lane& JobQueue::lane_at(const Place& place) const {
-    return hosts_.at(place.host).sources.at(place.client).lanes.at(place.station);
+template <class Visit>
+bool JobQueue::any_lane(const Visit& visit) const {
+    for (const auto& [host, origin] : hosts_) {
+        for (const auto& [client, source] : origin.sources) {
+            for (const auto& [station, lane] : source.lanes)
+                if (visit(Found{{host, client, station}, origin, source, lane})) return true;
+        }
+    }
+    return false;
+}
+
+const JobQueue::Source* JobQueue::find(Client client) const {
+    const auto home = home_.find(client);
+    return home == home_.end() ? nullptr : &hosts_.at(home->second).sources.at(client);
 }
 
 /// Lanes are in order of tickets, so their first jobs decide; broadcasts are the first lane.
-bool JobQueue::in_order(const Source& source, std::uint8_t station) {
-    const auto& [first_station, first_lane] = *source.lanes.begin();
-    if (first_station != kBroadcast) return true;
-    const Ticket broadcast = first_lane.jobs.front().job.ticket;
-    if (station != kBroadcast) return source.lanes.at(station).jobs.front().job.ticket < broadcast;
-    return std::ranges::all_of(source.lanes, [&](const auto& other) {
-        return broadcast <= other.second.jobs.front().job.ticket;
-    });
-}
-
-std::optional<JobQueue::Place> JobQueue::first_of(std::size_t rank, const Test& may_run) const {
-    for (const auto& [host_turn, host] : rounds_[rank]) {
-        const Origin& origin = hosts_.at(host);
-        for (const auto& [client_turn, client] : origin.rounds[rank]) {
-            const Source& source = origin.sources.at(client);
-            for (const auto& [turn, station] : source.rounds[rank]) {
-                if (in_order(source, station) && may_run(source.lanes.at(station).jobs.front().job))
-                    return Place{host, client, station};
-            }
-        }
-    }
-    return std::nullopt;
+const Job* JobQueue::Source::first(std::uint8_t station) const {
+    const auto lane = lanes.find(station);
+    if (lane == lanes.end()) return nullptr;
+    const Job* const job = &lane->second.jobs.front().job;
+    const auto is_before = [job](const Lane& other) {
+        return job->ticket <= other.jobs.front().job.ticket;
+    };
+    const auto& [lowest, broadcasts] = *lanes.begin();
+    if (lowest != kBroadcast) return job;
+    if (station != kBroadcast) return is_before(broadcasts) ? job : nullptr;
+    return std::ranges::all_of(lanes | std::views::values, is_before) ? job : nullptr;
 }
 
 /// A lower class never goes ahead twice in a row, so that a write waits for only one.
 JobQueue::Choice JobQueue::choose(const Test& may_run) const {
     Choice choice;
-    for (std::size_t rank = kRanks; rank-- > 0;) {
-        choice.first_[rank] = first_of(rank, may_run);
-        if (choice.first_[rank]) choice.rank_ = rank;
-    }
-    if (choice.rank_ == kRanks) return choice;
-    const std::size_t top = choice.rank_;
-    if (last_was_passed_over_) {
-        // The higher class goes.
-    } else if (top < kRead && choice.first_[kRead] && passed_[kRead] >= kReadTurn - 1) {
+    any_lane([&](const Found& at) {
+        const std::size_t rank = rank_of(at.lane.jobs.front().job);
+        choice.waits_[rank] = true;
+        Choice::First& first = choice.first_[rank];
+        const std::array turn{at.origin.turns[rank], at.source.turns[rank], at.lane.turns[rank]};
+        if (first.job != nullptr && first.turn < turn) return false;
+        const Job* const job = at.source.first(at.place.station);
+        if (job != nullptr && may_run(*job)) first = {job, at.place, turn};
+        return false;
+    });
+    std::size_t top = 0;
+    while (top < kRanks && choice.first_[top].job == nullptr) ++top;
+    choice.rank_ = top;
+    if (last_was_passed_over_) return choice;  // the higher class goes
+    if (top < kRead && choice.first_[kRead].job != nullptr && passed_[kRead] >= kReadTurn - 1) {
         choice.rank_ = kRead;
-    } else if (top < kPoll && choice.first_[kPoll] && is_polls_turn(choice, top)) {
+    } else if (top < kPoll && choice.first_[kPoll].job != nullptr && is_polls_turn(choice, top)) {
         choice.rank_ = kPoll;
     }
     choice.passed_over_ = choice.rank_ != top;
-    choice.job_ = &lane_at(*choice.first_[choice.rank_]).jobs.front().job;
     return choice;
 }
 
@@ -76,7 +81,7 @@ JobQueue::Choice JobQueue::choose(const Test& may_run) const {
 /// itself, or would be in the following turn, which is a write's again), the poll goes up to three
 /// turns earlier; one of these four turns is always free for it.
 bool JobQueue::is_polls_turn(const Choice& choice, std::size_t top) const {
-    const bool read = choice.first_[kRead].has_value();
+    const bool read = choice.first_[kRead].job != nullptr;
     const int reads_wait = passed_[kRead];
     if (read && reads_wait >= kReadTurn - 2) return false;
     const bool in_the_way = top == kWrite && reads_wait + (read ? 1 : 0) >= kReadTurn - 2;
@@ -86,41 +91,23 @@ bool JobQueue::is_polls_turn(const Choice& choice, std::size_t top) const {
 void JobQueue::count_turn(const Choice& choice) {
     last_was_passed_over_ = choice.passed_over_;
     for (const std::size_t rank : {kRead, kPoll}) {
-        if (rank == choice.rank_ || rounds_[rank].empty()) {
+        if (rank == choice.rank_ || !choice.waits_[rank]) {
             passed_[rank] = 0;
-        } else if (choice.first_[rank]) {
+        } else if (choice.first_[rank].job != nullptr) {
             ++passed_[rank];
         }
     }
 }
 
-const Job* JobQueue::peek(const Test& may_run) const { return choose(may_run).job(); }
-
-std::optional<Job> JobQueue::pop(const Test& may_run) {
-    const Choice choice = choose(may_run);
-    if (choice.job() == nullptr) return std::nullopt;
-    return take(choice);
-}
-
 Job JobQueue::take(const Choice& choice) {
     count_turn(choice);
-    const Place place = *choice.first_[choice.rank_];
-    move_to_back(place, choice.rank_);
-    return take(place, 0);
-}
-
-void JobQueue::move_to_back(const Place& place, std::size_t rank) {
-    ++turns_;
-    const auto move = [&](auto& rounds, Turns& turns) {
-        auto node = rounds[rank].extract(turns[rank]);
-        node.key() = turns[rank] = turns_;
-        rounds[rank].insert(std::move(node));
-    };
+    const std::size_t rank = choice.rank_;
+    const Place& place = choice.first_[rank].place;
     Origin& origin = hosts_.at(place.host);
     Source& source = origin.sources.at(place.client);
-    move(rounds_, origin.turns);
-    move(origin.rounds, source.turns);
-    move(source.rounds, source.lanes.at(place.station).turns);
+    Lane& lane = source.lanes.at(place.station);
+    origin.turns[rank] = source.turns[rank] = lane.turns[rank] = ++turns_;
+    return take(place, 0);
 }
 
 Jobs JobQueue::take_all(std::uint8_t station, const Test& wanted) {
@@ -128,16 +115,16 @@ Jobs JobQueue::take_all(std::uint8_t station, const Test& wanted) {
     for (bool again = true; again;) {
         again = false;
         PoolMap<Ticket, Place> places;
-        for (const auto& [host, origin] : hosts_) {
-            for (const auto& [client, source] : origin.sources) {
-                const auto lane = source.lanes.find(station);
-                if (lane != source.lanes.end())
-                    places.emplace(lane->second.jobs.front().job.ticket,
-                                   Place{host, client, station});
-            }
-        }
+        any_lane([&](const Found& at) {
+            if (at.place.station == station)
+                places.emplace(at.lane.jobs.front().job.ticket, at.place);
+            return false;
+        });
         for (const auto& [ticket, place] : places) {
-            while (has_first(place) && wanted(lane_at(place).jobs.front().job)) {
+            for (const Source* source = find(place.client); source != nullptr;
+                 source = find(place.client)) {
+                const Job* const job = source->first(station);
+                if (job == nullptr || !wanted(*job)) break;
                 taken.push_back(take(place, 0));
                 again = true;
             }
@@ -147,27 +134,13 @@ Jobs JobQueue::take_all(std::uint8_t station, const Test& wanted) {
     return taken;
 }
 
-/// True if the lane exists and order allows its first job to run.
-bool JobQueue::has_first(const Place& place) const {
-    const auto origin = hosts_.find(place.host);
-    if (origin == hosts_.end()) return false;
-    const auto source = origin->second.sources.find(place.client);
-    return source != origin->second.sources.end() && source->second.lanes.contains(place.station) &&
-           in_order(source->second, place.station);
-}
-
 Jobs JobQueue::remove_if(const Test& match) {
     PoolVector<std::pair<Place, std::size_t>> found;
-    for (const auto& [host, origin] : hosts_) {
-        for (const auto& [client, source] : origin.sources) {
-            for (const auto& [station, lane] : source.lanes) {
-                for (std::size_t i = 0; i < lane.jobs.size(); ++i) {
-                    if (match(lane.jobs[i].job))
-                        found.emplace_back(Place{host, client, station}, i);
-                }
-            }
-        }
-    }
+    any_lane([&](const Found& at) {
+        for (std::size_t i = 0; i < at.lane.jobs.size(); ++i)
+            if (match(at.lane.jobs[i].job)) found.emplace_back(at.place, i);
+        return false;
+    });
     Jobs removed;
     for (auto it = found.rbegin(); it != found.rend(); ++it)
         removed.push_back(take(it->first, it->second));
@@ -176,21 +149,16 @@ Jobs JobQueue::remove_if(const Test& match) {
 }
 
 bool JobQueue::any_first(const Test& match) const {
-    for (const auto& [host, origin] : hosts_) {
-        for (const auto& [client, source] : origin.sources) {
-            for (const auto& [station, lane] : source.lanes) {
-                if (in_order(source, station) && match(lane.jobs.front().job)) return true;
-            }
-        }
-    }
-    return false;
+    return any_lane([&](const Found& at) {
+        const Job* const job = at.source.first(at.place.station);
+        return job != nullptr && match(*job);
+    });
 }
 
 bool JobQueue::has(Client client, std::uint8_t station) const {
-    const auto home = home_.find(client);
-    if (home == home_.end()) return false;
-    const auto& lanes = hosts_.at(home->second).sources.at(client).lanes;
-    return lanes.contains(station) || lanes.contains(kBroadcast);
+    const Source* const source = find(client);
+    return source != nullptr &&
+           (source->lanes.contains(station) || source->lanes.contains(kBroadcast));
 }
 
 std::optional<TimePoint> JobQueue::first_expiry() const {
@@ -198,7 +166,7 @@ std::optional<TimePoint> JobQueue::first_expiry() const {
     return *expiries_.begin();
 }
 
-// Lanes and accounting: waiting jobs, rounds and counts.
+// Lanes and accounting.
 
 JobQueue::Entry JobQueue::entry_of(Job job) {
     std::optional<ReadSpan> span;
@@ -214,7 +182,7 @@ JobQueue::HostKey JobQueue::host_of(const Job& job) const {
     return job.host == 0 ? HostKey{true, job.client} : HostKey{false, job.host};
 }
 
-/// New entries join at the end of all rounds.
+/// Who is new has the last turn in all classes.
 JobQueue::Lane& JobQueue::open_lane(const Place& place) {
     const auto open = [this](auto& map, const auto& key) -> auto& {
         const auto [it, added] = map.try_emplace(key);
@@ -231,47 +199,39 @@ void JobQueue::put_back(Job job) { insert(entry_of(std::move(job))); }
 
 /// Inserts by ticket: at the end if it is new, further ahead if it was taken before.
 void JobQueue::insert(Entry entry) {
-    const Place place{host_of(entry.job), entry.job.client, entry.job.station};
-    Lane& lane = open_lane(place);
-    if (!lane.jobs.empty()) delist(place);
+    PoolDeque<Entry>& jobs =
+        open_lane({host_of(entry.job), entry.job.client, entry.job.station}).jobs;
     expiries_.insert(entry.job.start_by);
     if (entry.span) {
         reads_.add(entry.job, *entry.span, [this](Client client, int by) { count(client, by); });
     } else {
         count(entry.job.client, 1);
     }
-    auto at = lane.jobs.end();
-    while (at != lane.jobs.begin() && std::prev(at)->job.ticket > entry.job.ticket) --at;
-    if (at == lane.jobs.end()) {
-        lane.jobs.push_back(std::move(entry));
-    } else {
-        lane.jobs.insert(at, std::move(entry));
-    }
-    enlist(place);
+    auto at = jobs.end();
+    while (at != jobs.begin() && std::prev(at)->job.ticket > entry.job.ticket) --at;
+    jobs.insert(at, std::move(entry));
 }
 
 Job JobQueue::take(const Place& place, std::size_t index) {
-    Lane& lane = hosts_.at(place.host).sources.at(place.client).lanes.at(place.station);
-    delist(place);
-    const auto at = lane.jobs.begin() + static_cast<std::ptrdiff_t>(index);
-    forget(*at);
+    Origin& origin = hosts_.at(place.host);
+    Source& source = origin.sources.at(place.client);
+    PoolDeque<Entry>& jobs = source.lanes.at(place.station).jobs;
+    const auto at = jobs.begin() + static_cast<std::ptrdiff_t>(index);
+    expiries_.erase(expiries_.find(at->job.start_by));
+    if (at->span) {
+        reads_.remove(at->job, *at->span, [this](Client client, int by) { count(client, by); });
+    } else {
+        count(place.client, -1);
+    }
     Job job = std::move(at->job);
-    lane.jobs.erase(at);
-    if (lane.jobs.empty()) {
-        close(place);
-    } else {
-        enlist(place);
+    jobs.erase(at);
+    if (jobs.empty()) source.lanes.erase(place.station);
+    if (source.lanes.empty()) {
+        origin.sources.erase(place.client);
+        home_.erase(place.client);
     }
+    if (origin.sources.empty()) hosts_.erase(place.host);
     return job;
-}
-
-void JobQueue::forget(const Entry& entry) {
-    expiries_.erase(expiries_.find(entry.job.start_by));
-    if (entry.span) {
-        reads_.remove(entry.job, *entry.span, [this](Client client, int by) { count(client, by); });
-    } else {
-        count(entry.job.client, -1);
-    }
 }
 
 void JobQueue::count(Client client, int by) {
@@ -282,60 +242,16 @@ void JobQueue::count(Client client, int by) {
     size_ += change;
 }
 
-/// The class of its first job decides in which rounds a lane takes part.
-void JobQueue::enlist(const Place& place) {
-    Origin& origin = hosts_.at(place.host);
-    Source& source = origin.sources.at(place.client);
-    const Lane& lane = source.lanes.at(place.station);
-    const std::size_t rank = rank_of(lane.jobs.front().job);
-    source.rounds[rank].emplace(lane.turns[rank], place.station);
-    origin.rounds[rank].emplace(source.turns[rank], place.client);
-    rounds_[rank].emplace(origin.turns[rank], place.host);
-}
-
-void JobQueue::delist(const Place& place) {
-    Origin& origin = hosts_.at(place.host);
-    Source& source = origin.sources.at(place.client);
-    const Lane& lane = source.lanes.at(place.station);
-    const std::size_t rank = rank_of(lane.jobs.front().job);
-    source.rounds[rank].erase(lane.turns[rank]);
-    if (!source.rounds[rank].empty()) return;
-    origin.rounds[rank].erase(source.turns[rank]);
-    if (origin.rounds[rank].empty()) rounds_[rank].erase(origin.turns[rank]);
-}
-
-void JobQueue::close(const Place& place) {
-    Origin& origin = hosts_.at(place.host);
-    Source& source = origin.sources.at(place.client);
-    source.lanes.erase(place.station);
-    if (!source.lanes.empty()) return;
-    origin.sources.erase(place.client);
-    home_.erase(place.client);
-    if (origin.sources.empty()) hosts_.erase(place.host);
-}
-
 bool JobQueue::source_consistent(Client client, const HostKey& host, const Source& source) const {
     std::size_t counting = 0;
-    std::array<std::size_t, kRanks> enlisted{};
     for (const auto& [station, lane] : source.lanes) {
         if (lane.jobs.empty()) return false;
-        const std::size_t rank = rank_of(lane.jobs.front().job);
-        const auto turn = source.rounds[rank].find(lane.turns[rank]);
-        if (turn == source.rounds[rank].end() || turn->second != station) return false;
-        ++enlisted[rank];
         for (std::size_t i = 0; i < lane.jobs.size(); ++i) {
             const auto& [job, span] = lane.jobs[i];
             if (job.client != client || job.station != station) return false;
             if (i > 0 && lane.jobs[i - 1].job.ticket >= job.ticket) return false;
             if (!span || reads_.counts(job.ticket, *span)) ++counting;
         }
-    }
-    for (std::size_t rank = 0; rank < kRanks; ++rank) {
-        const auto& round = hosts_.at(host).rounds[rank];
-        const auto turn = round.find(source.turns[rank]);
-        const bool listed = turn != round.end() && turn->second == client;
-        if (enlisted[rank] != source.rounds[rank].size() || listed == source.rounds[rank].empty())
-            return false;
     }
     return !source.lanes.empty() && counting == source.counting && home_.at(client) == host;
 }
@@ -354,14 +270,8 @@ bool JobQueue::consistent() const {
         }
         if (origin.sources.empty() || of_host != origin.counting) return false;
         counting += of_host;
-        for (std::size_t rank = 0; rank < kRanks; ++rank) {
-            const auto turn = rounds_[rank].find(origin.turns[rank]);
-            const bool listed = turn != rounds_[rank].end() && turn->second == host;
-            if (listed == origin.rounds[rank].empty()) return false;
-        }
     }
-    return counting == size_ && waiting == expiries_.size() && clients == home_.size() &&
-           reads_.consistent();
+    return counting == size_ && waiting == expiries_.size() && clients == home_.size();
 }
 
 // Admission to the queue, and dropping jobs for it.
@@ -371,7 +281,8 @@ JobQueue::PushResult JobQueue::push(Job job) {
     if (waiting() >= kMost) return result;
     Entry entry = entry_of(std::move(job));
     if (!entry.span || !reads_.carries(*entry.span)) {
-        if (counting_of(entry.job.client) >= settings_.per_client) return result;
+        const Source* const source = find(entry.job.client);
+        if (source != nullptr && source->counting >= settings_.per_client) return result;
         if (size_ >= settings_.limit && !make_room(entry.job, result.shed)) return {};
     }
     result.taken = true;
@@ -384,7 +295,7 @@ JobQueue::PushResult JobQueue::push(Job job) {
 bool JobQueue::make_room(const Job& newcomer, Jobs& shed) {
     const auto first = find_victim(newcomer);
     if (!first) return false;
-    if (first->merit.makes_room) {
+    if (first->makes_room) {
         shed.push_back(take(first->place, first->index));
         return true;
     }
@@ -398,90 +309,56 @@ bool JobQueue::make_room(const Job& newcomer, Jobs& shed) {
     return true;
 }
 
-std::size_t JobQueue::counting_of(Client client) const {
-    const auto home = home_.find(client);
-    return home == home_.end() ? 0 : hosts_.at(home->second).sources.at(client).counting;
-}
-
+/// The victim of whoever is greedier than the newcomer: of a host with more waiting than its own
+/// would have, else of a client of its own. The one with the most loses; among equals the newest
+/// request is dropped, so that not always the same client loses.
 std::optional<JobQueue::Victim> JobQueue::find_victim(const Job& newcomer) const {
     const HostKey own = host_of(newcomer);
     const auto origin = hosts_.find(own);
+    const Source* const source = find(newcomer.client);
     const std::size_t of_host = origin == hosts_.end() ? 0 : origin->second.counting;
-    const std::size_t of_client = counting_of(newcomer.client);
+    const std::size_t of_client = source == nullptr ? 0 : source->counting;
     const bool write = newcomer.priority == PriorityClass::write;
-    const auto writes_too = [&](const Holder& holder) {
-        return write || 2 * holder.origin.counting > size_;
-    };
-    auto victim = greediest(
-        [&](const Holder& holder) { return holder.origin.counting > of_host + 1; }, writes_too);
-    if (victim) return victim;
-    victim = greediest(
-        [&](const Holder& holder) {
-            return holder.host == own && holder.source.counting > of_client + 1;
-        },
-        writes_too);
     // Writes come first, but not at the expense of the places of reads that every fifth turn needs.
-    if (victim || !write || kReadTurn * reads_.counting() <= settings_.limit) return victim;
-    return greediest(
-        [&](const Holder& holder) {
-            return holder.host == own ? holder.source.counting >= of_client
-                                      : holder.origin.counting >= of_host;
-        },
-        [](const Holder&) { return false; });
-}
-
-/// The victim of the client with the most requests that has one. Among equals the newest request is
-/// dropped, so that not always the same client loses.
-std::optional<JobQueue::Victim> JobQueue::greediest(const Ask& may_lose,
-                                                    const Ask& writes_too) const {
+    const bool replaces_reads = write && kReadTurn * reads_.counting() > settings_.limit;
     std::optional<Victim> best;
-    std::pair<std::size_t, std::size_t> most;
-    for (const auto& [host, origin] : hosts_) {
-        for (const auto& [client, source] : origin.sources) {
-            const std::pair load(origin.counting, source.counting);
-            const Holder holder{host, origin, client, source};
-            if ((best && load < most) || !may_lose(holder)) continue;
-            const auto victim = victim_of(holder, writes_too(holder));
-            if (!victim || (best && load == most && victim->merit < best->merit)) continue;
-            best = victim;
-            most = load;
-        }
-    }
-    return best;
-}
-
-std::optional<JobQueue::Victim> JobQueue::victim_of(const Holder& holder, bool writes_too) const {
-    std::optional<Victim> best;
-    for (const auto& [station, lane] : holder.source.lanes) {
-        const auto victim = victim_in(holder, station);
-        if (!victim || (victim->merit.is_write && !writes_too)) continue;
-        if (!best || best->merit < victim->merit) best = victim;
-    }
+    any_lane([&](const Found& at) {
+        const bool is_own = at.place.host == own;
+        const std::size_t load = is_own ? at.source.counting : at.origin.counting;
+        const std::size_t mine = is_own ? of_client : of_host;
+        const bool greedier = load > mine + 1;
+        if (!greedier && (load < mine || !replaces_reads)) return false;
+        auto victim = victim_in(at);
+        const bool writes_too = greedier && (write || 2 * at.origin.counting > size_);
+        if (!victim || (victim->is_write && !writes_too)) return false;
+        const int level = !greedier ? 0 : is_own ? 1 : 2;
+        victim->greed = {level, at.origin.counting, at.source.counting};
+        if (!best || *best < *victim) best = victim;
+        return false;
+    });
     return best;
 }
 
 /// The newest of a lane whose removal frees a place; if there is none, because carried reads would
 /// count instead, the newest that counts. Only reads remain behind it, so its removal breaks no
 /// order; likewise nothing younger may wait across a broadcast.
-std::optional<JobQueue::Victim> JobQueue::victim_in(const Holder& holder,
-                                                    std::uint8_t station) const {
-    const auto& lanes = holder.source.lanes;
-    const auto& jobs = lanes.at(station).jobs;
+std::optional<JobQueue::Victim> JobQueue::victim_in(const Found& at) const {
+    const auto& jobs = at.lane.jobs;
+    const std::uint8_t station = at.place.station;
     std::optional<Victim> found;
     for (std::size_t i = jobs.size(); i-- > 0;) {
         const auto& [job, span] = jobs[i];
         const bool frees = !span || reads_.frees(job.ticket, *span);
         if (!frees && (found || !reads_.counts(job.ticket, *span))) continue;
         const std::size_t rank = rank_of(job);
-        found = Victim{Place{holder.host, holder.client, station}, i,
-                       Merit{rank == 0, frees, rank, job.ticket}};
+        found = Victim{at.place, i, frees, rank == kWrite, {}, {frees, rank, job.ticket}};
         if (frees) break;
     }
     const auto younger_beyond = [&](const auto& other) {
         const bool beyond = other.first != station && (station == 0 || other.first == 0);
-        return beyond && other.second.jobs.back().job.ticket > found->merit.ticket;
+        return beyond && other.second.jobs.back().job.ticket > jobs[found->index].job.ticket;
     };
-    if (found && std::ranges::any_of(lanes, younger_beyond)) return std::nullopt;
+    if (found && std::ranges::any_of(at.source.lanes, younger_beyond)) return std::nullopt;
     return found;
 }
 

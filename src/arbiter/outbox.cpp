@@ -10,11 +10,12 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 
 namespace {
+
+constexpr std::uint8_t kUnlisted = 0;  // key of the counters
 
 /// How a frame is shown and counted that answers no open request.
 struct Shown {
@@ -69,12 +70,13 @@ StationCounters& Outbox::of(std::uint8_t station) {
     return found == stations_.end() ? stations_[kUnlisted] : found->second;
 }
 
-void Outbox::transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire, Reason why) {
+void Outbox::transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire,
+                      const Reason& why) {
     const Group& group = attempt.group();
     if (group.attempts > 1) ++of(group.station).retries;
     if (group.station == kBroadcast) ++line_.broadcasts;
     actions_.push_back(
-        Note{now, kind_of(group), std::move(adu), std::move(why), group.transaction});
+        Note{now, kind_of(group), std::move(adu), explain_ ? why : Reason{}, group.transaction});
     actions_.push_back(Transmit{std::move(wire)});
 }
 

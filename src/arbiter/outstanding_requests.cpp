@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <utility>
 
+#include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/response.hpp"
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 

@@ -8,7 +8,6 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 
@@ -141,20 +140,6 @@ bool WaitingReads::frees(Ticket ticket, const ReadSpan& span) const {
         if (span.contains(it->first)) return false;
     }
     return true;
-}
-
-bool WaitingReads::consistent() const {
-    std::size_t widest = 0;
-    for (const auto& [span, equals] : spans_) {
-        const auto table =
-            spans_.lower_bound({span.station, {span.items.table, 0, modbus::kTableItems}});
-        const bool contained = std::any_of(table, spans_.find(span), [&inner = span](auto& wider) {
-            return wider.first.contains(inner);
-        });
-        if (equals.empty() || contained == is_widest(span)) return false;
-        if (!contained) ++widest;
-    }
-    return widest == widest_.size();
 }
 
 }  // namespace panelgate::arbiter

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "panelgate/modbus/function.hpp"
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 
@@ -106,24 +105,15 @@ std::optional<Group> Backlog::take_retry(const InlineFunction<bool(const Group&)
     return group;
 }
 
-void Backlog::each_retry(const InlineFunction<void(const Group&), 48>& show) const {
-    for (const Group& group : retries_) show(group);
-}
-
 Jobs Backlog::remove_retries(const JobQueue::Test& match) {
     Jobs removed;
-    for (auto group = retries_.begin(); group != retries_.end();) {
-        std::ranges::copy_if(group->jobs, std::back_inserter(removed), match);
-        std::erase_if(group->jobs, match);
-        if (!group->abandoned()) {
-            ++group;
-            continue;
-        }
-        append(removed,
-               std::exchange(group->jobs, {}));  // of clients that left while it was on the wire
-        dropped_.push_back(std::move(*group));
-        group = retries_.erase(group);
+    for (Group& group : retries_) {
+        append(removed, take_if(group.jobs, match));
+        if (!group.abandoned()) continue;
+        append(removed, std::exchange(group.jobs, {}));  // they left while it was on the wire
+        dropped_.push_back(std::move(group));
     }
+    std::erase_if(retries_, [](const Group& group) { return group.abandoned(); });
     return removed;
 }
 
@@ -161,15 +151,6 @@ Jobs Backlog::clear() {
 }
 
 namespace {
-
-/// The longer of the gaps that the last station and this one require.
-bool gap_is_over(TimePoint now, std::uint8_t station, const Stations& stations, Quiet& quiet) {
-    const Duration gap = std::max(stations.gap(quiet.station()), stations.gap(station));
-    const TimePoint allowed = quiet.free_at(gap);
-    if (now >= allowed) return true;
-    quiet.rest_until(allowed);
-    return false;
-}
 
 /// Makes a read that no client asked for.
 Group internal_read(std::uint8_t station, modbus::Request request) {
@@ -236,32 +217,42 @@ bool Schedule::can_prove(const OutstandingRequests& book, const Station& station
 
 Schedule::Next Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
                               const EchoMemory& echo) {
+    const Line line{now, stations, quiet, echo};
     echo_known_ = echo.known();
     if (now < quiet.free_at(stations.gap(quiet.station()))) return {};
     const bool alone = backlog_.has_retries() &&
                        (quarantine_ == Quarantine::line || now < quiet.quarantined_until());
-    if (alone || !others_go_first(now, stations, quiet)) {
-        if (auto group = next_retry(now, stations, quiet)) return {std::move(group), false};
+    if (alone || !others_go_first(line)) {
+        if (auto group = next_retry(line)) return {std::move(group), false};
         if (alone) return {};
     }
     const auto due = stations.next_probe();
     // Probes have the lowest class, but a busy line must not keep a station offline: its budget
     // limits them.
     if (due && now >= *due + timing::kProbeWaits) {
-        if (auto group = next_probe(now, stations, quiet)) return {std::move(group), false};
+        if (auto group = next_probe(line)) return {std::move(group), false};
     }
-    if (Next job = next_job(now, stations, quiet, echo); job.group || job.reopen) return job;
-    if (auto group = next_retry(now, stations, quiet)) return {std::move(group), false};
-    if (due && now >= *due) return {next_probe(now, stations, quiet), false};
+    if (Next job = next_job(line); job.group || job.reopen) return job;
+    if (auto group = next_retry(line)) return {std::move(group), false};
+    if (due && now >= *due) return {next_probe(line), false};
     return {};
 }
 
-std::optional<Group> Schedule::next_retry(TimePoint now, const Stations& stations, Quiet& quiet) {
+/// The longer of the gaps that the last station and this one require.
+bool Schedule::gap_is_over(const Line& line, std::uint8_t station) {
+    const Duration gap =
+        std::max(line.stations.gap(line.quiet.station()), line.stations.gap(station));
+    const TimePoint allowed = line.quiet.free_at(gap);
+    if (line.now < allowed) line.quiet.rest_until(allowed);
+    return line.now >= allowed;
+}
+
+std::optional<Group> Schedule::next_retry(const Line& line) {
     auto group = backlog_.take_retry([&](const Group& waiting) {
-        return repeat_from(waiting, stations) <= now &&
-               gap_is_over(now, waiting.station, stations, quiet);
+        return repeat_from(waiting, line.stations) <= line.now &&
+               gap_is_over(line, waiting.station);
     });
-    if (group) let_others_go_first(now);
+    if (group) let_others_go_first(line.now);
     return group;
 }
 
@@ -295,45 +286,40 @@ void Schedule::take_turn(const Job& job) {
     }
 }
 
-bool Schedule::others_go_first(TimePoint now, const Stations& stations, const Quiet& quiet) const {
-    if (turns_ == 0 || now >= others_until_) return false;
-    const JobQueue::Test may = runnable(now, stations, quiet);
-    return backlog_.queue().peek([&](const Job& job) {
-        return has_turn(job) && may(job) && stations.may_spend(now, job);
-    }) != nullptr;
+bool Schedule::others_go_first(const Line& line) const {
+    if (turns_ == 0 || line.now >= others_until_) return false;
+    return backlog_.queue().any_first([&](const Job& job) {
+        return has_turn(job) && may_run(line, job) && line.stations.may_spend(line.now, job);
+    });
 }
 
-std::optional<Group> Schedule::next_probe(TimePoint now, Stations& stations, Quiet& quiet) const {
-    if (now < quiet.quarantined_until()) return std::nullopt;
-    const auto station = stations.next_to_probe(now);
-    if (!station || !gap_is_over(now, *station, stations, quiet)) return std::nullopt;
-    Group group = internal_read(*station, stations.find(*station)->replies().reads().probe());
+std::optional<Group> Schedule::next_probe(const Line& line) const {
+    if (line.now < line.quiet.quarantined_until()) return std::nullopt;
+    const auto station = line.stations.next_to_probe(line.now);
+    if (!station || !gap_is_over(line, *station)) return std::nullopt;
+    Group group = internal_read(*station, line.stations.find(*station)->replies().reads().probe());
     group.probe = true;
     return group;
 }
 
 /// Not while a late reply could be taken for the answer (P1).
-JobQueue::Test Schedule::runnable(TimePoint now, const Stations& stations,
-                                  const Quiet& quiet) const {
-    return [&, this, now](const Job& job) {
-        if (now < quiet.quarantined_until()) return false;
-        return now >= ready_at(stations, job) && !backlog_.has_retry(job.station);
-    };
+bool Schedule::may_run(const Line& line, const Job& job) const {
+    return line.now >= line.quiet.quarantined_until() && line.now >= ready_at(line.stations, job) &&
+           !backlog_.has_retry(job.station);
 }
 
 /// P1: an outstanding reply of its station could be taken for the answer to this job. Stations
 /// serve in order: the answer to a read of another length proves that none can come. If the
 /// transport may delay frames and the station does not answer, the connection that the request was
 /// sent on proves nothing: a new one is needed.
-std::optional<Schedule::Next> Schedule::proof_before(TimePoint now, const Job& job,
-                                                     const Stations& stations) const {
-    const Station* station = stations.find(job.station);
+std::optional<Schedule::Next> Schedule::proof_before(const Line& line, const Job& job) const {
+    const Station* station = line.stations.find(job.station);
     if (station == nullptr) return std::nullopt;
-    const OutstandingRequests& book = stations.book();
+    const OutstandingRequests& book = line.stations.book();
     const ReplyHabits& replies = station->replies();
     if (!book.is_ambiguous(job.station, job.request)) return std::nullopt;
-    const bool is_in_transit = in_transit(stations, *station);
-    if (!is_in_transit && now >= replies.clear_at(book, job.request)) return std::nullopt;
+    const bool is_in_transit = in_transit(line.stations, *station);
+    if (!is_in_transit && line.now >= replies.clear_at(book, job.request)) return std::nullopt;
     if (is_in_transit && !can_prove(book, *station) && book.any_since(job.station, book.opened()))
         return Next{std::nullopt, true};
     Group proof = internal_read(job.station, replies.proof(book));
@@ -344,28 +330,26 @@ std::optional<Schedule::Next> Schedule::proof_before(TimePoint now, const Job& j
 
 /// A read that no client asked for and that goes before this job: a proof (P1), or one that shows
 /// whether the line has an echo (P8).
-std::optional<Schedule::Next> Schedule::read_before(TimePoint now, const Job& job,
-                                                    Stations& stations, const EchoMemory& echo) {
+std::optional<Schedule::Next> Schedule::read_before(const Line& line, const Job& job) {
     if (job.station == kBroadcast) return std::nullopt;
-    if (auto proof = proof_before(now, job, stations)) return proof;
-    if (!echo.must_be_learned_before(job.request, job.ticket == learned_for_)) return std::nullopt;
+    if (auto proof = proof_before(line, job)) return proof;
+    if (!line.echo.must_be_learned_before(job.request, job.ticket == learned_for_))
+        return std::nullopt;
     learned_for_ = job.ticket;
-    return Next{learning_for(job, stations.of(job.station)), false};
+    return Next{learning_for(job, line.stations.of(job.station)), false};
 }
 
-Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quiet,
-                                  const EchoMemory& echo) {
+Schedule::Next Schedule::next_job(const Line& line) {
     struct {
         bool others;
         bool in_budget = true;
         std::optional<std::uint8_t> reads_of{};  ///< only of this station
-    } wanted{others_go_first(now, stations, quiet)};
-    const JobQueue::Test may_run = runnable(now, stations, quiet);
+    } wanted{others_go_first(line)};
     const JobQueue::Test test = [&](const Job& job) {
         if (wanted.reads_of && (job.station != *wanted.reads_of || !job.request.is_read()))
             return false;
-        return (!wanted.others || has_turn(job)) && may_run(job) &&
-               (!wanted.in_budget || stations.may_spend(now, job));
+        return (!wanted.others || has_turn(job)) && may_run(line, job) &&
+               (!wanted.in_budget || line.stations.may_spend(line.now, job));
     };
     const JobQueue& queue = backlog_.queue();
     JobQueue::Choice next = queue.choose(test);
@@ -374,12 +358,13 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
     if (next.job() == nullptr) next = queue.choose(test);
     if (next.job() == nullptr) return {};
     // P9: in the turn of a station's write its read goes first, and the write is next.
-    if (!next.job()->request.is_read() && stations.has_read_turn(next.job()->station)) {
-        wanted.reads_of = next.job()->station;
+    const Station* station = line.stations.find(next.job()->station);
+    if (!next.job()->request.is_read() && station != nullptr && station->has_read_turn()) {
+        wanted.reads_of = station->id();
         if (const auto read = queue.choose(test); read.job() != nullptr) next = read;
     }
-    if (!gap_is_over(now, next.job()->station, stations, quiet)) return {};
-    if (auto read = read_before(now, *next.job(), stations, echo)) return std::move(*read);
+    if (!gap_is_over(line, next.job()->station)) return {};
+    if (auto read = read_before(line, *next.job())) return std::move(*read);
     Job job = backlog_.queue().take(next);
     take_turn(job);
     if (job.station == kBroadcast) {
@@ -387,8 +372,9 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
         group.jobs.push_back(std::move(job));
         return {std::move(group), false};
     }
-    const Station& station = stations.of(job.station);
-    return {sharing_.gather(std::move(job), station, stations.book(), backlog_.queue()), false};
+    const OutstandingRequests& book = line.stations.book();
+    const Station& asked = line.stations.of(job.station);
+    return {sharing_.gather(std::move(job), asked, book, backlog_.queue()), false};
 }
 
 std::optional<TimePoint> Schedule::next_start(const Stations& stations, const Quiet& quiet) const {
@@ -397,7 +383,7 @@ std::optional<TimePoint> Schedule::next_start(const Stations& stations, const Qu
     const auto earlier = [&](TimePoint t) {
         next = next ? std::min(*next, std::max(free, t)) : std::max(free, t);
     };
-    backlog_.each_retry([&](const Group& group) { earlier(repeat_from(group, stations)); });
+    for (const Group& group : backlog_.retries()) earlier(repeat_from(group, stations));
     // Usually the first may start at once: then nothing can start sooner.
     const bool at_once = backlog_.queue().any_first([&](const Job& job) {
         if (backlog_.has_retry(job.station)) return false;
@@ -437,10 +423,7 @@ void Schedule::retry(TimePoint now, Group group, Duration patience) {
 
 Jobs Schedule::give_back(Group& group) {
     for (Job& job : sharing_.split(group)) backlog_.queue().put_back(std::move(job));
-    Jobs gone;
-    std::ranges::copy_if(group.jobs, std::back_inserter(gone), &Job::gone);
-    std::erase_if(group.jobs, [](const Job& job) { return job.gone; });
-    return gone;
+    return take_if(group.jobs, [](const Job& job) { return job.gone; });
 }
 
 }  // namespace panelgate::arbiter

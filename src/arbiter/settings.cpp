@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "verdict.hpp"
+#include "panelgate/arbiter/job.hpp"
 
 namespace panelgate::arbiter {
 

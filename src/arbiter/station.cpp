@@ -11,19 +11,13 @@ namespace panelgate::arbiter {
 
 Station::Station(const StationSettings& settings, const OfflineSettings& offline, bool listed,
                  Duration frame)
-    : settings_(settings),
-      listed_(listed),
-      replies_(settings),
-      health_(offline),
-      adaptive_(settings.timeout_floor, settings.response_timeout),
-      trail_(frame) {}
+    : settings_(settings), listed_(listed), replies_(settings), health_(offline), trail_(frame) {}
 
 void Station::apply(const StationSettings& settings, const OfflineSettings& offline, bool listed) {
     settings_ = settings;
     listed_ = listed;
     replies_.apply(settings);
     health_.apply(offline);
-    adaptive_.apply(settings.timeout_floor, settings.response_timeout);
 }
 
 void Station::on_asked(OutstandingRequests& book, TimePoint now, const Group& group,
@@ -39,9 +33,9 @@ Station::Heard Station::on_unsolicited_frame(OutstandingRequests& book, TimePoin
     Heard heard{replies_.on_unsolicited(book, now, done, pdu, asked)};
     if (done == Done::duplicate) trail_.on_unsolicited(now);
     // It may be the true answer to the last request: then the one before it shows no pace.
-    if (done == Done::second) quickest_ = quickest_before_;
+    if (done == Done::second) times_ = times_before_;
     if (!is_late(done)) return heard;
-    if (heard.needed) slowest_.add(*heard.needed);
+    if (heard.needed) times_.add_long(*heard.needed);
     heard.back = health_.on_late_reply(now);
     missed_ = false;
     probes_ = 0;
@@ -62,14 +56,11 @@ Station::Replied Station::on_reply(OutstandingRequests& book, TimePoint now, con
     missed_ = false;
     lately_ = result.back ? 0 : static_cast<std::uint8_t>(lately_ << 1);
     if (group.shows_pace()) {
-        slowest_.add(waited);
-        quickest_before_ = quickest_;
-        quickest_.add(waited);
+        times_before_ = times_;
+        times_.add(waited);
     }
     turnaround_.add(think);
-    adaptive_.on_reply();
-    if (drift_.check(turnaround_, settings_.response_timeout))
-        result.drift = turnaround_.quantile(0.95);
+    result.drift = turnaround_.take_report(settings_.response_timeout);
     result.trailed = trail_.seen();
     const TimePoint came = attempt.came_at(now);
     trail_.on_reply(came);
@@ -89,7 +80,6 @@ void Station::on_failed(TimePoint now, Verdict verdict, Duration cost,
     if (!is_read) ignored_ = write->pdu();
     read_missed_ = read_missed_ || is_read;
     read_turn_ = !is_read;
-    if (verdict == Verdict::silent) adaptive_.on_timeout();
     failed_ = now;
     if (verdict != Verdict::silent) unusual_ = kUnusualReplies;
     if (health_.offline() || flaky()) ++probes_;
@@ -134,7 +124,14 @@ bool Station::may_retry(const Group& group) const {
     return harmless && failed <= settings_.retries;
 }
 
-Duration Station::short_wait(std::optional<Duration> line) const {
+Duration Station::response_timeout() const {
+    const Duration whole = settings_.response_timeout;
+    if (!settings_.adaptive_timeout || !turnaround_.known()) return whole;
+    const Duration wanted = settings_.timeout_floor + 2 * turnaround_.quantile(0.98);
+    return std::min(whole, wanted * (1 << std::countr_one(lately_)));
+}
+
+Duration Station::usual(std::optional<Duration> line) const {
     const std::optional<Duration> own = slowest();
     const Duration whole = settings_.response_timeout;
     if (!own && !line) return whole;
@@ -148,14 +145,14 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
     if (group.silent_after > Duration::zero()) {
         // A retry after a whole timeout waits as long as the panel has ever needed; one after a
         // shorter wait waits longer than that.
-        if (group.silent_after >= whole) return short_wait(line);
+        if (group.silent_after >= whole) return usual(line);
         return settings_.adaptive_timeout ? whole : std::min(whole, 2 * group.silent_after);
     }
-    if (group.distinct_length) return short_wait(line);
+    if (group.distinct_length) return usual(line);
     // A station that stopped inside a reply is alive but may still be delayed: the two attempts
     // together wait as long as one.
     if (group.cut_after > Duration::zero() && !health_.offline())
-        return std::max(short_wait(line), whole - group.cut_after);
+        return std::max(usual(line), whole - group.cut_after);
     constexpr int kDear = 16;
     if (health_.offline() && slowest() && turnaround_.known() && probes_ % kDear != kDear - 1) {
         // A few replies delayed by a network must not make probes long: one in kDear waits as long
@@ -163,24 +160,24 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
         constexpr double kMost = 0.75;
         const Duration most = std::max(timing::kShortestWait,
                                        2 * turnaround_.quantile(kMost) + timing::kReceiveMargin);
-        return std::min(short_wait(line), most);
+        return std::min(usual(line), most);
     }
     if ((health_.offline() || flaky_beside_others) && !slowest()) {
         // Its think time is unknown: one in kOneIn waits longer, and longer each time.
         constexpr int kOneIn = 4;
         constexpr int kDoublings = 6;
         const int longer = probes_ % kOneIn == kOneIn - 1 ? 1 + probes_ / kOneIn % kDoublings : 0;
-        return std::min(whole, short_wait(line) * (1 << longer));
+        return std::min(whole, usual(line) * (1 << longer));
     }
     if (health_.offline() || missed_last() || speculative() || flaky_beside_others)
-        return short_wait(line);
+        return usual(line);
     // Not a write: it may need longer, and its outcome is worth waiting for.
     if (urgent && slowest() && group.request.is_read())
-        return std::min(timeout(), short_wait(line));
+        return std::min(response_timeout(), usual(line));
     // A write that is not repeated waits for the configured time: the panel may have become slower,
     // and only the reply shows whether it was executed.
     const bool repeatable = group.request.is_read() || settings_.retry_writes;
-    return repeatable ? timeout() : whole;
+    return repeatable ? response_timeout() : whole;
 }
 
 }  // namespace panelgate::arbiter

@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "panelgate/modbus/request.hpp"
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 

@@ -1,4 +1,5 @@
 #include "panelgate/arbiter/unsolicited.hpp"
+#include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/timing.hpp"
 
 #include <algorithm>
@@ -9,7 +10,6 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
-#include "verdict.hpp"
 
 namespace panelgate::arbiter {
 

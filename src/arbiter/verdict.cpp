@@ -1,5 +1,3 @@
-#include "verdict.hpp"
-
 #include <algorithm>
 #include <cstdlib>
 #include <iterator>
@@ -9,143 +7,9 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/response.hpp"
 
-namespace panelgate::arbiter::explain {
-namespace {
-
-std::string ms(Duration duration) {
-    const auto tenths = duration / 100us;
-    return std::to_string(tenths / 10) + '.' + std::to_string(tenths % 10) + " ms";
-}
-
-/// "read of modbus_tcp 10.0.0.5:50012 to station 17"; a poller's name already says what it polls.
-std::string describe(PriorityClass priority, const std::string& name, std::uint8_t station) {
-    const std::string own = std::string(label(priority)) + " of ";
-    if (name.starts_with(own)) return name;
-    return own + name + " to station " + std::to_string(station);
-}
-std::string describe(const Job& job, const ClientNames& names) {
-    return describe(job.priority, names.of(job.client), job.station);
-}
-
-/// Explains a request that is sent.
-std::string turn(const Reason& reason) {
-    const std::string text =
-        describe(reason.priority, ClientNames::words(reason.client), reason.station) + ": ";
-    const std::string instead =
-        reason.asked_function == 0
-            ? ""
-            : ", instead of function " + std::to_string(reason.asked_function);
-    if (reason.kind == Reason::Kind::again)
-        return text + "attempt " + std::to_string(reason.attempt) + instead;
-    return text + "next in turn after " + ms(reason.waited) + ", " +
-           std::to_string(reason.waiting) + " wait" +
-           (reason.passed_over ? ", ahead of a higher class that has had its turns" : "") +
-           (reason.answers > 1 ? ", answers " + std::to_string(reason.answers) + " requests in one"
-                               : "") +
-           instead;
-}
-
-/// What follows from it (README here: Health and budgets).
-std::string means(Condition condition) {
-    switch (condition) {
-        case Condition::well:
-            return "its reads are retried as configured";
-        case Condition::unheard:
-            return "it has the whole response timeout";
-        case Condition::missed:
-            return "it has as long as it has ever needed, and no retry";
-        case Condition::flaky:
-            return "it has no retry beside others, who do not wait long for it";
-        case Condition::failing:
-            return "no retries, and a fifth of the line's time at most";
-        case Condition::offline:
-            return "only probes are sent";
-    }
-    std::abort();
-}
-
-}  // namespace
-
-Reason start(TimePoint now, const Group& group, const JobQueue& queue, const ClientNames& names) {
-    Reason reason;
-    if (group.learns_for != 0 || !group.confirms.empty() || group.probe) {
-        const bool learns = !group.probe;
-        reason.kind = learns ? Reason::Kind::learns_echo : Reason::Kind::probe;
-        return reason;
-    }
-    const Job& leader = group.jobs.front();
-    reason.kind = group.attempts > 1 ? Reason::Kind::again : Reason::Kind::turn;
-    reason.priority = leader.priority;
-    reason.station = leader.station;
-    reason.asked_function = leader.asked_function;
-    reason.passed_over = queue.last_was_passed_over();
-    reason.attempt = group.attempts;
-    reason.waited = now - leader.arrived;
-    reason.waiting = queue.waiting();
-    reason.answers = group.jobs.size();
-    reason.client = names.name(leader.client);
-    return reason;
-}
-
-std::string offline(TimePoint now, const Job& job, const StationHealth& health,
-                    const ClientNames& names) {
-    return describe(job, names) + " refused: offline after " +
-           std::to_string(health.silent_in_a_row()) + " silent transactions, next probe in " +
-           ms(std::max(health.next_probe() - now, Duration::zero()));
-}
-
-std::string full(const Job& job, const QueueSettings& settings, std::size_t waiting,
-                 const ClientNames& names) {
-    return describe(job, names) + " refused: " + std::to_string(waiting) + " of " +
-           std::to_string(settings.limit) + " wait on this line, at most " +
-           std::to_string(settings.per_client) + " of one client";
-}
-
-std::string shed(const Job& job, const ClientNames& names) {
-    return describe(job, names) + " given up: the queue is full, and its host has the most waiting";
-}
-
-std::string doubted(const Job& job, const ClientNames& names) {
-    return describe(job, names) +
-           " asked once more: its answer repeats an earlier one and may be a duplicate of it";
-}
-
-std::string condition(std::uint8_t station, Condition now) {
-    return "station " + std::to_string(station) + " is " + std::string(label(now)) +
-           " now: " + means(now);
-}
-
-std::string line_rests(Duration rest, const Group& group) {
-    return "only this request is sent for " + ms(rest) + ": station " +
-           std::to_string(group.station) + " did not answer and may do so late";
-}
-
-std::string expired(TimePoint now, const Job& job, bool transmitted, const ClientNames& names) {
-    return describe(job, names) + " given up after " + ms(now - job.arrived) +
-           (transmitted ? ": no answer before its deadline"
-                        : ": it could not end before its deadline");
-}
-
-}  // namespace panelgate::arbiter::explain
-
 namespace panelgate::arbiter {
 
 using fact::when;
-
-std::string text_of(const Reason& reason) {
-    switch (reason.kind) {
-        case Reason::Kind::none:
-            return "";
-        case Reason::Kind::learns_echo:
-            return "a write is next and it is unknown whether this line has an echo";
-        case Reason::Kind::probe:
-            return "the station is offline and its probe is due";
-        case Reason::Kind::again:
-        case Reason::Kind::turn:
-            return explain::turn(reason);
-    }
-    std::abort();
-}
 
 // Handles an attempt's outcome: its jobs are answered or it is retried, and its station is judged.
 
@@ -153,22 +17,10 @@ using Kind = StationEvent::Kind;
 
 namespace {
 
+/// How a failed attempt ended.
 TransactionEnd end_of(Verdict verdict) {
-    switch (verdict) {
-        case Verdict::open:
-            return TransactionEnd::open;
-        case Verdict::replied:
-            return TransactionEnd::ok;
-        case Verdict::silent:
-            return TransactionEnd::timeout;
-        case Verdict::damaged:
-            return TransactionEnd::damaged;
-        case Verdict::wrong:
-            return TransactionEnd::wrong;
-        case Verdict::doubtful:
-            return TransactionEnd::doubtful;
-    }
-    std::abort();
+    if (verdict == Verdict::silent) return TransactionEnd::timeout;
+    return verdict == Verdict::wrong ? TransactionEnd::wrong : TransactionEnd::damaged;
 }
 
 /// True if another attempt could still answer one of the jobs in time.
@@ -236,7 +88,7 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
     const bool overdue = claims.passed && first_sign > station.usual(stations_.slowest());
     const bool like_echo = attempt.may_be_its_echo() && first &&
                            (is_early || echo_memory_.echoes_writes() ||
-                            station.is_far_too_quick(first_sign, stations_.quickest()));
+                            station.is_far_too_quick(first_sign, stations_.times()));
     const bool like_broadcast = first && !refusal && group.doubted.empty() &&
                                 !group.request.is_read() &&
                                 habits.may_answer_broadcast(book.behind_broadcast(now, reply));
@@ -264,12 +116,12 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     const Done done = judge(facts);
     if (done == Done::contested) attempt.reject_contested();
     if (done == Done::reject) attempt.reject_reply();
-    if (done == Done::keep) attempt.keep_candidate(station.needed(), Attempt::Candidate::believed);
-    if (done == Done::ask_again || done == Done::suspect_echo)
-        attempt.keep_candidate(station.needed(), Attempt::Candidate::doubted);
+    const auto keep = [&](Attempt::Candidate as) { attempt.keep_candidate(station.needed(), as); };
+    if (done == Done::keep) keep(Attempt::Candidate::believed);
+    if (done == Done::ask_again) keep(Attempt::Candidate::doubted);
+    if (done == Done::suspect_echo) keep(Attempt::Candidate::echo);
     if (done == Done::hold)
         attempt.keep_candidate(station.replies().holds_answers(now), Attempt::Candidate::held);
-    if (done == Done::suspect_echo) attempt.suspect_echo();
     if (done != Done::accept && (facts & fact::before_end) != 0) attempt.mark_candidate_early();
     attempt.group().odd_pace =
         early && !settings_.paced && !pace_.unbound() && attempt.group().attempts <= 1;
@@ -305,14 +157,14 @@ void Arbiter::settle(TimePoint now) {
     quiet_.rest_until(station.trail_until());
     outbox_.on_answered(now, attempt, think, replied);
     attempt.teach(echo_memory_);
-    if (attempt.echo_is_suspected()) echo_memory_.on_suspected();
+    if (attempt.may_be_echo()) echo_memory_.on_suspected();
     const bool refused = modbus::exception_of(reply).has_value();
     outbox_.report(attempt, refused ? TransactionEnd::exception : TransactionEnd::ok);
     if (!group.confirms.empty()) return confirm(group, reply, attempt.echoed());
     if (refused) {
         give_back(group);
-    } else {
-        admission_.on_read(group, reply, station.settings().max_age);
+    } else if (group.span && station.settings().max_age > Duration::zero()) {
+        memory_.store({group.station, *group.span}, reply, group.started);
     }
     for (const Job& job : group.jobs)
         outbox_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
@@ -344,7 +196,7 @@ void Arbiter::ask_again(TimePoint now) {
     if (active_->candidate_is_early()) pace_.on_doubted();
     active_->remember_doubt();
     Attempt attempt = take_active(now);
-    outbox_.report(attempt, end_of(Verdict::doubtful));
+    outbox_.report(attempt, TransactionEnd::doubtful);
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
     station.replies().on_doubted(stations_.book(), now, group, attempt.timing().sent);
@@ -353,7 +205,7 @@ void Arbiter::ask_again(TimePoint now) {
     finish_barred(group);
     if (group.doubts <= Group::kMostDoubts && in_time(now, group) && !group.abandoned()) {
         if (!group.request.is_read()) return schedule_.retry(now, confirming(group, station), {});
-        outbox_.decide(now, [&] { return explain::doubted(group.jobs.front(), names_); });
+        outbox_.decide(now, Decision::Kind::doubted, group.jobs.front());
         return schedule_.retry(now, std::move(group), station.usual());
     }
     for (const Job& job : group.jobs)
@@ -362,10 +214,8 @@ void Arbiter::ask_again(TimePoint now) {
 
 /// Ends those who may not ask again.
 void Arbiter::finish_barred(Group& group) {
-    for (const Job& job : group.jobs) {
-        if (job.barred) outbox_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
-    }
-    std::erase_if(group.jobs, [](const Job& job) { return job.barred; });
+    for (const Job& job : take_if(group.jobs, [](const Job& one) { return one.barred; }))
+        outbox_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
 }
 
 /// Makes a read for the jobs of this write, whose confirmation may be its echo.
@@ -402,6 +252,7 @@ void Arbiter::learn_from_failure(TimePoint now, const Attempt& attempt, Verdict 
 void Arbiter::fail(TimePoint now, Verdict verdict) {
     Attempt attempt = take_active(now);
     outbox_.on_failed(attempt, verdict);
+    const bool silent = verdict == Verdict::silent;
     outbox_.report(attempt, end_of(verdict));
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
@@ -415,23 +266,24 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
         quiet_.quarantine(now, group.station, *until);
         station.on_line_rests(now, *until - now);
-        outbox_.decide(now, [&] { return explain::line_rests(*until - now, group); });
+        outbox_.decide({.at = now,
+                        .kind = Decision::Kind::line_rests,
+                        .station = group.station,
+                        .time = *until - now});
     }
-    group.silent_after = verdict == Verdict::silent
-                             ? std::min(now - sent, attempt.timing().patience) - latency_
-                             : Duration::zero();
+    group.silent_after =
+        silent ? std::min(now - sent, attempt.timing().patience) - latency_ : Duration::zero();
     group.cut_after = cut_off ? now - sent : Duration::zero();
     finish_barred(group);
-    if (!group.confirms.empty()) {
-        give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);
-    } else if (in_time(now, group) && affordable && station.may_retry(group)) {
-        station.on_retry(verdict == Verdict::silent);
+    const bool again = group.confirms.empty() && in_time(now, group) && affordable;
+    if (again && station.may_retry(group)) {
+        station.on_retry(silent);
         schedule_.retry(now, std::move(group), stations_.patience(now, group));
-    } else if (group.joined()) {
-        station.on_retry(verdict == Verdict::silent);
+    } else if (group.confirms.empty() && group.joined()) {
+        station.on_retry(silent);
         give_back(group);  // health unaffected: the panel may only not answer this length
     } else {
-        give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);
+        give_up(now, group, silent ? Fault::timeout : Fault::damaged);
     }
     explain_condition(now, attempt.group().station, before);
 }
@@ -439,7 +291,8 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
 void Arbiter::explain_condition(TimePoint now, std::uint8_t station, Condition before) {
     const Condition is = stations_.condition(station);
     if (is != before && before != Condition::unheard)
-        outbox_.decide(now, [&] { return explain::condition(station, is); });
+        outbox_.decide(
+            {.at = now, .kind = Decision::Kind::condition, .station = station, .condition = is});
 }
 
 /// The parts of a joined read are sent again, except for clients that have left.
@@ -455,7 +308,7 @@ void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
     if (group.learns_for != 0 && fault != Fault::damaged) {
         // P8: the write never left, and its station is silent.
         const auto asked = [&](const Job& job) { return job.ticket == group.learns_for; };
-        for (const Job& job : backlog.remove_if(asked)) outbox_.finish(job, fault);
+        for (const Job& job : backlog.queue().remove_if(asked)) outbox_.finish(job, fault);
     }
     Station& station = stations_.of(group.station);
     if (group.probe) station.replies().on_probe_unanswered(group.distinct_length);
@@ -463,7 +316,7 @@ void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
     if (!station.on_given_up(now, fault, group.request.is_read())) return;
     if (!station.speculative()) outbox_.event(Kind::offline, group.station);
     const auto theirs = [&](const Job& job) { return job.station == group.station; };
-    for (const Job& job : backlog.remove_if(theirs)) outbox_.finish(job, Fault::offline);
+    for (const Job& job : backlog.queue().remove_if(theirs)) outbox_.finish(job, Fault::offline);
 }
 
 /// Ends the attempt: accounts for its time, and passes on what the echo filter buffered.

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "client_names.hpp"
 #include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/arbiter/counters.hpp"
@@ -122,7 +123,7 @@ std::string without_port(const std::string& name);
 /// The sources of client_shares().
 struct ClientUse {
     const arbiter::BusShares& shares;
-    const arbiter::ClientNames& names;
+    const ClientNames& names;
     const ClientAccounts& accounts;
     DepartedClients& departed;
     Duration busy{};  ///< the line's total

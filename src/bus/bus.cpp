@@ -271,7 +271,7 @@ void Bus::State::record_departure(ClientId client) {
     const auto used = arbiter.shares().of(client);
     const auto totals = clients.of(client);
     if (used.transactions == 0 && totals.requests == 0) return;
-    departed.leave(clock.now(), arbiter.client_names().of(client), used, totals);
+    departed.leave(clock.now(), names.of(client), used, totals);
 }
 
 void Bus::cancel(ClientId client) {
@@ -279,10 +279,11 @@ void Bus::cancel(ClientId client) {
     state_->call(
         [&] { state_->drive.tell([&](TimePoint now) { state_->arbiter.cancel(now, client); }); });
     state_->clients.forget(client);
+    state_->names.forget(client);
 }
 
 void Bus::name_client(ClientId client, std::string name) {
-    state_->arbiter.name_client(client, std::move(name));
+    state_->names.set(client, std::move(name));
 }
 
 LineStatus Bus::status() const {
@@ -301,8 +302,8 @@ LineStatus Bus::status() const {
 
 std::vector<ClientShare> Bus::clients() const {
     const arbiter::Arbiter& arbiter = state_->arbiter;
-    return client_shares({arbiter.shares(), arbiter.client_names(), state_->clients,
-                          state_->departed, arbiter.counters().busy},
+    return client_shares({arbiter.shares(), state_->names, state_->clients, state_->departed,
+                          arbiter.counters().busy},
                          state_->clock.now());
 }
 

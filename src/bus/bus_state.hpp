@@ -11,6 +11,8 @@
 
 #include "accounts.hpp"
 #include "answers.hpp"
+#include "client_names.hpp"
+#include "explain.hpp"
 #include "health_events.hpp"
 #include "line_doctor.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
@@ -79,12 +81,18 @@ struct Bus::State final : public line::Line::Events {
         arbiter.set_latency(line->latency());
     }
     void act(arbiter::Finish& finish);
-    void act(arbiter::Note& note) { book.note(std::move(note)); }
+    void act(arbiter::Note& note) {
+        ClientName client = names.name(note.why.client);
+        book.note(std::move(note), std::move(client));
+    }
     void act(const arbiter::Exchange& exchange) {
         book.end(exchange);
         tell_health(exchange.station);
     }
-    void act(arbiter::Decision& decision) { book.decide(decision.at, std::move(decision.text)); }
+    void act(const arbiter::Decision& decision) {
+        const ClientName client = names.name(decision.client);
+        book.decide(decision.at, text_of(decision, client, settings.arbiter.queue));
+    }
     void act(arbiter::StationEvent& event);
     void tell_health(std::uint8_t station);
     void act(const arbiter::Written& written) {
@@ -124,6 +132,7 @@ struct Bus::State final : public line::Line::Events {
     Account account;
     std::map<std::string, std::uint64_t> denials;  ///< by the name of the rule
     ClientAccounts clients;
+    ClientNames names;
     DepartedClients departed;
     LineDoctor doctor;
     HealthEvents health_events;

@@ -292,7 +292,7 @@ struct ListeningBus::State final : public line::Line::Events {
     HeardStations heard;
     Account account;
     std::map<std::string, std::uint64_t> denials{};  ///< by the name of the rule
-    arbiter::ClientNames names;
+    ClientNames names;
     mutable LineDoctor doctor;
     HealthEvents health_events;
     LoadMeter load;

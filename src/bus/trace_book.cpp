@@ -1,4 +1,5 @@
 #include "trace_book.hpp"
+#include "explain.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -110,8 +111,13 @@ void TraceStore::clear() {
 }
 
 TraceFrame TraceStore::decoded(const RecordedFrame& frame) const {
-    return {frame.sequence,     frame.at,   frame.kind,       bytes_.at(frame.place, frame.size),
-            text_of(frame.why), frame.time, frame.transaction};
+    return {frame.sequence,
+            frame.at,
+            frame.kind,
+            bytes_.at(frame.place, frame.size),
+            text_of(frame.why, frame.client),
+            frame.time,
+            frame.transaction};
 }
 
 TraceDecision TraceStore::decoded(const RecordedDecision& decision) const {
@@ -128,7 +134,7 @@ TraceTransaction TraceStore::decoded(const RecordedTransaction& one) const {
         if (frame.sequence == one.first) {
             made.kind = frame.kind;
             made.reason = reason_of(frame);
-            if (frame.why.client) made.client = *frame.why.client;
+            if (frame.client) made.client = *frame.client;
             made.request = bytes_.at(frame.place, frame.size);
         } else if (frame.kind == FrameKind::reply) {
             made.reply = bytes_.at(frame.place, frame.size);
@@ -281,13 +287,13 @@ std::optional<Incident> IncidentBook::fetch(std::uint64_t id, bool marks) {
 
 namespace {
 
-void log_frame(const std::string& line, const arbiter::Note& note) {
+void log_frame(const std::string& line, const arbiter::Note& note, const ClientName& client) {
     if (!rt::log_enabled(rt::LogLevel::trace)) return;
     rt::log(rt::LogLevel::trace, "frame",
             {{"line", line},
              {"what", std::string(label(note.kind))},
              {"bytes", to_hex(note.bytes)},
-             {"why", text_of(note.why)}});
+             {"why", text_of(note.why, client)}});
 }
 
 bool begins(FrameKind kind) {
@@ -299,8 +305,8 @@ bool begins(FrameKind kind) {
 TraceBook::TraceBook(const Settings& settings, Wall& wall)
     : settings_(settings), wall_(wall), store_(settings.trace), incidents_(settings.incidents) {}
 
-void TraceBook::note(arbiter::Note note) {
-    log_frame(settings_.name, note);
+void TraceBook::note(arbiter::Note note, ClientName client) {
+    log_frame(settings_.name, note, client);
     RecordedFrame frame;
     frame.sequence = ++sequence_;
     frame.at = note.at;
@@ -308,7 +314,8 @@ void TraceBook::note(arbiter::Note note) {
     if (begins(note.kind)) begin(note, frame);
     frame.transaction = current_;
     frame.kind = note.kind;
-    frame.why = std::move(note.why);
+    frame.why = note.why;
+    frame.client = std::move(client);
     const WallTime time = frame.time;
     incidents_.add(frame, note.bytes);
     store_.add(std::move(frame), note.bytes);

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "client_names.hpp"
 #include "panelgate/arbiter/actions.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
@@ -50,6 +51,7 @@ struct RecordedFrame {
     std::uint16_t size = 0;
     FrameKind kind = FrameKind::request;
     arbiter::Reason why{};
+    ClientName client{};  ///< that it was sent for
 };
 struct RecordedDecision {
     std::uint64_t sequence = 0;
@@ -177,8 +179,9 @@ class TraceBook {
   public:
     TraceBook(const Settings& settings, Wall& wall);
 
-    /// A sent frame, or a request heard from another master, begins a transaction.
-    void note(arbiter::Note note);
+    /// A sent frame, or a request heard from another master, begins a transaction. `client`: for
+    /// whom it was sent.
+    void note(arbiter::Note note, ClientName client = {});
     void decide(TimePoint at, const std::string& text);
     /// Ends the transaction with this number; 0: the last one begun.
     void end(const arbiter::Exchange& exchange);

@@ -12,7 +12,11 @@
 #include <utility>
 #include <vector>
 
+#include "panelgate/access/settings.hpp"
+#include "panelgate/base/decimal.hpp"
 #include "panelgate/base/text.hpp"
+#include "panelgate/config/endpoint.hpp"
+#include "panelgate/yaml/document.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 #include "setting_writer.hpp"
 
@@ -21,6 +25,42 @@ namespace panelgate::config {
 /// The words of a key and what they mean; static.
 template <class T, std::size_t N>
 using Words = std::array<std::pair<std::string_view, T>, N>;
+
+// Values as they are written in the file.
+
+inline std::string as_written(std::string text) { return text; }
+inline std::string as_written(double number) { return number_text(number); }
+inline std::string as_written(Duration duration) { return yaml::format_duration(duration); }
+inline std::string as_written(const Decimal& number) { return number.text(); }
+inline std::string as_written(const Network& network) { return network_text(network); }
+inline std::string as_written(const access::Place& place) {
+    return place.first + '/' + std::to_string(place.second);
+}
+template <std::integral Number>
+std::string as_written(Number number) {
+    return std::to_string(number);
+}
+template <class Word>
+    requires std::is_enum_v<Word>
+std::string as_written(Word word) {
+    return std::string(label(word));
+}
+/// "" of nothing.
+template <class Value>
+std::string as_written(const std::optional<Value>& value) {
+    return value ? as_written(*value) : "";
+}
+/// "[a, b]", in the order of the alphabet, as theirs means nothing; "" of an empty list.
+template <class Value>
+std::string as_written(const std::vector<Value>& list) {
+    std::vector<std::string> words;
+    for (const Value& one : list)
+        words.push_back(std::integral<Value> ? as_written(one) : yaml::written(as_written(one)));
+    std::ranges::sort(words);
+    std::string text;
+    for (const std::string& one : words) text += (text.empty() ? "" : ", ") + one;
+    return words.empty() ? "" : '[' + text + ']';
+}
 
 /// One key of a map: a row of its table. S is what the key is read into, V what it is shown of.
 template <class S, class V = S>
@@ -61,7 +101,7 @@ class Keys {
             [=](yaml::MapReader& in, S& into) {
                 return store(in.duration(key, min, max), std::invoke(field, into));
             },
-            [=](const V& of) { return yaml::format_duration(std::invoke(field, of)); });
+            [=](const V& of) { return as_written(std::invoke(field, of)); });
     }
     /// A duration, or `auto` for a member that is empty.
     template <class Field>
@@ -88,7 +128,7 @@ class Keys {
             [=](yaml::MapReader& in, S& into) {
                 return store(in.integer(key, min, max), std::invoke(field, into));
             },
-            [=](const V& of) { return std::to_string(std::invoke(field, of)); });
+            [=](const V& of) { return as_written(std::invoke(field, of)); });
     }
     template <class Field>
     Keys boolean(std::string_view key, Field field, std::string_view text) && {
@@ -107,7 +147,7 @@ class Keys {
             [=](yaml::MapReader& in, S& into) {
                 return store(in.share(key), std::invoke(field, into));
             },
-            [=](const V& of) { return number_text(std::invoke(field, of)); });
+            [=](const V& of) { return as_written(std::invoke(field, of)); });
     }
     /// A value that has none of the words is shown as "".
     template <class Field, class T, std::size_t N>
@@ -125,9 +165,15 @@ class Keys {
                 return found == words.end() ? "" : std::string(found->first);
             });
     }
-    /// A key that code of its own reads.
-    Keys other(std::string_view key, std::string_view text, Shown shown = {}) && {
-        return std::move(*this).add(key, text, {}, std::move(shown));
+    /// A key that code of its own reads, and shows.
+    Keys other(std::string_view key, std::string_view text) && {
+        return std::move(*this).add(key, text, {}, {});
+    }
+    /// The same, shown of a member, or of what a function returns.
+    template <class Field>
+    Keys other(std::string_view key, std::string_view text, Field field) && {
+        return std::move(*this).add(
+            key, text, {}, [=](const V& of) { return as_written(std::invoke(field, of)); });
     }
     /// The key before this is not set where this is false.
     Keys shown_if(std::function<bool(const V&)> is_set) && {

@@ -87,16 +87,25 @@ void load_roles(Loading& loading, MapReader& in, Rule& rule) {
     }
 }
 
-void load_token_names(Loading& loading, MapReader& in, Rule& rule) {
-    std::vector<std::string_view> known;
-    if (loading.config.http) {
-        for (const web::Token& token : loading.config.http->tokens) known.push_back(token.name);
+/// Names that stand elsewhere in the file.
+std::vector<std::string> load_names(Loading& loading, MapReader& in, std::string_view key,
+                                    std::string_view example, std::string_view what,
+                                    const std::vector<std::string>& names) {
+    const std::vector<std::string_view> known(names.begin(), names.end());
+    std::vector<std::string> all;
+    for (const Node* item : in.items(key, example, kAny)) {
+        all.push_back(item->scalar);
+        if (std::ranges::find(names, item->scalar) == names.end())
+            loading.problems.add(item->mark, yaml::no_such(what, item->scalar, known));
     }
-    for (const Node* item : in.items("tokens", "[ops]", kAny)) {
-        rule.tokens.push_back(item->scalar);
-        if (std::ranges::find(known, item->scalar) == known.end())
-            loading.problems.add(item->mark, yaml::no_such("token", item->scalar, known));
-    }
+    return all;
+}
+
+std::vector<std::string> token_names(const Config& config) {
+    std::vector<std::string> all;
+    if (!config.http) return all;
+    for (const web::Token& token : config.http->tokens) all.push_back(token.name);
+    return all;
 }
 
 std::vector<std::string> listener_names(const Config& config) {
@@ -106,16 +115,6 @@ std::vector<std::string> listener_names(const Config& config) {
     if (config.http) all.push_back(config.http->name());
     if (config.mqtt) all.push_back(config.mqtt->broker());
     return all;
-}
-
-void load_listeners(Loading& loading, MapReader& in, Rule& rule) {
-    const std::vector<std::string> names = listener_names(loading.config);
-    const std::vector<std::string_view> known(names.begin(), names.end());
-    for (const Node* item : in.items("listeners", "[\"0.0.0.0:502\"]", kAny)) {
-        rule.listeners.push_back(item->scalar);
-        if (std::ranges::find(known, item->scalar) == known.end())
-            loading.problems.add(item->mark, yaml::no_such("listener", item->scalar, known));
-    }
 }
 
 /// A station's name, or LINE/ID.
@@ -181,9 +180,10 @@ void load_rule(Loading& loading, const Node& node) {
     load_acts(loading, in, rule);
     load_networks(loading, in, "from", rule.from);
     load_roles(loading, in, rule);
-    load_token_names(loading, in, rule);
+    rule.tokens = load_names(loading, in, "tokens", "[ops]", "token", token_names(loading.config));
     rule.faces = words(loading, in, "faces", "[modbus_tcp]", kFaces);
-    load_listeners(loading, in, rule);
+    rule.listeners = load_names(loading, in, "listeners", "[\"0.0.0.0:502\"]", "listener",
+                                listener_names(loading.config));
     load_stations(loading, in, rule);
     load_functions(loading, in, rule);
     load_range(loading, in, rule);

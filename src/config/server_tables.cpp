@@ -12,15 +12,6 @@ namespace {
 
 using yaml::format_duration;
 
-std::string names_text(const std::vector<std::string>& names) {
-    return listed(names, [](const std::string& name) { return yaml::written(name); });
-}
-
-std::string networks_text(const std::vector<Network>& allow) {
-    return listed(allow,
-                  [](const Network& network) { return yaml::written(network_text(network)); });
-}
-
 }  // namespace
 
 const Keys<tcp_server::Settings>& access_keys() {
@@ -30,7 +21,7 @@ const Keys<tcp_server::Settings>& access_keys() {
             .other("lines",
                    "Lines that are served; of a serial master those whose listed stations "
                    "it may ask. Without it all.",
-                   [](const Settings& settings) { return names_text(settings.lines); })
+                   &Settings::lines)
             .other("units",
                    "Further unit ids (0 to 255, of a serial master 1 to 247), each to "
                    "LINE/STATION; needed where two lines have the same station id.")
@@ -90,7 +81,7 @@ const Keys<tcp_server::Settings>& listener_keys() {
             .initially("255")
             .other("allow",
                    "Networks whose clients may connect, such as 192.168.1.0/24. Without it any.",
-                   [](const Settings& settings) { return networks_text(settings.allow); })
+                   &Settings::allow)
             .change_needs(kAllowCloses)
             .integer("max_connections", &Settings::max_connections, 1, 65535,
                      "Most connections of all clients.")
@@ -142,10 +133,7 @@ const Keys<serial_server::Settings>& master_keys() {
             .other("response_timeout",
                    "How long the master waits: what would be sent later is not sent. "
                    "Without it no limit but the deadline.",
-                   [](const Settings& settings) {
-                       const auto& timeout = settings.response_timeout;
-                       return timeout ? format_duration(*timeout) : "";
-                   })
+                   &Settings::response_timeout)
             .change_needs(kOpensPort);
     return kKeys;
 }
@@ -166,14 +154,14 @@ const Keys<web::Settings>& http_keys() {
             .other("hosts",
                    "Its names in URLs, besides its addresses and localhost; another name "
                    "is answered 421. Without it the machine's name.",
-                   [](const Settings& settings) { return names_text(settings.hosts); })
+                   &Settings::hosts)
             .other("cors",
                    "Origins of other sites whose pages may read, such as "
                    "https://scada.plant.example.",
-                   [](const Settings& settings) { return names_text(settings.cors); })
+                   &Settings::cors)
             .other("allow",
                    "Networks whose clients may connect, such as 192.168.1.0/24. Without it any.",
-                   [](const Settings& settings) { return networks_text(settings.allow); })
+                   &Settings::allow)
             .change_needs(kAllowCloses)
             .other("tokens", "Tokens of clients (Authorization: Bearer TOKEN).")
             .other("tls", "HTTPS: only clients that speak TLS are served.")
@@ -336,21 +324,12 @@ const Keys<audit::Settings>& audit_keys() {
 
 namespace {
 
-template <class List>
-std::string words_text(const List& list) {
-    return listed(list, [](const auto& one) { return std::string(label(one)); });
-}
-
-std::string acts_text(const access::Acts& acts) {
+std::vector<access::Act> acts_of(const access::Rule& rule, bool allowed) {
     std::vector<access::Act> all;
     for (const auto act :
          {access::Act::read, access::Act::write, access::Act::broadcast, access::Act::raw})
-        if (acts.has(act)) all.push_back(act);
-    return words_text(all);
-}
-
-std::string place_text(const access::Place& place) {
-    return place.first + '/' + std::to_string(place.second);
+        if (rule.allow == allowed && rule.acts.has(act)) all.push_back(act);
+    return all;
 }
 
 }  // namespace
@@ -378,7 +357,7 @@ const Keys<OwnRole>& own_role_keys() {
                        std::vector<Right> rights;
                        for (const Right right : kAllRights)
                            if (role.rights.has(right)) rights.push_back(right);
-                       return words_text(rights);
+                       return rights;
                    });
     return kKeys;
 }
@@ -392,29 +371,22 @@ const Keys<access::Rule>& rule_keys() {
             .other("allow",
                    "What the rule allows: read, write, broadcast (also a write), raw (also a read "
                    "or a write).",
-                   [](const Rule& rule) { return rule.allow ? acts_text(rule.acts) : ""; })
+                   [](const Rule& rule) { return acts_of(rule, true); })
             .other("deny", "What it denies; a rule has allow or deny.",
-                   [](const Rule& rule) { return rule.allow ? "" : acts_text(rule.acts); })
-            .other("from", "Networks of the clients that it is about. Without it any.",
-                   [](const Rule& rule) { return networks_text(rule.from); })
+                   [](const Rule& rule) { return acts_of(rule, false); })
+            .other("from", "Networks of the clients that it is about. Without it any.", &Rule::from)
             .other("roles",
                    "Roles that it is about: viewer, operator, engineer, admin, one of "
                    "access.roles, or a role of a client's certificate. Modbus clients without one "
                    "are operators.",
-                   [](const Rule& rule) { return names_text(rule.roles); })
-            .other("tokens", "Tokens that it is about, by name.",
-                   [](const Rule& rule) { return names_text(rule.tokens); })
+                   &Rule::roles)
+            .other("tokens", "Tokens that it is about, by name.", &Rule::tokens)
             .other("faces", "Ways in: modbus_tcp (UDP, too), http, mqtt, serial_master.",
-                   [](const Rule& rule) { return words_text(rule.faces); })
+                   &Rule::faces)
             .other("listeners", "Listeners by their address, or serial masters by name.",
-                   [](const Rule& rule) { return names_text(rule.listeners); })
-            .other("stations", "Stations by name, or LINE/ID. Without it all.",
-                   [](const Rule& rule) { return listed(rule.stations, place_text); })
-            .other("functions", "Function codes. Without it all.",
-                   [](const Rule& rule) {
-                       return listed(rule.functions,
-                                     [](std::uint8_t code) { return std::to_string(code); });
-                   })
+                   &Rule::listeners)
+            .other("stations", "Stations by name, or LINE/ID. Without it all.", &Rule::stations)
+            .other("functions", "Function codes. Without it all.", &Rule::functions)
             .other("range",
                    "Items: FIRST-LAST in the panel's notation, such as UW100-UW199, "
                    "TABLE/FIRST-LAST, or a map. Functions without items are among them only where "

@@ -97,7 +97,7 @@ const Keys<Line>& line_keys() {
             .change_needs(kOpensPort)
             .other("timing", "Times of all its stations; a station's own timing overrides them.")
             .other("retries", "Retries of a read; a write is never repeated on its own.",
-                   [](const Line& line) { return std::to_string(line.arbiter.unlisted.retries); })
+                   [](const Line& line) { return line.arbiter.unlisted.retries; })
             .initially("1")
             .other("queue", "Limits of the requests that wait for this line.")
             .other("offline",
@@ -128,7 +128,7 @@ const Keys<SerialFormat>& serial_keys() {
             .integer("baud", &Format::baud, 50, 4'000'000, "Bits per second.")
             .other("data_bits",
                    "Data bits of a character: 8 in RTU; 7 or 8 in ASCII, where 7 is the default.",
-                   [](const Format& format) { return std::to_string(format.data_bits); })
+                   &Format::data_bits)
             .word("parity", &Format::parity, kParityWords, "Of each character.")
             .integer("stop_bits", &Format::stop_bits, 1, 2, "Of each character.");
     return kKeys;
@@ -195,7 +195,7 @@ const Keys<Timing>& timing_keys() {
             .other("adaptive_ceiling",
                    "Longest timeout, of response_timeout: adaptive; not below adaptive_floor. "
                    "Without it the line's timeout, or 500ms.",
-                   [](const Timing& of) { return format_duration(of.settings.response_timeout); })
+                   [](const Timing& of) { return of.settings.response_timeout; })
             .shown_if(is_adaptive)
             .duration_or_auto("frame_gap", &Timing::frame_gap, 0ms, 10s,
                               "Silence between two frames; auto: 3.5 characters (1.75 ms above "
@@ -260,7 +260,7 @@ const Keys<StationBody, StationView>& station_keys() {
     static const auto kKeys =
         Keys<StationBody, StationView>()
             .other("id", "Address of the panel on the line.",
-                   [](const StationView& of) { return std::to_string(of.station.id); })
+                   [](const StationView& of) { return of.station.id; })
             .other("name", "Name of a-z, 0-9 and '-', unique over all lines. Without it LINE-ID.",
                    [](const StationView& of) { return of.station.name; })
             .other("template", "Template whose keys it takes; the station's own keys win.")
@@ -343,40 +343,27 @@ const Keys<points::Point>& point_keys() {
                                                           {"BADC", points::kOrders[1]},
                                                           {"CDAB", points::kOrders[2]},
                                                           {"DCBA", points::kOrders[3]}}};
-    const auto text = [](const auto& number) { return number ? number->text() : ""; };
     static const auto kKeys =
         Keys<Point>()
             .other("name", "Name of a-z, 0-9, '-' and '_', unique in its station.", &Point::name)
             .other("at", "Register or bit in the panel's notation, such as UW100 or 400001.",
                    &Point::at)
-            .other("bit", "One bit of a register; the type is bool then.",
-                   [](const Point& point) {
-                       return point.bit ? std::to_string(*point.bit) : std::string();
-                   })
-            .other("type", "Type of the value. Without it u16; of a bit bool.",
-                   [](const Point& point) { return std::string(label(point.type)); })
-            .other("length", "Characters of a string, two in a register.",
-                   [](const Point& point) { return std::to_string(point.length); })
+            .other("bit", "One bit of a register; the type is bool then.", &Point::bit)
+            .other("type", "Type of the value. Without it u16; of a bit bool.", &Point::type)
+            .other("length", "Characters of a string, two in a register.", &Point::length)
             .word("word_order", &Point::word_order, kOrders,
                   "Order of the bytes of values in registers, not of bits; ABCD: high word first.")
-            .other("scale", "Of numbers: value = raw * scale + offset; not 0.",
-                   [](const Point& point) { return number_text(point.scale); })
+            .other("scale", "Of numbers: value = raw * scale + offset; not 0.", &Point::scale)
             .initially("1")
-            .other("offset", "Of numbers: value = raw * scale + offset.",
-                   [](const Point& point) { return number_text(point.offset); })
+            .other("offset", "Of numbers: value = raw * scale + offset.", &Point::offset)
             .initially("0")
             .other("unit", "Unit, as people write it.", &Point::unit)
-            .other("min", "Of numbers: smallest value that may be written.",
-                   [=](const Point& point) { return text(point.min); })
-            .other("max", "Of numbers: largest value that may be written.",
-                   [=](const Point& point) { return text(point.max); })
+            .other("min", "Of numbers: smallest value that may be written.", &Point::min)
+            .other("max", "Of numbers: largest value that may be written.", &Point::max)
             .boolean("writable", &Point::writable, "Clients may write it.")
             .other("labels", "Of integers: texts of raw numbers, such as {0: off, 1: on}.")
             .other("no_value", "Of numbers: raw ones that mean that there is no value.",
-                   [](const Point& point) {
-                       return listed(point.no_value,
-                                     [](std::int64_t raw) { return std::to_string(raw); });
-                   })
+                   &Point::no_value)
             .duration("every", &Point::every, 1ms, points::kSlowest, "Interval between two reads.");
     return kKeys;
 }

@@ -28,17 +28,6 @@ inline constexpr Words<modbus::HexDigits, 2> kLowerCase{
 
 inline std::string access_text(bool read_only) { return read_only ? "read_only" : "read_write"; }
 
-/// "[a, b]", in the order of the alphabet, as theirs means nothing; "" of an empty list.
-template <class List, class Word>
-std::string listed(const List& list, const Word& word) {
-    std::vector<std::string> words;
-    for (const auto& one : list) words.push_back(word(one));
-    std::ranges::sort(words);
-    std::string text;
-    for (const std::string& one : words) text += (text.empty() ? "" : ", ") + one;
-    return words.empty() ? "" : '[' + text + ']';
-}
-
 // The keys of the configuration: a table a map, in the order in which they are described. Keys that
 // hold a map or a list are rows, too; their own keys have a table of their own.
 

@@ -34,7 +34,6 @@ class Play {
   public:
     Play() {
         arbiter_.on_line_up(now_);
-        for (Client client = 1; client <= 8; ++client) arbiter_.name_client(client, "somebody");
         run();
     }
     void submit(Client client, std::uint8_t station, const modbus::Request& request) {

@@ -56,12 +56,12 @@ class QueueFixture : public testing::Test {
         EXPECT_TRUE(queue_.consistent());
         return ticket;
     }
-    /// Of the next one, 0 when none may run. What peek() shows is what comes.
+    /// Of the next one, 0 when none may run. What choose() shows is what comes.
     Ticket next(const JobQueue::Test& may_run = any) {
-        const Job* shown = queue_.peek(may_run);
-        const Ticket ticket = shown == nullptr ? 0 : shown->ticket;
-        const auto popped = queue_.pop(may_run);
-        EXPECT_EQ(popped ? popped->ticket : 0, ticket);
+        const JobQueue::Choice choice = queue_.choose(may_run);
+        if (choice.job() == nullptr) return 0;
+        const Ticket ticket = choice.job()->ticket;
+        EXPECT_EQ(queue_.take(choice).ticket, ticket);
         EXPECT_TRUE(queue_.consistent());
         return ticket;
     }

@@ -16,7 +16,7 @@
 
 namespace panelgate::arbiter {
 
-/// Why a frame is sent now. text_of() renders it only when a reader asks.
+/// Why a frame is sent now.
 struct Reason {
     enum class Kind : std::uint8_t {
         none,         ///< explain is off, or the frame is not ours
@@ -31,14 +31,11 @@ struct Reason {
     std::uint8_t asked_function = 0;  ///< that the client asked for; 0: the request's own
     bool passed_over = false;         ///< ahead of a higher class that had its turns
     int attempt = 1;
+    std::uint32_t answers = 0;  ///< number of requests it answers
     Duration waited{};
     std::size_t waiting = 0;  ///< requests still queued on the whole line
-    std::size_t answers = 0;  ///< number of requests it answers
-    ClientName client{};      ///< that it is sent for
+    Client client = 0;        ///< that it is sent for
 };
-
-/// Returns the reason as one line, or "" for Kind::none.
-std::string text_of(const Reason& reason);
 
 /// Write these bytes in one piece, now: a frame in the line's mode.
 struct Transmit {
@@ -69,10 +66,28 @@ struct Exchange : TransactionInstants {
     TransactionEnd end = TransactionEnd::open;
     std::uint8_t station = 0;
 };
-/// With Settings::explain: why something is not done now, or not at all. One line.
+/// With Settings::explain: why something is not done now, or not at all.
 struct Decision {
+    enum class Kind : std::uint8_t {
+        // Of a request.
+        offline,     ///< refused; the next probe is due in `time`
+        full,        ///< refused: so many wait
+        shed,        ///< given up for a newcomer
+        doubted,     ///< asked once more: its answer may be a duplicate
+        expired,     ///< given up after `time`: it could not end before its deadline
+        unanswered,  ///< given up after `time`: it was sent, and not answered before its deadline
+        // Of a station.
+        condition,   ///< it has changed
+        line_rests,  ///< only its request is sent for `time`: it may answer late
+    };
     TimePoint at;
-    std::string text;
+    Kind kind = Kind::offline;
+    std::uint8_t station = 0;
+    Client client = 0;  ///< whose request it is
+    PriorityClass priority = PriorityClass::read;
+    Duration time{};
+    std::size_t count = 0;  ///< requests that wait, or silent transactions in a row
+    Condition condition{};  ///< of the station, now
 };
 /// A station changed its health, or shows something that its operator should know.
 struct StationEvent {

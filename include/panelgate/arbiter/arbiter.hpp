@@ -28,40 +28,10 @@
 
 namespace panelgate::arbiter {
 
-/// Admits jobs: assigns ticket and deadline, or answers from memory. Pure.
-class Admission {
-  public:
-    explicit Admission(const Settings& settings)
-        : serial_(settings.serial), deadline_(settings.queue.deadline) {}
-
-    /// Applies to jobs admitted from now on.
-    void apply(const Settings& settings) {
-        serial_ = settings.serial;
-        deadline_ = settings.queue.deadline;
-    }
-    /// Sets the job's ticket, its deadline and start_by: the last moment at which the request, a
-    /// gap and its normal reply still fit before the deadline. Reserving only for the shortest
-    /// reply, an exception, would fill an overloaded line with transactions whose answers come too
-    /// late.
-    void stamp(TimePoint now, Job& job);
-
-    struct FromMemory {
-        Ticket ticket = 0;
-        ReadCache::Hit hit;
-    };
-    /// Returns a recently read value, where the station's max_age allows it. Never for polls, which
-    /// must read new values.
-    std::optional<FromMemory> from_memory(TimePoint now, const Job& job, Duration max_age);
-    /// Stores a read that its station answered; `max_age` is that station's.
-    void on_read(const Group& group, const Bytes& reply, Duration max_age);
-    ReadCache& memory() { return memory_; }
-
-  private:
-    SerialFormat serial_;
-    Duration deadline_;
-    ReadCache memory_;
-    Ticket last_ticket_ = 0;
-};
+/// The last moment at which the job's request, a gap and its normal reply still fit before its
+/// deadline. Reserving only for the shortest reply, an exception, would fill an overloaded line
+/// with transactions whose answers come too late.
+TimePoint latest_start(const SerialFormat& serial, const Job& job);
 
 /// Decides what one line does. Pure: time is an argument, actions are returned by poll_action();
 /// calling on_deadline early or twice is harmless.
@@ -114,9 +84,6 @@ class Arbiter {
     /// The client is gone: its queued jobs are finished as cancelled, without being sent; a request
     /// on the wire is not repeated for it.
     void cancel(TimePoint now, Client client);
-    /// Sets the client's name in explained decisions, until cancel().
-    void name_client(Client client, std::string name) { names_.set(client, std::move(name)); }
-    const ClientNames& client_names() const { return names_; }
     void on_rx(TimePoint now, ByteView bytes);
     void on_deadline(TimePoint now) { step(now); }
     void on_line_up(TimePoint now);
@@ -173,6 +140,8 @@ class Arbiter {
     void check_invariants() const;
 
   private:
+    std::optional<ReadCache::Hit> from_memory(TimePoint now, const Job& job) const;
+    void forget_line();
     void step(TimePoint now);
     bool start_next(TimePoint now);
     void start(TimePoint now, Group group);
@@ -212,10 +181,10 @@ class Arbiter {
     Pace pace_;
     WakeLatency wake_latency_;
     int unusual_ = 0;  ///< replies until exceptions are no longer expected
-    Admission admission_;
+    ReadCache memory_;
+    Ticket last_ticket_ = 0;
     EchoMemory echo_memory_;
     Outbox outbox_;
-    ClientNames names_;
     std::optional<Attempt> active_;
     TimePoint rest_{};  ///< of the wire; kept when the line is reopened
     bool up_ = false;

@@ -65,11 +65,7 @@ struct Group {
     }
     /// Removes and returns the jobs whose own deadline has passed; the others keep waiting.
     Jobs expire(TimePoint now) {
-        const auto late = [&](const Job& job) { return job.deadline <= now; };
-        Jobs expired;
-        std::ranges::copy_if(jobs, std::back_inserter(expired), late);
-        std::erase_if(jobs, late);
-        return expired;
+        return take_if(jobs, [&](const Job& job) { return job.deadline <= now; });
     }
     /// True if a reply that may be a duplicate must be confirmed by asking again: values, for
     /// clients. Exceptions are not asked for again; they may be gone by then.
@@ -216,6 +212,7 @@ class Attempt {
         believed,  ///< it is the answer
         doubted,   ///< the attempt is doubtful
         held,      ///< it is the answer, unless another one differs
+        echo,      ///< the same: it may be the echo, on a line that had none so far
     };
     /// Keeps the reply as a candidate because it may be a duplicate. Nothing else comes: until
     /// `needed` after the request, the longest time the station has needed, or, if doubted, after
@@ -249,11 +246,10 @@ class Attempt {
     bool came_damaged_before() const;
     /// When the candidate came, if the reply repeats it.
     std::optional<TimePoint> first_reply_at() const {
-        return echo_suspected_ ? std::nullopt : first_reply_at_;
+        return may_be_echo() ? std::nullopt : first_reply_at_;
     }
-    /// Marks the candidate as a possible echo, on a line that had none so far.
-    void suspect_echo() { echo_suspected_ = true; }
-    bool echo_is_suspected() const { return echo_suspected_; }
+    /// True if its candidate may have been the echo.
+    bool may_be_echo() const { return kept_ == Candidate::echo; }
     /// Records the doubtful reply in its group.
     void remember_doubt() {
         group_.doubted = std::exchange(candidate_, std::nullopt).value_or(Bytes{});
@@ -329,6 +325,7 @@ class Attempt {
     bool is_stale(TimePoint now, std::size_t size) const;
     /// True if other bytes were heard: the reply may be lost, so wait only the usual time.
     bool in_doubt() const { return framer_.was_damaged() || echo_.mismatch() || disturbed_; }
+    bool is_doubted() const { return kept_ == Candidate::doubted || may_be_echo(); }
     bool is_hearing() const { return framer_.has_pending() || echo_.pending(); }
 
     Group group_;
@@ -368,7 +365,6 @@ class Attempt {
     bool frames_in_front_ = false;    ///< good frames
     bool contested_ = false;
     bool refusal_rejected_ = false;
-    bool echo_suspected_ = false;
     Instead instead_ = Instead::nothing;
     bool refused_other_ = false;
     bool end_confirmed_ = true;

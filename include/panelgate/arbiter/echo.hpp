@@ -88,6 +88,11 @@ bool holds_written(ByteView write, ByteView reply);
 /// The read of what this write names, for holds_written(); empty: none tells.
 std::optional<modbus::Request> read_back(ByteView write);
 
+/// True if the bytes begin with another master's request: not our own frame, which an adapter
+/// configured without echo may return. The reply framer would take a request followed by its reply
+/// for damage.
+bool begins_with_request(ByteView heard, ByteView own, const modbus::CrcOrders& orders);
+
 /// True if two or more consecutive bytes of `heard` also occur in `frame`: part of its echo.
 bool holds_fragment(ByteView heard, ByteView frame);
 

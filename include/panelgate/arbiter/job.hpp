@@ -1,10 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <map>
-#include <memory>
-#include <string>
 #include <utility>
 
 #include "panelgate/base/fault.hpp"
@@ -42,6 +42,8 @@ class TransactionNumbers {
 
 /// Identifies one accepted job; never reused.
 using Ticket = std::uint64_t;
+/// The station id of requests to all.
+inline constexpr std::uint8_t kBroadcast = 0;
 using Client = std::uint64_t;
 /// Where a client comes from: the same for all connections from one address.
 using Host = std::uint64_t;
@@ -75,34 +77,14 @@ struct Job {
 };
 using Jobs = PoolVector<Job>;
 
-/// Null: a client without a name.
-using ClientName = std::shared_ptr<const std::string>;
-
-/// Names of clients for messages. Bounded; a client that has gone is forgotten. Pure.
-class ClientNames {
-  public:
-    static constexpr std::size_t kClients = 8192;
-
-    /// Replaces an earlier name.
-    void set(Client client, std::string name) {
-        const auto known = names_.find(client);
-        if (known == names_.end() && names_.size() >= kClients) return;
-        names_.insert_or_assign(client, std::make_shared<const std::string>(std::move(name)));
-    }
-    void forget(Client client) { names_.erase(client); }
-    /// Returns a name that stays valid after the client has gone.
-    ClientName name(Client client) const {
-        const auto known = names_.find(client);
-        return known == names_.end() ? nullptr : known->second;
-    }
-    std::string of(Client client) const { return words(name(client)); }
-    static std::string words(const ClientName& name) {
-        return name ? *name : "a client without a name";
-    }
-
-  private:
-    std::map<Client, ClientName> names_;
-};
+/// Removes and returns the jobs that match.
+template <class Match>
+Jobs take_if(Jobs& jobs, const Match& match) {
+    Jobs taken;
+    std::ranges::copy_if(jobs, std::back_inserter(taken), match);
+    std::erase_if(jobs, match);
+    return taken;
+}
 
 /// How much of the line's time each client has used (P9). A shared transaction is split equally.
 /// Bounded; a client that has gone is forgotten. Pure.

@@ -62,8 +62,6 @@ class JobQueue {
     Choice choose(const Test& may_run) const;
     /// Takes the job that was chosen and advances the turns. There must be one.
     Job take(const Choice& choice);
-    const Job* peek(const Test& may_run) const;
-    std::optional<Job> pop(const Test& may_run);
     /// Takes the matching first jobs of all lanes for this station, repeatedly until none matches;
     /// `wanted` may depend on what it accepted. Turns do not advance. In order of tickets.
     Jobs take_all(std::uint8_t station, const Test& wanted);
@@ -89,9 +87,7 @@ class JobQueue {
 
   private:
     static constexpr std::size_t kRanks = 3;  ///< probes are not queued
-    /// Keys in order of their turns.
-    template <class Key>
-    using Rounds = std::array<PoolMap<std::uint64_t, Key>, kRanks>;
+    /// Of each class: when the last turn was, or when it came. The least is next.
     using Turns = std::array<std::uint64_t, kRanks>;
     using HostKey =
         std::pair<bool, std::uint64_t>;  ///< whether it is a client without a host, and the id
@@ -101,18 +97,19 @@ class JobQueue {
         std::optional<ReadSpan> span;  ///< of a shareable read
     };
     struct Lane {
-        PoolDeque<Entry> jobs;
+        PoolDeque<Entry> jobs;  ///< in order of tickets
         Turns turns{};
     };
     struct Source {
         PoolMap<std::uint8_t, Lane> lanes;
-        Rounds<std::uint8_t> rounds;
         Turns turns{};
         std::size_t counting = 0;
+
+        /// The first job of this lane, if there is one and order allows it to run, else null.
+        const Job* first(std::uint8_t station) const;
     };
     struct Origin {
         PoolMap<Client, Source> sources;
-        Rounds<Client> rounds;
         Turns turns{};
         std::size_t counting = 0;
     };
@@ -121,62 +118,53 @@ class JobQueue {
         Client client = 0;
         std::uint8_t station = 0;
     };
-    /// Drop order: the greatest is dropped first.
-    struct Merit {
-        bool is_write = false;
-        bool makes_room = false;
-        std::size_t rank = 0;
-        Ticket ticket = 0;
-        bool operator<(const Merit& other) const {
-            return std::tuple(!is_write, makes_room, rank, ticket) <
-                   std::tuple(!other.is_write, other.makes_room, other.rank, other.ticket);
-        }
+    /// A lane, and whose it is.
+    struct Found {
+        Place place;
+        const Origin& origin;
+        const Source& source;
+        const Lane& lane;
     };
+    /// A job that may be dropped: the greatest is.
     struct Victim {
         Place place;
         std::size_t index = 0;
-        Merit merit;
+        bool makes_room = false;
+        bool is_write = false;
+        /// How greedy it is beside the newcomer, what its host has waiting, and its client.
+        std::tuple<int, std::size_t, std::size_t> greed;
+        /// Whether it makes room, its class, and its age. A write goes last.
+        std::tuple<bool, std::size_t, Ticket> merit;
+
+        bool operator<(const Victim& other) const {
+            return std::tuple(greed, !is_write, merit) <
+                   std::tuple(other.greed, !other.is_write, other.merit);
+        }
     };
-    struct Holder {
-        const HostKey& host;
-        const Origin& origin;
-        Client client;
-        const Source& source;
-    };
-    using Ask = InlineFunction<bool(const Holder&), 32>;
 
     static std::size_t rank_of(const Job& job);
-    static bool in_order(const Source& source, std::uint8_t station);
-    const Lane& lane_at(const Place& place) const;
-    bool has_first(const Place& place) const;
-    std::optional<Place> first_of(std::size_t rank, const Test& may_run) const;
+    /// Visits all lanes, until one visit returns true.
+    template <class Visit>
+    bool any_lane(const Visit& visit) const;
+    const Source* find(Client client) const;
     bool is_polls_turn(const Choice& choice, std::size_t top) const;
     void count_turn(const Choice& choice);
-    void move_to_back(const Place& place, std::size_t rank);
 
     static Entry entry_of(Job job);
     HostKey host_of(const Job& job) const;
     Lane& open_lane(const Place& place);
     void insert(Entry entry);
     Job take(const Place& place, std::size_t index);
-    void enlist(const Place& place);
-    void delist(const Place& place);
-    void close(const Place& place);  ///< removes an empty lane
     void count(Client client, int by);
-    void forget(const Entry& entry);
 
-    std::size_t counting_of(Client client) const;
     bool make_room(const Job& newcomer, Jobs& shed);
     std::optional<Victim> find_victim(const Job& newcomer) const;
-    std::optional<Victim> greediest(const Ask& may_lose, const Ask& writes_too) const;
-    std::optional<Victim> victim_of(const Holder& holder, bool writes_too) const;
-    std::optional<Victim> victim_in(const Holder& holder, std::uint8_t station) const;
+    std::optional<Victim> victim_in(const Found& found) const;
     bool source_consistent(Client client, const HostKey& host, const Source& source) const;
 
     QueueSettings settings_;
     PoolMap<HostKey, Origin> hosts_;  ///< no empty entries
-    Rounds<HostKey> rounds_;
-    PoolMap<Client, HostKey> home_;  ///< of clients with waiting jobs
+    PoolMap<Client, HostKey> home_;   ///< of clients with waiting jobs
     WaitingReads reads_;
     PoolMultiset<TimePoint> expiries_;  ///< of all waiting jobs
     std::size_t size_ = 0;
@@ -189,12 +177,17 @@ class JobQueue {
 class JobQueue::Choice {
   public:
     /// Null: none is runnable.
-    const Job* job() const { return job_; }
+    const Job* job() const { return rank_ < kRanks ? first_[rank_].job : nullptr; }
 
   private:
     friend class JobQueue;
-    const Job* job_ = nullptr;
-    std::array<std::optional<Place>, kRanks> first_;  ///< first runnable one of each class
+    struct First {
+        const Job* job = nullptr;  ///< the first runnable one of its class
+        Place place;
+        std::array<std::uint64_t, 3> turn{};  ///< of its host, client and lane
+    };
+    std::array<First, kRanks> first_;
+    std::array<bool, kRanks> waits_{};  ///< one of the class is first in a lane, runnable or not
     std::size_t rank_ = kRanks;
     bool passed_over_ = false;
 };

@@ -29,8 +29,8 @@ class Outbox {
     void apply(const Settings& settings);
 
     std::optional<Action> poll();
-    /// `wire`: the bytes that represent `adu` on the line.
-    void transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire, Reason why);
+    /// `wire`: the bytes that represent `adu` on the line; `why` is told with Settings::explain.
+    void transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire, const Reason& why);
     void finish(const Job& job, Result<Bytes> pdu, bool shared = false);
     void finish_from_memory(Ticket ticket, Bytes pdu, Duration age);
     /// Adds the Exchange of this attempt, with Settings::explain.
@@ -39,12 +39,15 @@ class Outbox {
     /// Adds a Written if the group is a write.
     void written(const Group& group, bool ended);
     void reset(std::string_view why) { actions_.push_back(Reset{why}); }
-    /// Adds one line; `text` is called only with Settings::explain.
-    template <class Text>
-    void decide(TimePoint now, const Text& text) {
-        if (explain_) actions_.push_back(Decision{now, text()});
+    /// Adds a decision, with Settings::explain.
+    void decide(const Decision& decision) {
+        if (explain_) actions_.push_back(decision);
     }
-    bool explains() const { return explain_; }
+    /// ... about this request.
+    void decide(TimePoint now, Decision::Kind kind, const Job& job, Duration time = {},
+                std::size_t count = 0) {
+        decide({now, kind, job.station, job.client, job.priority, time, count});
+    }
 
     // What happened on the wire
     void on_started(TimePoint now, const Job& job);

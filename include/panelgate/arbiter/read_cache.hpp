@@ -85,8 +85,6 @@ class WaitingReads {
     bool frees(Ticket ticket, const ReadSpan& span) const;
     /// Number of reads that count.
     std::size_t counting() const { return widest_.size(); }
-    /// Checks consistency by recomputing. For tests.
-    bool consistent() const;
 
   private:
     /// Spans within another come directly after it, or after others that begin inside it.

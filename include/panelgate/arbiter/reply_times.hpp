@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <utility>
 
@@ -102,52 +103,40 @@ class Drift {
     int ppm_ = 0;
 };
 
-/// The longest of recent values; older ones are forgotten. Pure.
-class Slowest {
+/// The shortest and the longest of recent times: at least of the last kWindow, at most of twice as
+/// many. Pure.
+class RecentTimes {
   public:
-    static constexpr int kWindow =
-        256;  ///< at least the last kWindow values count, at most twice as many
+    static constexpr std::uint64_t kWindow = 256;
+    static constexpr std::uint64_t kEnough = 16;  ///< fewer are not significant
 
-    void add(Duration seen) {
-        newer_ = std::max(newer_, seen);
-        if (++count_ < kWindow) return;
-        count_ = 0;
-        older_ = std::exchange(newer_, Duration::min());
+    void add(Duration time) {
+        newer_.shortest = std::min(newer_.shortest, time);
+        newer_.longest = std::max(newer_.longest, time);
+        if (++seen_ % kWindow == 0) older_ = std::exchange(newer_, {});
     }
-    /// Empty if no value was seen.
-    std::optional<Duration> value() const {
-        const Duration longest = std::max(older_, newer_);
+    /// One that was selected for being long: it says nothing about how short they are.
+    void add_long(Duration time) { newer_.longest = std::max(newer_.longest, time); }
+    /// Empty if none was seen.
+    std::optional<Duration> longest() const {
+        const Duration longest = std::max(older_.longest, newer_.longest);
         return longest == Duration::min() ? std::nullopt : std::optional(longest);
     }
-    /// Enough values were seen that a longer one is an exception.
-    bool is_significant() const { return older_ != Duration::min() || count_ >= kEnough; }
+    std::optional<Duration> shortest() const {
+        if (seen_ == 0) return std::nullopt;
+        return std::min(older_.shortest, newer_.shortest);
+    }
+    /// True if a longer one than longest() is an exception, or a shorter one than shortest().
+    bool is_significant() const { return seen_ >= kEnough; }
 
   private:
-    static constexpr int kEnough = 16;
-    Duration older_ = Duration::min();
-    Duration newer_ = Duration::min();
-    int count_ = 0;
-};
-
-/// The shortest of recent values. Pure.
-class Quickest {
-  public:
-    static constexpr int kEnough = 16;  ///< fewer are not significant
-
-    void add(Duration seen) {
-        slowest_.add(-seen);
-        count_ = std::min(count_ + 1, kEnough);
-    }
-    /// Empty if no value was seen.
-    std::optional<Duration> value() const {
-        const auto longest = slowest_.value();
-        return longest ? std::optional(-*longest) : std::nullopt;
-    }
-    bool known() const { return count_ >= kEnough; }
-
-  private:
-    Slowest slowest_;
-    int count_ = 0;
+    struct Range {
+        Duration shortest = Duration::max();
+        Duration longest = Duration::min();
+    };
+    Range older_;
+    Range newer_;
+    std::uint64_t seen_ = 0;
 };
 
 /// Learns how long a station pauses inside its replies where that is longer than the line's
@@ -262,53 +251,19 @@ class Turnaround {
                           [&](Duration sample) { return sample < bound; }));
         return below <= std::min(rank, count_ - 1);
     }
+    /// What 95 of 100 replies take, once: when that has come near the response timeout (80 %), and
+    /// again after it had gone back (60 %).
+    std::optional<Duration> take_report(Duration timeout) {
+        constexpr double kMost = 0.95;
+        const bool is_near = known() && reaches(kMost, timeout * (reported_ ? 6 : 8) / 10);
+        if (std::exchange(reported_, is_near) || !is_near) return std::nullopt;
+        return quantile(kMost);
+    }
 
   private:
     std::array<Duration, kSamples> samples_{};
     std::size_t next_ = 0;
     std::size_t count_ = 0;
-};
-
-/// A response timeout that follows the turnaround (`response_timeout: adaptive`): the floor plus
-/// twice the time that 98 of 100 replies needed, doubled after each timeout in a row. Never above
-/// the ceiling, which also applies until enough is known. Pure.
-class AdaptiveTimeout {
-  public:
-    AdaptiveTimeout(Duration floor, Duration ceiling) : floor_(floor), ceiling_(ceiling) {}
-
-    void apply(Duration floor, Duration ceiling) {
-        floor_ = floor;
-        ceiling_ = ceiling;
-    }
-    void on_reply() { silent_ = 0; }
-    void on_timeout() { silent_ = std::min(silent_ + 1, 16); }
-    Duration value(const Turnaround& seen) const {
-        if (!seen.known()) return ceiling_;
-        const Duration wanted = (floor_ + 2 * seen.quantile(0.98)) * (1 << silent_);
-        return std::min(wanted, ceiling_);
-    }
-
-  private:
-    Duration floor_;
-    Duration ceiling_;
-    int silent_ = 0;
-};
-
-/// Reports once that a station has come near its response timeout, and again after it had
-/// recovered. Pure.
-class DriftAlarm {
-  public:
-    /// True if it must be reported now: 95 of 100 replies no longer stay below 80 % of the timeout.
-    bool check(const Turnaround& seen, Duration timeout) {
-        if (!seen.known()) return false;
-        constexpr double kMost = 0.95;
-        if (reported_) reported_ = seen.reaches(kMost, timeout * 6 / 10);
-        if (reported_ || !seen.reaches(kMost, timeout * 8 / 10)) return false;
-        reported_ = true;
-        return true;
-    }
-
-  private:
     bool reported_ = false;
 };
 

@@ -68,7 +68,7 @@ class Backlog {
                                    [&](const Group& group) { return group.station == station; });
     }
     std::optional<Group> take_retry(const InlineFunction<bool(const Group&), 48>& may_go);
-    void each_retry(const InlineFunction<void(const Group&), 48>& show) const;
+    const PoolDeque<Group>& retries() const { return retries_; }
 
     /// Takes the retries that no client waits for any more, without their jobs: they count as
     /// failed.
@@ -80,8 +80,6 @@ class Backlog {
     /// answered in time.
     Jobs expire(TimePoint now);
     std::optional<TimePoint> first_expiry() const;
-    /// Removes and returns the matching jobs that wait for their first turn.
-    Jobs remove_if(const JobQueue::Test& match) { return queue_.remove_if(match); }
     /// Removes and returns the matching jobs whose request waits to be sent again.
     Jobs remove_retries(const JobQueue::Test& match);
     /// Removes and returns all jobs.
@@ -133,20 +131,27 @@ class Schedule {
     Jobs give_back(Group& group);
 
   private:
-    std::optional<Group> next_retry(TimePoint now, const Stations& stations, Quiet& quiet);
-    bool others_go_first(TimePoint now, const Stations& stations, const Quiet& quiet) const;
+    /// The line that is free now.
+    struct Line {
+        TimePoint now;
+        Stations& stations;
+        Quiet& quiet;
+        const EchoMemory& echo;
+    };
+    static bool gap_is_over(const Line& line, std::uint8_t station);
+    std::optional<Group> next_retry(const Line& line);
+    std::optional<Group> next_probe(const Line& line) const;
+    Next next_job(const Line& line);
+    std::optional<Next> proof_before(const Line& line, const Job& job) const;
+    std::optional<Next> read_before(const Line& line, const Job& job);
+    bool may_run(const Line& line, const Job& job) const;
+    TimePoint ready_at(const Stations& stations, const Job& job) const;
+    TimePoint repeat_from(const Group& group, const Stations& stations) const;
+    bool can_prove(const OutstandingRequests& book, const Station& station) const;
+    bool others_go_first(const Line& line) const;
     void let_others_go_first(TimePoint now);
     bool has_turn(const Job& job) const;
     void take_turn(const Job& job);
-    std::optional<Group> next_probe(TimePoint now, Stations& stations, Quiet& quiet) const;
-    Next next_job(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo);
-    std::optional<Next> proof_before(TimePoint now, const Job& job, const Stations& stations) const;
-    std::optional<Next> read_before(TimePoint now, const Job& job, Stations& stations,
-                                    const EchoMemory& echo);
-    TimePoint ready_at(const Stations& stations, const Job& job) const;
-    bool can_prove(const OutstandingRequests& book, const Station& station) const;
-    TimePoint repeat_from(const Group& group, const Stations& stations) const;
-    JobQueue::Test runnable(TimePoint now, const Stations& stations, const Quiet& quiet) const;
 
     Quarantine quarantine_;
     bool may_stall_;

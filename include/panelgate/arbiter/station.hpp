@@ -113,19 +113,17 @@ class Station {
     }
     /// True if no recent reply began this soon after the request.
     bool is_quicker_than_ever(Duration first_sign) const {
-        const auto quickest = quickest_.value();
-        return quickest && first_sign < *quickest;
+        const auto shortest = times_.shortest();
+        return shortest && first_sign < *shortest;
     }
-    /// ... by a wide margin; compared with the whole `line` if no reply of the station is
-    /// known.
-    bool is_far_too_quick(Duration first_sign, const Quickest& line) const {
-        const Quickest& seen = quickest_.value() ? quickest_ : line;
-        return seen.value() && first_sign < *seen.value() * 3 / 4;
-    }
-
-    /// ... of its own.
+    /// ... by a wide margin.
     bool is_far_too_quick(Duration first_sign) const {
-        return quickest_.known() && first_sign < *quickest_.value() * 3 / 4;
+        return is_far_too_quick(first_sign, times_);
+    }
+    /// ... compared with the whole `line` if few replies of the station are known.
+    bool is_far_too_quick(Duration first_sign, const RecentTimes& line) const {
+        const RecentTimes& seen = times_.is_significant() ? times_ : line;
+        return seen.is_significant() && first_sign < *seen.shortest() * 3 / 4;
     }
 
     // How to ask it
@@ -144,9 +142,7 @@ class Station {
         return speculative() && !book.any(id()) && now >= asked_ + timing::kForgetUnheard;
     }
     /// True if it missed its last request, and is not offline yet.
-    bool missed_last() const {
-        return (missed_ || health_.silent_in_a_row() > 0) && !health_.offline();
-    }
+    bool missed_last() const { return !is_answering() && !health_.offline(); }
     /// True if it fails repeatedly without being offline.
     bool failing() const { return failed_in_a_row_ >= kFailing && !health_.offline(); }
     /// True if so many recent attempts failed that another failure is expected.
@@ -181,12 +177,15 @@ class Station {
                       bool flaky_beside_others = false) const;
     /// Its longest recent time plus a margin, at most its response timeout. For a station never
     /// heard that of the `line`, if known.
-    Duration usual(std::optional<Duration> line = {}) const { return short_wait(line); }
+    Duration usual(std::optional<Duration> line = {}) const;
     /// ... without that margin, except for receiver buffering.
     Duration needed() const {
         return slowest().value_or(settings_.response_timeout) + timing::kCandidateMargin;
     }
-    Duration response_timeout() const { return timeout(); }
+    /// From the end of a request to the beginning of its reply. Adaptive: the floor and twice the
+    /// time that 98 of 100 replies needed, doubled after each timeout in a row; as configured at
+    /// most, and until enough is known.
+    Duration response_timeout() const;
     /// True if its last replies were as requested: no exceptions, no damage.
     bool answers_as_asked() const { return unusual_ == 0; }
     const Drift& clock_drift() const { return clock_drift_; }
@@ -194,9 +193,9 @@ class Station {
     TimePoint trail_until() const {
         return std::max(trail_.until(), replies_.duplicates_until(trail_.longest()));
     }
-    std::optional<Duration> slowest() const { return slowest_.value(); }
+    std::optional<Duration> slowest() const { return times_.longest(); }
     /// Enough replies have shown how long it may need.
-    bool is_slowest_known() const { return slowest_.is_significant(); }
+    bool is_slowest_known() const { return times_.is_significant(); }
 
     /// End of its last failed attempt.
     TimePoint failed() const { return failed_; }
@@ -211,10 +210,6 @@ class Station {
     static constexpr int kBudgetMemory = 3;     ///< whole timeouts that are remembered
 
   private:
-    Duration timeout() const {
-        return settings_.adaptive_timeout ? adaptive_.value(turnaround_)
-                                          : settings_.response_timeout;
-    }
     /// Time in which its share of the line covers one whole timeout.
     Duration timeout_cost() const {
         return static_cast<int>(1 / ProbeBudget::kFailing) * settings_.response_timeout;
@@ -229,24 +224,20 @@ class Station {
         };
         return std::ranges::equal(place(write.pdu()), place(ignored_));
     }
-    Duration short_wait(std::optional<Duration> line) const;
 
     StationSettings settings_;
     bool listed_;
     ReplyHabits replies_;
     StationHealth health_;
     Turnaround turnaround_;
-    AdaptiveTimeout adaptive_;
-    DriftAlarm drift_;
     Trail trail_;
     ProbeBudget budget_{ProbeBudget::kFailing};   ///< of reads that fail; replies do not reduce it
     ProbeBudget writes_{ProbeBudget::kFailing};   ///< of writes that fail, separate from reads
     ProbeBudget failing_{ProbeBudget::kFailing};  ///< of failures while it is failing()
     std::uint8_t lately_ = 0;  ///< the last 8 attempts, latest lowest: 1 was silent
     TimePoint asked_{};
-    Slowest slowest_;           ///< from request to first sign of the reply
-    Quickest quickest_;         ///< the same
-    Quickest quickest_before_;  ///< without the last reply
+    RecentTimes times_;         ///< from request to first sign of the reply
+    RecentTimes times_before_;  ///< without the last reply
     TimePoint failed_{};
     Drift clock_drift_;
     ReplyHole hole_;

@@ -31,7 +31,7 @@ class Stations {
     /// Silence required before a request to this station and after its reply.
     Duration gap(std::uint8_t id) const;
     /// Longest recent time that any station of the line has needed.
-    std::optional<Duration> slowest() const { return slowest_.value(); }
+    std::optional<Duration> slowest() const { return times_.longest(); }
     /// Unsolicited bytes followed this station's reply.
     void on_trail(TimePoint now, std::uint8_t id) {
         const auto found = stations_.find(id);
@@ -56,6 +56,7 @@ class Stations {
             station.replies().on_damaged_bytes(book_, now, bytes, station.settings().crc_order);
     }
     void on_line_down() {
+        book_.forget_foreign();
         for (auto& [id, station] : stations_) station.on_line_down();
     }
     /// The line was opened, on a transport that may stall.
@@ -74,12 +75,10 @@ class Stations {
     /// `waited`: from request to first sign of the reply; empty: unknown.
     void on_reply(TimePoint now, std::optional<Duration> waited) {
         heard_ = now;
-        if (!waited) return;
-        slowest_.add(*waited);
-        quickest_.add(*waited);
+        if (waited) times_.add(*waited);
     }
-    /// Shortest recent time that any station of the line has needed.
-    const Quickest& quickest() const { return quickest_; }
+    /// Recent times that the stations of the line have needed.
+    const RecentTimes& times() const { return times_; }
 
     /// Time from which no outstanding reply can still come; `may_stall`: on a transport that may
     /// stall, counted from now.
@@ -113,11 +112,6 @@ class Stations {
     TimePoint throttled_until(std::uint8_t id) const;
     /// An attempt that occupied the line for `cost` failed.
     void on_failed(TimePoint now, const Group& group, Verdict verdict, Duration cost);
-    /// True if a waiting read of this station goes before its writes.
-    bool has_read_turn(std::uint8_t id) const {
-        const Station* station = find(id);
-        return station != nullptr && station->has_read_turn();
-    }
 
     /// Returns the listed station, offline or not answering writes, whose probe is most overdue;
     /// empty if none is due.
@@ -162,8 +156,7 @@ class Stations {
     ProbeBudget unheard_{ProbeBudget::kFailing};        ///< all attempts at unheard stations
     ProbeBudget asked_unheard_{ProbeBudget::kUnheard};  ///< except the first at each
     OutstandingRequests book_;
-    Slowest slowest_;
-    Quickest quickest_;
+    RecentTimes times_;
     TimePoint heard_{};         ///< any of them
     TimePoint urgent_until_{};  ///< one just timed out: shorter waits for others
 };

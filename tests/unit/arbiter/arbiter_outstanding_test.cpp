@@ -138,7 +138,7 @@ TEST_F(ArbiterDoubtTest, P1AStationThatRepeatsADoubtfulAnswerSendsTwiceAndRestsF
 class ArbiterOneBehindTest : public ArbiterTest {
   protected:
     ArbiterOneBehindTest() {
-        for (unsigned i = 1; i <= Quickest::kEnough; ++i) {
+        for (unsigned i = 1; i <= RecentTimes::kEnough; ++i) {
             ask(i);
             answer(script, 17, reply_number(i), 20ms);
         }
@@ -320,7 +320,7 @@ TEST_F(ArbiterTest, P1AnAnswerOverTheNextConnectionEndsNoDoubtOfTheOneBefore) {
         answer(script, 17, reply_number(number), 14ms);
         script.run_for(10ms);
     };
-    for (unsigned i = 1; i <= Quickest::kEnough; ++i) read(i);
+    for (unsigned i = 1; i <= RecentTimes::kEnough; ++i) read(i);
     script.submit(17, read_at(30), 1);
     script.run_for(1ms);
     script.line_down();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <variant>
 #include <vector>
 
 #include "arbiter_fixture.hpp"
@@ -24,39 +25,7 @@ Job job_of(const Bytes& pdu, std::uint8_t station = 17) {
     return {.station = station, .request = test::request_of(pdu)};
 }
 
-class AdmissionTest : public testing::Test {
-  protected:
-    AdmissionTest() { admission_.memory().store(*test::read_span(17, kRead), kReply, kNow); }
-    Admission admission_{Settings{}};
-};
-
-TEST_F(AdmissionTest, TicketsAreNeverUsedTwiceAlsoNotForAnswersFromMemory) {
-    Ticket last = 0;
-    for (int i = 0; i < 10; ++i) {
-        Job job = job_of(kRead);
-        admission_.stamp(kNow, job);
-        EXPECT_GT(job.ticket, last);
-        const auto hit = admission_.from_memory(kNow, job, 1s);
-        ASSERT_TRUE(hit);
-        EXPECT_GT(hit->ticket, job.ticket);
-        last = hit->ticket;
-    }
-}
-
-TEST_F(AdmissionTest, P3TheDeadlineCountsFromTheArrivalAndIsEarlierForAClientThatWaitsForLess) {
-    Settings settings;
-    settings.queue.deadline = 700ms;
-    Admission admission(settings);
-    for (const Duration within : {job_of(kRead).within, Duration(300ms), Duration(1h)}) {
-        Job job = job_of(kRead);
-        job.within = within;
-        admission.stamp(kNow, job);
-        EXPECT_EQ(job.arrived, kNow);
-        EXPECT_EQ(job.deadline, kNow + std::min<Duration>(within, 700ms));
-    }
-}
-
-TEST_F(AdmissionTest, P3WhatStartsAtTheLastMomentCanStillBeAnsweredByItsNormalReply) {
+TEST(LatestStart, P3WhatStartsThenCanStillBeAnsweredByItsNormalReply) {
     const Bytes write = Writer().u8(0x10).u16(0).u16(100).u8(200).raw(Bytes(200)).take();
     struct Row {
         int baud;
@@ -74,52 +43,34 @@ TEST_F(AdmissionTest, P3WhatStartsAtTheLastMomentCanStillBeAnsweredByItsNormalRe
         {9600, 0, "06 00 6B 00 01"_hex, 0},  // a broadcast only has to leave
     };
     for (const Row& row : rows) {
-        Settings settings;
-        settings.serial.baud = row.baud;
+        const SerialFormat serial{.baud = row.baud};
         Job job = job_of(row.pdu, row.station);
-        Admission(settings).stamp(kNow, job);
-        const Duration frames = wire_time(settings.serial, row.pdu.size() + 3 + row.reply);
-        const Duration gap = row.reply == 0 ? 0ms : silent_interval(settings.serial);
-        EXPECT_GE(job.deadline - job.start_by, frames + gap) << to_hex(row.pdu);
-        EXPECT_LE(job.deadline - job.start_by, frames + gap + 1us) << to_hex(row.pdu);
+        job.deadline = kNow;
+        const Duration frames = wire_time(serial, row.pdu.size() + 3 + row.reply);
+        const Duration gap = row.reply == 0 ? 0ms : silent_interval(serial);
+        const Duration reserved = kNow - latest_start(serial, job);
+        EXPECT_GE(reserved, frames + gap) << to_hex(row.pdu);
+        EXPECT_LE(reserved, frames + gap + 1us) << to_hex(row.pdu);
     }
 }
 
-TEST_F(AdmissionTest, P6MemoryAnswersOnlyReadsOfClientsAndWhereTheStationAllowsIt) {
-    Job job = job_of(kRead);
-    const auto hit = admission_.from_memory(kNow + 1s, job, 1s);
-    ASSERT_TRUE(hit);
-    EXPECT_EQ(hit->hit.pdu, kReply);
-    EXPECT_EQ(hit->hit.age, Duration(1s));
-    EXPECT_FALSE(admission_.from_memory(kNow, job, 0s));
-    EXPECT_FALSE(admission_.from_memory(kNow, job_of("06 00 6B 00 01"_hex), 1s));
-    EXPECT_FALSE(admission_.from_memory(kNow, job_of(kRead, 18), 1s));
-    job.priority = PriorityClass::poll;
-    EXPECT_FALSE(admission_.from_memory(kNow, job, 1s));
-}
-
-TEST_F(ArbiterTest, P9WhatHasWaitedLongGoesAheadButAWriteStartsWithinTwoTransactions) {
-    settings.queue.deadline = 60s;
-    BusScript script{settings};
-    script.submit(18, kRead, 99);
-    const Ticket poll = script.submit(17, read_at(1), 1, PriorityClass::poll);
-    for (unsigned i = 0; i < 200 && !script.answered(poll); ++i) {
-        if (i % 2 == 0) script.submit(17, read_at(2 + i), 2);
-        if (script.arbiter().queue_depth() < 8) script.submit(17, kWrite, 3, PriorityClass::write);
-        const Bytes adu = script.sent.back().adu;
-        const Bytes request(adu.begin() + 1, adu.end() - 2);
-        answer(script, adu[0], request[0] == 6 ? request : kReply, 10ms);
-        ASSERT_TRUE(script.next_sent());
+TEST_F(ArbiterTest, P3TheDeadlineCountsFromTheArrivalAndIsEarlierForAClientThatWaitsForLess) {
+    settings.queue.deadline = 700ms;
+    for (const Duration within : {job_of(kRead).within, Duration(300ms), Duration(1h)}) {
+        Arbiter arbiter(settings);
+        arbiter.on_line_up(kNow);
+        Job job = job_of(kRead);
+        job.within = within;
+        ASSERT_TRUE(arbiter.submit(kNow, job));
+        TimePoint now = kNow;
+        for (bool answered = false; !answered;) {
+            now = arbiter.next_deadline().value();
+            arbiter.on_deadline(now);
+            while (const auto action = arbiter.poll_action())
+                answered = answered || std::holds_alternative<Finish>(*action);
+        }
+        EXPECT_EQ(now, kNow + std::min<Duration>(within, 700ms));
     }
-    EXPECT_TRUE(script.answered(poll));
-}
-
-TEST_F(ArbiterTest, P9WritesGoBeforeReadsOfOtherClients) {
-    bus.submit(17, kRead, 1);
-    bus.submit(17, kRead, 2);
-    bus.submit(18, kWrite, 3, PriorityClass::write);
-    answer(bus, 17, kReply);
-    EXPECT_EQ(bus.next_sent().value().adu[1], 0x06);
 }
 
 TEST_F(ArbiterTest, P9RefusesAtOnceWhenAQueueIsFull) {
@@ -273,7 +224,7 @@ TEST_F(ArbiterMemoryTest, P6MemoryAnswersAClientButNeverAPoll) {
     EXPECT_EQ(bus.answer(cached).pdu.value(), kReply);
     EXPECT_FALSE(bus.answer(cached).transmitted);
     EXPECT_EQ(bus.sent.size(), 1u);
-    bus.submit(17, kRead, 9, PriorityClass::poll);
+    EXPECT_GT(bus.submit(17, kRead, 9, PriorityClass::poll), cached) << "a ticket of its own";
     EXPECT_EQ(bus.sent.size(), 2u);
     answer(bus, 17, kReply, 3ms);
     bus.run_for(1s);

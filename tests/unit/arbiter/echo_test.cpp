@@ -379,7 +379,7 @@ TEST_F(Echo, P8TheEchoOfAnUnansweredRequestIsNoSignOfLife) {
 class EchoInMidLife : public LearnedEcho {
   protected:
     EchoInMidLife() {
-        for (int i = 0; i < Quickest::kEnough; ++i) read_once(bus, false);
+        for (unsigned i = 0; i < RecentTimes::kEnough; ++i) read_once(bus, false);
         write = bus.submit(17, kWrite);
         hear_echo(bus);
         EXPECT_FALSE(bus.answered(write));
@@ -454,7 +454,7 @@ TEST_F(EchoInMidLife, P2WhereLongWritesAreAnsweredWithoutTheirEchoAReadThatTells
 
 /// An adapter that echoes writes alone, as long after them as the panel takes to answer.
 TEST_F(LearnedEcho, P8WhereALongWriteHasComeBackOneFrameConfirmsNoShortOne) {
-    for (int i = 0; i < Quickest::kEnough; ++i) read_once(bus, false);
+    for (unsigned i = 0; i < RecentTimes::kEnough; ++i) read_once(bus, false);
     const Ticket longer = bus.submit(17, kLongWrite);
     bus.run_to_end_of_request();
     bus.run_for(3ms);

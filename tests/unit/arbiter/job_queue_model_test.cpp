@@ -183,21 +183,21 @@ class JobQueueModel : public testing::Test {
     }
     void pop() {
         const auto test = any_test();
-        const Job* shown = queue_.peek(test);
-        const Ticket ticket = shown == nullptr ? 0 : shown->ticket;
-        const auto popped = queue_.pop(test);
-        ASSERT_EQ(popped ? popped->ticket : 0, ticket);
-        ASSERT_EQ(popped.has_value(), !model_.firsts(test).empty());
-        if (!popped) return;
-        const Job* expected = model_.next(popped->priority, test);
+        const JobQueue::Choice choice = queue_.choose(test);
+        ASSERT_EQ(choice.job() != nullptr, !model_.firsts(test).empty());
+        if (choice.job() == nullptr) return;
+        const Ticket ticket = choice.job()->ticket;
+        const Job popped = queue_.take(choice);
+        ASSERT_EQ(popped.ticket, ticket);
+        const Job* expected = model_.next(popped.priority, test);
         ASSERT_TRUE(expected != nullptr && expected->ticket == ticket);
         bool higher = false;
         for (const auto c : {PriorityClass::write, PriorityClass::read})
-            higher = higher || (c < popped->priority && model_.next(c, test) != nullptr);
+            higher = higher || (c < popped.priority && model_.next(c, test) != nullptr);
         ASSERT_EQ(queue_.last_was_passed_over(), higher);
         overtaken_ += higher ? 1 : 0;
-        model_.popped(*popped);
-        if (below(4) == 0) taken_.push_back(*popped);
+        model_.popped(popped);
+        if (below(4) == 0) taken_.push_back(popped);
     }
     void take_all() {
         const auto test = any_test();

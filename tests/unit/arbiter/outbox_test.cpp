@@ -95,17 +95,6 @@ TEST_F(OutboxTest, ATransactionCostsFromItsFirstBitToTheGapBehindItButNotAClient
     EXPECT_TRUE(outbox.shares().all().empty());
 }
 
-TEST(ClientNames, P9AreBoundedAndTheLastOneCountsUntilTheClientHasGone) {
-    ClientNames names;
-    for (Client client = 1; client <= ClientNames::kClients + 1; ++client) names.set(client, "x");
-    EXPECT_EQ(names.of(ClientNames::kClients), "x");
-    EXPECT_EQ(names.of(ClientNames::kClients + 1), "a client without a name");
-    names.set(1, "y");
-    EXPECT_EQ(names.of(1), "y");
-    names.forget(1);
-    EXPECT_EQ(names.of(1), "a client without a name");
-}
-
 /// With `explain`: each transaction's number, its instants, and how it ended.
 class ExchangeTest : public testing::Test {
   protected:
@@ -211,22 +200,20 @@ TEST_F(ArbiterTest, ExplainsWhyEachRequestGoesNowAndWhyOneIsRefused) {
     settings.queue.per_client = 1;
     settings.stations[0].retries = settings.stations[1].retries = 0;
     BusScript script(settings);
-    script.arbiter().name_client(1, "modbus_tcp 10.0.0.5:50012");
     script.submit(17, kRead, 1);
     script.submit(18, kRead, 2);
     EXPECT_FALSE(script.try_submit(18, "03 00 00 00 03"_hex, 2));
-    EXPECT_EQ(text_of(script.notes[0].why),
-              "read of modbus_tcp 10.0.0.5:50012 to station 17: next in turn after 0.0 ms, 0 wait");
+    EXPECT_EQ(script.notes[0].why.kind, Reason::Kind::turn);
+    EXPECT_EQ(script.notes[0].why.client, 1u);
     ASSERT_EQ(script.decisions.size(), 1u);
-    EXPECT_EQ(
-        script.decisions[0].text,
-        "read of a client without a name to station 18 refused: 1 of 256 wait on this line, at "
-        "most 1 of one client");
+    EXPECT_EQ(script.decisions[0].kind, Decision::Kind::full);
+    EXPECT_EQ(script.decisions[0].client, 2u);
+    EXPECT_EQ(script.decisions[0].count, 1u);
     script.run_for(3s);
     ASSERT_GE(script.decisions.size(), 2u);
-    EXPECT_EQ(
-        script.decisions[1].text,
-        "only this request is sent for 500.0 ms: station 17 did not answer and may do so late");
+    EXPECT_EQ(script.decisions[1].kind, Decision::Kind::line_rests);
+    EXPECT_EQ(script.decisions[1].station, 17);
+    EXPECT_EQ(script.decisions[1].time, Duration(500ms));
 }
 
 TEST_F(ArbiterTest, ExplainsWhyAReadThatWasAnsweredIsAskedOnceMore) {
@@ -238,9 +225,7 @@ TEST_F(ArbiterTest, ExplainsWhyAReadThatWasAnsweredIsAskedOnceMore) {
     }
     ASSERT_TRUE(script.next_sent(100ms));
     ASSERT_EQ(script.decisions.size(), 1u);
-    EXPECT_EQ(script.decisions[0].text,
-              "read of a client without a name to station 17 asked once more: its answer repeats "
-              "an earlier one and may be a duplicate of it");
+    EXPECT_EQ(script.decisions[0].kind, Decision::Kind::doubted);
 }
 
 }  // namespace

@@ -116,24 +116,27 @@ TEST(ReplyEnd, IsNeverFarFromWhatTheRateSays) {
     EXPECT_GE(end.early(10ms), -600us);
 }
 
-TEST(Slowest, IsSignificantAfterSixteenValues) {
-    Slowest slowest;
-    EXPECT_EQ(slowest.value(), std::nullopt);
-    for (int i = 0; i < 15; ++i) slowest.add(2ms);
-    EXPECT_FALSE(slowest.is_significant());
-    for (int i = 0; i < 2 * Slowest::kWindow; ++i) {
-        slowest.add(2ms);
-        ASSERT_TRUE(slowest.is_significant()) << i;
+TEST(RecentTimes, AreSignificantAfterSixteenValues) {
+    RecentTimes times;
+    EXPECT_EQ(times.longest(), std::nullopt);
+    EXPECT_EQ(times.shortest(), std::nullopt);
+    for (int i = 0; i < 15; ++i) times.add(2ms);
+    EXPECT_FALSE(times.is_significant());
+    for (unsigned i = 0; i < 2 * RecentTimes::kWindow; ++i) {
+        times.add(2ms);
+        ASSERT_TRUE(times.is_significant()) << i;
     }
 }
 
-TEST(Slowest, RemembersTheLongestForAWindowAndForgetsItAfterTwo) {
-    Slowest slowest;
-    for (const Duration seen : {3ms, 400ms, 5ms}) slowest.add(seen);
-    for (int i = 0; i < Slowest::kWindow; ++i) slowest.add(2ms);
-    EXPECT_EQ(slowest.value(), 400ms);
-    for (int i = 0; i < Slowest::kWindow; ++i) slowest.add(2ms);
-    EXPECT_EQ(slowest.value(), 2ms);
+TEST(RecentTimes, RememberTheExtremesForAWindowAndForgetThemAfterTwo) {
+    RecentTimes times;
+    for (const Duration seen : {3ms, 400ms, 1ms}) times.add(seen);
+    for (unsigned i = 0; i < RecentTimes::kWindow; ++i) times.add(2ms);
+    EXPECT_EQ(times.longest(), 400ms);
+    EXPECT_EQ(times.shortest(), 1ms);
+    for (unsigned i = 0; i < RecentTimes::kWindow; ++i) times.add(2ms);
+    EXPECT_EQ(times.longest(), 2ms);
+    EXPECT_EQ(times.shortest(), 2ms);
 }
 
 class TrailTest : public testing::Test {
@@ -211,22 +214,7 @@ TEST(Turnaround, ReachesWhatItsQuantilesAreAtLeast) {
     }
 }
 
-TEST(AdaptiveTimeout, FollowsTheTurnaroundBetweenFloorAndCeiling) {
-    AdaptiveTimeout timeout(20ms, 500ms);
-    Turnaround seen;
-    EXPECT_EQ(timeout.value(seen), Duration(500ms)) << "nothing is known yet";
-    for (int i = 0; i < 10; ++i) seen.add(5ms);
-    EXPECT_EQ(timeout.value(seen), Duration(30ms));
-    timeout.on_timeout();
-    EXPECT_EQ(timeout.value(seen), Duration(60ms));
-    for (int i = 0; i < 100; ++i) timeout.on_timeout();
-    EXPECT_EQ(timeout.value(seen), Duration(500ms));
-    timeout.on_reply();
-    EXPECT_EQ(timeout.value(seen), Duration(30ms));
-}
-
-TEST(DriftAlarm, ReportsOnceUntilTheStationHasRecovered) {
-    DriftAlarm alarm;
+TEST(Turnaround, ReportsOnceThatItIsNearTheTimeoutUntilItHasGoneBack) {
     Turnaround seen;
     for (int round = 0; round < 2; ++round) {
         int told = 0;
@@ -234,7 +222,7 @@ TEST(DriftAlarm, ReportsOnceUntilTheStationHasRecovered) {
             EXPECT_EQ(told, 0);
             for (int i = 0; i < 100; ++i) {
                 seen.add(think);
-                told += alarm.check(seen, 100ms) ? 1 : 0;
+                told += seen.take_report(100ms) ? 1 : 0;
             }
         }
         EXPECT_EQ(told, 1);

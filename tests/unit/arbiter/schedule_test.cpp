@@ -130,6 +130,14 @@ TEST_F(ScheduleTest, P4ARetryLeavesTheOthersTurnsByWhatItMayCost) {
     }
 }
 
+TEST_F(ScheduleTest, P8TheReadThatConfirmsAWriteGoesBeforeTheOthers) {
+    wait(2);
+    Group read = failed(1);
+    read.confirms = Bytes{6, 0, 1, 0, 1};
+    schedule.retry(now, std::move(read), {});
+    EXPECT_EQ(order(), "r1 2") << "what they do meanwhile could change what it shows";
+}
+
 TEST_F(ScheduleTest, P4ADearRetryLeavesTheOthersNoMoreTimeThanItMayTake) {
     wait(2);
     wait(3);
@@ -380,7 +388,7 @@ TEST_F(BacklogTest, P3WhatWasSentExpiresOnlyAtItsDeadlineEachJobAtItsOwn) {
 TEST_F(BacklogTest, OnlyWhatWaitsForItsFirstTurnIsRemoved) {
     const Ticket waits = wait(read(1, 17));
     retry({read(1, 17)});
-    EXPECT_EQ(tickets(backlog_.remove_if(test::any)), std::vector<Ticket>{waits});
+    EXPECT_EQ(tickets(backlog_.queue().remove_if(test::any)), std::vector<Ticket>{waits});
     EXPECT_TRUE(backlog_.has_retry(17));
 }
 

@@ -79,6 +79,21 @@ class StationTest : public testing::Test {
     TimePoint now_{1h};
 };
 
+TEST_F(StationTest, AnAdaptiveTimeoutFollowsTheTurnaroundBetweenFloorAndWhatIsConfigured) {
+    StationSettings settings = station_.settings();
+    settings.adaptive_timeout = true;
+    station_.apply(settings, {}, true);
+    EXPECT_EQ(station_.response_timeout(), kTimeout) << "nothing is known yet";
+    for (int i = 0; i < 10; ++i) answer(kRead, kReply);
+    EXPECT_EQ(station_.response_timeout(), settings.timeout_floor + 2 * Duration(25ms));
+    miss(kRead);
+    EXPECT_EQ(station_.response_timeout(), 2 * (settings.timeout_floor + 2 * Duration(25ms)));
+    for (int i = 0; i < 100; ++i) miss(kRead);
+    EXPECT_EQ(station_.response_timeout(), kTimeout);
+    answer(kRead, kReply);
+    EXPECT_EQ(station_.response_timeout(), settings.timeout_floor + 2 * Duration(25ms));
+}
+
 TEST_F(StationTest, P1WithAnOutstandingReplyOnlyTheVerySameMayBeAskedUntilItHasRested) {
     EXPECT_TRUE(may_ask(now_, kOther));
     miss(kRead);

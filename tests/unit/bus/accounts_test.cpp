@@ -23,7 +23,7 @@ class ClientSharesTest : public testing::Test {
         return client_shares({used, names, accounts, departed, busy}, kNow);
     }
     arbiter::BusShares used;
-    arbiter::ClientNames names;
+    ClientNames names;
     ClientAccounts accounts;
     DepartedClients departed;
 };
@@ -136,6 +136,17 @@ TEST_F(ClientSharesTest, TheDepartedAreBoundedInTimeAndNumberAndNothingIsLost) {
     EXPECT_TRUE(departed.rows(kNow + 1h).empty());
     EXPECT_EQ(departed.forgotten().used.busy, Duration(3s));
     EXPECT_EQ(departed.forgotten().totals.requests, 3u);
+}
+
+TEST(ClientNames, P9AreBoundedAndTheLastOneCountsUntilTheClientHasGone) {
+    ClientNames names;
+    for (ClientId client = 1; client <= ClientNames::kClients + 1; ++client) names.set(client, "x");
+    EXPECT_EQ(names.of(ClientNames::kClients), "x");
+    EXPECT_EQ(names.of(ClientNames::kClients + 1), "a client without a name");
+    names.set(1, "y");
+    EXPECT_EQ(names.of(1), "y");
+    names.forget(1);
+    EXPECT_EQ(names.of(1), "a client without a name");
 }
 
 TEST(ClientNames, OfServersClientsHaveAnAddressAndAPort) {

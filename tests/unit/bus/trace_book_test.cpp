@@ -91,7 +91,7 @@ struct Line {
         frame.sequence = ++sequence;
         frame.transaction = id;
         frame.kind = kind;
-        frame.why.client = std::make_shared<const std::string>("http 10.0.0.9");
+        frame.client = std::make_shared<const std::string>("http 10.0.0.9");
         store.add(frame, bytes);
     }
     void end(TransactionEnd how = TransactionEnd::ok) {

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "panelgate/bus/bus_client.hpp"
+
+namespace panelgate::bus {
+
+/// Null: a client without a name.
+using ClientName = std::shared_ptr<const std::string>;
+
+/// Names of clients for messages. Bounded; a client that has gone is forgotten. Pure.
+class ClientNames {
+  public:
+    static constexpr std::size_t kClients = 8192;
+
+    /// Replaces an earlier name.
+    void set(ClientId client, std::string name) {
+        const auto known = names_.find(client);
+        if (known == names_.end() && names_.size() >= kClients) return;
+        names_.insert_or_assign(client, std::make_shared<const std::string>(std::move(name)));
+    }
+    void forget(ClientId client) { names_.erase(client); }
+    /// Returns a name that stays valid after the client has gone.
+    ClientName name(ClientId client) const {
+        const auto known = names_.find(client);
+        return known == names_.end() ? nullptr : known->second;
+    }
+    std::string of(ClientId client) const { return words(name(client)); }
+    static std::string words(const ClientName& name) {
+        return name ? *name : "a client without a name";
+    }
+
+  private:
+    std::map<ClientId, ClientName> names_;
+};
+
+}  // namespace panelgate::bus
