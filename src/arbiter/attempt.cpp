@@ -103,7 +103,7 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
         if (echo_.pending() && !echo_since_) echo_since_ = now;
         return Verdict::open;
     }
-    if (now < timing_.sent) early_ = now;
+    if (now < timing_.sent && !comes_back(rest)) early_ = now;
     if (is_stale(now, rest.size())) {
         disturbed_ = true;
         stale_.insert(stale_.end(), rest.begin(), rest.end());
@@ -120,6 +120,15 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     heard_ = true;
     last_byte_ = now;
     return feed(rest, ends);
+}
+
+/// True if all that has come while the request is leaving is its beginning, these bytes, too.
+bool Attempt::comes_back(ByteView bytes) {
+    const ByteView behind = echo_.frame().subspan(came_back_);
+    if (behind.size() < bytes.size() || !std::ranges::equal(bytes, behind.first(bytes.size())))
+        return false;
+    came_back_ += bytes.size();
+    return true;
 }
 
 /// Drops bytes that are no part of the reply once the silence after them was longer than any inside

@@ -63,7 +63,8 @@ bool ReplyHabits::may_be_duplicate(TimePoint now, const Attempt& attempt, const 
     return is_impossible(attempt, claims, early) ||
            duplicates_.repeats_itself(now, claims.repeated) ||
            duplicates_.suspicious(now, group.request.pdu(), attempt.reply(), claims) ||
-           (quicker && claims.repeats_other);
+           (quicker && claims.repeats_other) ||
+           (attempt.may_have_collided() && claims.repeats && !group.is_values(attempt.reply()));
 }
 
 void ReplyHabits::on_asked(OutstandingRequests& book, TimePoint now, const Group& group,

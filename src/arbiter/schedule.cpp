@@ -339,15 +339,31 @@ std::optional<Schedule::Next> Schedule::read_before(const Line& line, const Job&
     return Next{learning_for(job, line.stations.of(job.station)), false};
 }
 
+/// P9: in the turn of a station's write its read goes first, and the write is next; now and then
+/// its poll goes before its read.
+JobQueue::Choice Schedule::own_turn(const Line& line, JobQueue::Choice next,
+                                    const JobQueue::Test& may_run) const {
+    const Station* const station = line.stations.find(next.job()->station);
+    if (station == nullptr) return next;
+    const auto prefer = [&](bool (*is)(const Job&)) {
+        const auto own = backlog_.queue().choose([&, is](const Job& job) {
+            return job.station == station->id() && is(job) && may_run(job);
+        });
+        if (own.job() != nullptr) next = own;
+    };
+    if (!next.job()->request.is_read() && station->has_read_turn())
+        prefer([](const Job& job) { return job.request.is_read(); });
+    if (next.job()->priority == PriorityClass::read && station->has_poll_turn())
+        prefer([](const Job& job) { return job.priority == PriorityClass::poll; });
+    return next;
+}
+
 Schedule::Next Schedule::next_job(const Line& line) {
     struct {
         bool others;
         bool in_budget = true;
-        std::optional<std::uint8_t> reads_of{};  ///< only of this station
     } wanted{others_go_first(line)};
     const JobQueue::Test test = [&](const Job& job) {
-        if (wanted.reads_of && (job.station != *wanted.reads_of || !job.request.is_read()))
-            return false;
         return (!wanted.others || has_turn(job)) && may_run(line, job) &&
                (!wanted.in_budget || line.stations.may_spend(line.now, job));
     };
@@ -357,12 +373,7 @@ Schedule::Next Schedule::next_job(const Line& line) {
     wanted.in_budget = next.job() != nullptr;
     if (next.job() == nullptr) next = queue.choose(test);
     if (next.job() == nullptr) return {};
-    // P9: in the turn of a station's write its read goes first, and the write is next.
-    const Station* station = line.stations.find(next.job()->station);
-    if (!next.job()->request.is_read() && station != nullptr && station->has_read_turn()) {
-        wanted.reads_of = station->id();
-        if (const auto read = queue.choose(test); read.job() != nullptr) next = read;
-    }
+    next = own_turn(line, next, test);
     if (!gap_is_over(line, next.job()->station)) return {};
     if (auto read = read_before(line, *next.job())) return std::move(*read);
     Job job = backlog_.queue().take(next);

@@ -25,6 +25,7 @@ void Station::on_asked(OutstandingRequests& book, TimePoint now, const Group& gr
     replies_.on_asked(book, now, group, in_transit);
     asked_ = now;
     writes_in_a_row_ = group.request.is_read() ? 0 : std::min(writes_in_a_row_ + 1, kWritesInARow);
+    polls_passed_over_ = group.is_poll() ? 0 : std::min(polls_passed_over_ + 1, kPollsPassedOver);
     if (group.request.is_read()) read_turn_ = wants_check_ = woken_by_write_ = false;
 }
 

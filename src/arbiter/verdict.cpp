@@ -98,14 +98,15 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
     const bool misnumbered = refusal && group.may_doubt_refusal() && first &&
                              habits.may_refuse_other(book, now, claims, group.request.function());
     const bool repeats = station.may_be_duplicate(now, attempt, claims, is_early);
+    const bool may_ask = group.may_doubt(reply) ||
+                         (refusal && group.may_doubt_refusal() && attempt.may_have_collided());
     return fact::answers | when(claims.contested, fact::other_master) |
            when(refuses_other, fact::refuses_other) | when(impossible, fact::impossible) |
            when(overdue, fact::overdue) | when(like_echo, fact::like_echo) |
            when(misnumbered, fact::misnumbered) | when(repeats, fact::repeats) |
            when(like_broadcast, fact::like_broadcast) | when(too_soon, fact::too_soon) |
            when(before_end, fact::before_end) | when(contradicted, fact::contradicted) |
-           when(may_be_followed, fact::may_be_followed) |
-           when(group.may_doubt(reply), fact::may_ask) |
+           when(may_be_followed, fact::may_be_followed) | when(may_ask, fact::may_ask) |
            when(first && attempt.precedes_echo(), fact::before_echo);
 }
 

@@ -258,6 +258,7 @@ Cause cause_of_damage(const Case& c, const Symptoms& s) {
 void find_crc_order(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::wrong_crc_order, named(station)};
     if (s.crc_swapped < bar.enough(3) || s.crc_swapped * 2 <= s.damaged()) return;
+    if (s.crc_swapped <= s.answered) return;  // another order would damage these
     const bool set = c.facts.crc_high_first.contains(station);
     const std::string advice =
         set ? "Leave its `crc_order` out, or set it to `low_first`, the standard's; of the profile "

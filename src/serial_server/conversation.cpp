@@ -14,10 +14,9 @@ namespace {
 /// Bytes that an adapter delivers together (config's reply_hole uses the same).
 constexpr std::size_t kChunk = 32;
 
-EchoState first_state(EchoMode mode) {
-    if (mode == EchoMode::on) return EchoState::present;
-    return mode == EchoMode::off ? EchoState::absent : EchoState::unknown;
-}
+/// So often a write that may be an echo is answered without the panel, in a row: a master may write
+/// the same all the time.
+constexpr int kAgain = 4;
 
 Duration lead(const line::Settings& device) {
     const bool switches = device.rs485.mode != line::Rs485::Mode::off;
@@ -35,9 +34,8 @@ void Conversation::reset() {
     hearing_ = make_hearing(settings_, served_);
     was_silent_ = true;
     unframed_bytes_ = 0;
-    echo_ = {};
-    echo_until_.reset();
-    echo_state_ = first_state(settings_.echo);
+    own_.begin(settings_.echo);
+    confirmed_.reset();
 }
 
 void Conversation::serve(const Units& served) {
@@ -56,12 +54,11 @@ void Conversation::on_line_down() {
 /// Bytes are timestamped when read, not when they arrived: a silence before them counts only if
 /// on_deadline() found it with no bytes pending.
 void Conversation::on_rx(TimePoint now, ByteView bytes) {
-    const ByteView rest = echo_.feed(bytes);
-    if (echo_until_ && echo_.complete()) {
-        if (echo_is_distinct_) echo_state_ = EchoState::present;
-        echo_until_.reset();
+    if (!own_.any()) return hear(now, bytes);
+    for (const std::uint8_t byte : bytes) {
+        const ByteView rest = own_.hear(now, byte, hearing_->pending() == 0);
+        if (!rest.empty()) hear(now, rest);
     }
-    if (!rest.empty()) hear(now, rest);
 }
 
 void Conversation::hear(TimePoint now, ByteView bytes) {
@@ -80,6 +77,7 @@ void Conversation::take_frames() {
 void Conversation::on_frame(modbus::SerialAdu adu) {
     unframed_bytes_ = hearing_->pending();
     if (adu.station != 0 && served_[adu.station]) return ask(std::move(adu));
+    confirmed_.reset();
     supersede();
     if (adu.station != 0) {
         ++counters_.foreign;
@@ -97,11 +95,24 @@ void Conversation::ask(modbus::SerialAdu adu) {
         open_->ended = last_rx_at_;
         return;
     }
+    if (answer_again(adu)) return;
+    confirmed_.reset();
     supersede();
     if (finishing_) return;
     ++counters_.requests;
     open_ = Open{next_ticket_++, adu, last_rx_at_};
     actions_.emplace_back(Ask{open_->ticket, std::move(adu)});
+}
+
+/// The master has not got the answer, or hears another's, or this is the answer's echo: the panel
+/// has done it just now.
+bool Conversation::answer_again(const modbus::SerialAdu& adu) {
+    if (finishing_ || !confirmed_ || confirmed_->request != adu) return false;
+    if (++confirmed_->again > kAgain) return false;
+    ++counters_.requests;
+    ++counters_.repeated;
+    open_ = Open{next_ticket_++, adu, last_rx_at_, confirmed_->reply};
+    return true;
 }
 
 void Conversation::supersede() {
@@ -135,7 +146,7 @@ void Conversation::check_silence(TimePoint now) {
 /// be taken for. Shorter noise is a glitch.
 void Conversation::judge_noise() {
     if (hearing_->pending() > 0) return;
-    disturbed_ = disturbed_ || unframed_bytes_ > 0;
+    if (unframed_bytes_ > 0) own_.disturb();
     if (std::exchange(unframed_bytes_, 0) >= modbus::kMinAdu) supersede();
 }
 
@@ -153,35 +164,33 @@ void Conversation::on_answer(TimePoint now, std::uint64_t ticket, const std::opt
 }
 
 void Conversation::on_deadline(TimePoint now) {
-    if (echo_until_ && now >= *echo_until_) end_echo(now);
+    end_echoes(now);
     check_silence(now);
     try_send(now);
 }
 
 /// Bytes kept as a possible echo were the master's. Damage may have been the echo colliding with a
 /// transmission of the master.
-void Conversation::end_echo(TimePoint now) {
-    const Bytes held = echo_.release();
-    const bool clear = held.empty() && unframed_bytes_ == 0 && !disturbed_;
-    if (clear && echo_is_distinct_ && settings_.echo == EchoMode::automatic)
-        echo_state_ = EchoState::absent;
-    echo_ = {};
-    echo_until_.reset();
+void Conversation::end_echoes(TimePoint now) {
+    if (confirmed_ && now >= confirmed_->until) confirmed_.reset();
+    if (unframed_bytes_ > 0) own_.disturb();
+    const Bytes held = own_.expire(now);
     if (!held.empty()) hear(now, held);
 }
 
-/// If a reply equals its request, its echo looks like a retry: only a line known to have no echo
-/// can distinguish them.
-void Conversation::watch_echo(TimePoint now, const Bytes& sent) {
+/// If a reply equals its request, its echo looks like a retry. No master has sent one before it
+/// could hear the reply.
+void Conversation::watch_echo(const Bytes& sent) {
     const modbus::SerialAdu& request = open_->request;
     const Bytes asked =
         modbus::encode_reply(settings_.access.framing, 0, request.station, request.pdu);
-    echo_is_distinct_ = sent != asked;
-    const bool watch = echo_is_distinct_ || echo_state_ != EchoState::absent;
-    if (!watch) return;
-    echo_ = arbiter::EchoFilter(sent, arbiter::EchoFilter::Expect::perhaps);
-    echo_until_ = std::max(now, tx_done_at_) + settings_.hole;
-    disturbed_ = false;
+    const bool is_distinct = sent != asked;
+    const Duration again = silence_ + wire_time(settings_.device.serial, sent.size());
+    const TimePoint until = tx_done_at_ + settings_.hole;
+    own_.add(sent, is_distinct, tx_done_at_ + again, until);
+    if (is_distinct) return confirmed_.reset();
+    const int before = confirmed_ ? confirmed_->again : 0;
+    confirmed_ = Confirmed{request, sent, until, before};
 }
 
 /// Waits also for pending bytes that may become a frame.
@@ -202,7 +211,7 @@ void Conversation::try_send(TimePoint now) {
     if (open_->is_exception) ++counters_.exceptions;
     const Bytes bytes = *std::move(open_->reply);
     tx_done_at_ = now + lead(settings_.device) + wire_time(settings_.device.serial, bytes.size());
-    watch_echo(now, bytes);
+    watch_echo(bytes);
     open_.reset();
     actions_.emplace_back(Send{bytes});
 }
@@ -215,8 +224,9 @@ std::optional<Action> Conversation::poll_action() {
 }
 
 std::optional<TimePoint> Conversation::next_deadline() const {
-    std::optional<TimePoint> next = echo_until_;
+    std::optional<TimePoint> next = own_.next_deadline();
     const auto add = [&](TimePoint when) { next = next ? std::min(*next, when) : when; };
+    if (confirmed_) add(confirmed_->until);
     if (!was_silent_) add(last_rx_at_ + silence_);
     if (hearing_->pending() > 0) add(last_rx_at_ + pause());
     if (open_ && open_->reply && counters_.up) add(may_send_at());

@@ -8,10 +8,9 @@
 #include <variant>
 
 #include "hearing.hpp"
-#include "panelgate/arbiter/echo.hpp"
+#include "own_replies.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
-#include "panelgate/base/words.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/serial_server/counters.hpp"
 #include "panelgate/serial_server/settings.hpp"
@@ -38,8 +37,9 @@ using Action = std::variant<Ask, ForwardBroadcast, Withdraw, Send>;
 /// The slave side of a serial line: turns a master's frames into requests, one at a time, and
 /// answers into correctly timed replies. A reply is sent after t3.5 of silence, and never once the
 /// master has sent anything else: another frame, or enough bytes for a damaged one. An identical
-/// frame is a retry and gets the first one's answer. Frames of units not served are parsed but not
-/// answered. Pure; a line::Drive machine.
+/// frame is a retry and gets the first one's answer; so does a write that equals its answer and
+/// comes again just behind that, which may be the answer's echo (P2). Frames of units not served
+/// are parsed but not answered. Pure; a line::Drive machine.
 class Conversation {
   public:
     Conversation(const Settings& settings, const Units& served);
@@ -73,15 +73,23 @@ class Conversation {
         std::optional<Bytes> reply{};
         bool is_exception = false;
     };
+    /// A write whose answer is the same.
+    struct Confirmed {
+        modbus::SerialAdu request;
+        Bytes reply;
+        TimePoint until;  ///< its echo may come
+        int again = 0;    ///< so often answered without the panel
+    };
     void hear(TimePoint now, ByteView bytes);
     void take_frames();
     void on_frame(modbus::SerialAdu adu);
     void ask(modbus::SerialAdu adu);
+    bool answer_again(const modbus::SerialAdu& adu);
     void supersede();
     void check_silence(TimePoint now);
     void judge_noise();
-    void end_echo(TimePoint now);
-    void watch_echo(TimePoint now, const Bytes& sent);
+    void end_echoes(TimePoint now);
+    void watch_echo(const Bytes& sent);
     void try_send(TimePoint now);
     Duration pause() const;
     TimePoint may_send_at() const;
@@ -94,15 +102,12 @@ class Conversation {
     std::deque<Action> actions_;
     std::optional<Open> open_;
     std::uint64_t next_ticket_ = 1;
-    TimePoint last_rx_at_{};          ///< last byte received, own echo excluded
+    TimePoint last_rx_at_{};          ///< last byte received, own echoes excluded
     bool was_silent_ = true;          ///< silence since then, already handled
     std::size_t unframed_bytes_ = 0;  ///< bytes since the last good frame
     TimePoint tx_done_at_{};          ///< end of the last transmission
-    arbiter::EchoFilter echo_;        ///< of the last transmission
-    std::optional<TimePoint> echo_until_;
-    bool echo_is_distinct_ = false;  ///< its echo cannot be mistaken for a retry
-    bool disturbed_ = false;         ///< noise since the transmission
-    EchoState echo_state_ = EchoState::unknown;
+    OwnReplies own_;
+    std::optional<Confirmed> confirmed_;  ///< if the master has sent nothing else since
     bool finishing_ = false;
     Counters counters_;
 };

@@ -11,46 +11,13 @@
 
 namespace panelgate::tap {
 
-void GiveUp::seen(Duration interval) {
-    seen_.push_back(interval);
-    if (seen_.size() > kKept) seen_.pop_front();
-    outwaited_.clear();
-}
-
-void GiveUp::outwaited(Duration interval) {
-    outwaited_.push_back(interval);
-    if (outwaited_.size() < kNeeded) return;
-    const Duration waited = *std::ranges::min_element(outwaited_);
-    std::erase_if(seen_, [&](Duration given_up) { return given_up <= waited; });
-    outwaited_.clear();
-    refuted_ = true;
-}
-
-std::optional<Duration> GiveUp::least() const {
-    if (seen_.size() < kNeeded) return std::nullopt;
-    return *std::ranges::min_element(seen_);
-}
-
-void Habits::answered(Duration think) {
-    constexpr int kMemory = 64;  // replies, until one slow reply is nearly forgotten
-    longest_ = longest_ ? std::max(think, *longest_ - (*longest_ - think) / kMemory) : think;
-    usual_ = 0;
-}
-
-bool Habits::answered_as_usual(Duration think) {
-    constexpr int kEnough = 2;
-    constexpr Duration kJitter = 2ms;
-    const bool usual = longest_ && think <= *longest_ + *longest_ / 4 + kJitter;
-    usual_ = usual ? usual_ + 1 : 0;
-    if (usual_ < kEnough) return false;
-    usual_ = 0;
-    return true;
-}
-
 namespace {
 
-/// Shorter than any master's timeout: an adapter's latency timer plus a panel's think time.
+/// Shorter than nearly all masters' timeouts: an adapter's latency timer plus a panel's think time.
 constexpr Duration kQuickest = 30ms;
+
+/// The same, as far as nothing is known of its panel.
+constexpr Duration kAtOnce = 20ms;
 
 ByteView pdu_of(const Piece& piece) { return modbus::pdu_of(piece.bytes); }
 
@@ -60,6 +27,22 @@ bool has_form_of_reply(ByteView frame) {
     if (frame[0] == 0) return false;  // a broadcast has no reply
     const modbus::ReplyLength length = modbus::reply_length(frame);
     return length.kind == modbus::ReplyLength::Kind::by_silence || length.length == frame.size();
+}
+
+bool is_read(ByteView pdu) { return pdu[0] <= modbus::kReadInputRegisters; }
+
+/// True if so many damaged bytes are its reply, which is not owed any more. A few may be lost.
+bool is_damaged_reply(ByteView request, std::size_t damaged) {
+    constexpr std::size_t kLost = 2;
+    const auto expected = modbus::reply_length_from_request(request);
+    return expected && damaged + kLost >= *expected;
+}
+
+/// True if the panel says that it will do it, or is busy with it: the reply may follow.
+bool announces_reply(ByteView reply) {
+    const auto code = modbus::exception_of(reply);
+    return code == static_cast<std::uint8_t>(modbus::ExceptionCode::acknowledge) ||
+           code == static_cast<std::uint8_t>(modbus::ExceptionCode::server_device_busy);
 }
 
 }  // namespace
@@ -79,6 +62,7 @@ void Matcher::on_deadline(TimePoint now) {
     }
     if (asked_ && !candidate_ && cutter_.empty() && now - asked_->end >= settings_.patience)
         give_up(now);
+    if (held_ && cutter_.empty() && now >= held_until_) tell_held();
 }
 
 void Matcher::on_line_down(TimePoint now) {
@@ -88,7 +72,11 @@ void Matcher::on_line_down(TimePoint now) {
         asked_->doubtful = true;
         give_up(now);
     }
-    for (const auto& [id, habits] : habits_) book_.settle(id);
+    tell_held();
+    for (auto& [id, habits] : habits_) {
+        book_.settle(id);
+        habits.owed = 0;
+    }
     noise_ = false;
 }
 
@@ -103,6 +91,7 @@ std::optional<TimePoint> Matcher::next_deadline() const {
     if (!cutter_.empty()) return cutter_.last() + settings_.hole;
     if (candidate_) return resolved_at();
     if (asked_) return asked_->end + settings_.patience;
+    if (held_) return held_until_;
     return std::nullopt;
 }
 
@@ -124,13 +113,22 @@ void Matcher::take(Piece piece) {
     }
 }
 
-/// Decides the candidate by the next piece: if the same bytes follow at once, that is the answer,
-/// and the candidate was the repeated request; if the master goes on sooner than it has waited
-/// before, the candidate was the answer. True if `piece` is consumed.
+/// Decides the candidate by the next piece. True if `piece` is consumed.
 bool Matcher::resolve(Piece& piece) {
-    const Duration waited = candidate_->begin - asked_->end;
-    const Duration behind = piece.begin - candidate_->end;
     Piece candidate = *std::exchange(candidate_, std::nullopt);
+    const bool echo = std::ranges::equal(asked_->pending.pdu, pdu_of(candidate));
+    if (echo ? resolve_echo(candidate, piece) : resolve_read(candidate, piece)) return true;
+    // It was cut as an answer to the request that is answered now.
+    if (piece.kind == Piece::Kind::answer)
+        piece.kind = piece.ambiguous ? Piece::Kind::request : Piece::Kind::reply;
+    return false;
+}
+
+/// If the same bytes follow at once, that is the answer, and the candidate was the repeated
+/// request; if the master goes on sooner than it has waited before, the candidate was the answer.
+bool Matcher::resolve_echo(Piece& candidate, Piece& piece) {
+    const Duration waited = candidate.begin - asked_->end;
+    const Duration behind = piece.begin - candidate.end;
     const bool same = piece.kind != Piece::Kind::damaged && piece.bytes == candidate.bytes;
     if (same && behind <= quick(of(asked_->pending.station))) {
         give_up(piece.begin);
@@ -144,10 +142,33 @@ bool Matcher::resolve(Piece& piece) {
     const bool goes_on =
         known && piece.kind != Piece::Kind::damaged && behind < waited - waited / 4;
     answer(std::move(candidate), !goes_on);
-    // It was cut as an answer to the request that is answered now.
-    if (piece.kind == Piece::Kind::answer)
-        piece.kind = piece.ambiguous ? Piece::Kind::request : Piece::Kind::reply;
     return false;
+}
+
+/// The candidate has the form of a read of the same function. It was one if the same follows, or
+/// what answers it.
+bool Matcher::resolve_read(Piece& candidate, Piece& piece) {
+    const Habits& habits = of(asked_->pending.station);
+    const Duration waited = candidate.begin - asked_->end;
+    const Duration behind = piece.begin - candidate.end;
+    const bool heard = piece.kind != Piece::Kind::damaged;
+    const bool is_asked = habits.has_asked(pdu_of(candidate));
+    const bool same = heard && piece.bytes == candidate.bytes;
+    const bool answers = heard && !same && piece.bytes.front() == candidate.bytes.front() &&
+                         modbus::answers(pdu_of(candidate), pdu_of(piece)) &&
+                         !habits.has_asked(pdu_of(piece));
+    if (!same && !answers) {
+        answer(std::move(candidate), !heard || is_asked || behind >= waited - waited / 4);
+        return false;
+    }
+    give_up(candidate.begin);
+    ask(candidate, false);
+    if (answers) {
+        answer(std::move(piece), !is_asked);
+    } else {
+        on_request(std::move(piece));
+    }
+    return true;
 }
 
 void Matcher::on_answer(Piece piece) {
@@ -163,14 +184,22 @@ void Matcher::on_answer(Piece piece) {
     }
 }
 
-/// Classifies an answer that may also be the repeated request: soon after the request it is the
-/// answer; after the master's timeout the request; in between it is open.
+/// Classifies an answer that may also be a request: at the station's usual time it is the answer,
+/// unless its master is known to ask that; after the master's timeout it is the request; in between
+/// it is open.
 Matcher::Reading Matcher::read(const Piece& piece) const {
     const Habits& habits = habits_.at(asked_->pending.station);
     const Duration waited = piece.begin - asked_->end;
-    const Duration late = patience(habits);
-    if (waited >= late) return Reading::request;
-    return waited <= quick(habits) ? Reading::answer : Reading::open;
+    if (waited >= patience(habits)) return Reading::request;
+    if (habits.has_asked(pdu_of(piece))) return Reading::open;
+    return waited <= usual(habits) ? Reading::answer : Reading::open;
+}
+
+/// The station answers so soon as a rule, and no master repeats a request so soon.
+Duration Matcher::usual(const Habits& habits) const {
+    constexpr Duration kJitter = 2ms;
+    const Duration think = habits.usual_think().value_or(Duration::zero());
+    return std::min(patience(habits), std::max(think + think / 8 + kJitter, kAtOnce));
 }
 
 /// A time that any master waits at least.
@@ -198,22 +227,20 @@ void Matcher::answer(Piece piece, bool in_doubt) {
     const ByteView reply = pdu_of(piece);
     const Duration think = std::max<Duration>(piece.begin - asked.end, Duration::zero());
     const std::uint8_t station = asked.pending.station;
-    const bool late = claims(piece, request).other_outstanding;
-    const bool repeats = habits.repeated && piece.end - *habits.repeated < settings_.late_window;
-    const bool duplicate =
-        repeats && repeats_last(piece) && request != book_.last_reply(station)->pdu;
-    Transaction made;
-    made.station = station;
-    made.request = request;
-    made.reply = copy_of(reply);
-    made.end = End::answered;
+    const arbiter::Claims claimed = claims(piece, request);
     const bool missed_request = asked.damaged_bytes >= modbus::kMinAdu;  // a request, perhaps
     const bool overdue = piece.begin - asked.end >= patience(habits);
     // For a function without a length rule, frames may be missed where an adapter joins them.
     const bool unknown_length =
         !modbus::is_known(request[0]) && (think > kQuickest || std::ranges::equal(reply, request));
-    const bool doubted = in_doubt || unknown_length || late || duplicate || missed_request;
+    const bool doubted = in_doubt || unknown_length || claimed.other_outstanding ||
+                         is_duplicate(piece, request, claimed) || missed_request;
     if (overdue && !doubted) habits.give_up.outwaited(piece.begin - asked.end);
+    Transaction made;
+    made.station = station;
+    made.request = request;
+    made.reply = copy_of(reply);
+    made.end = End::answered;
     made.doubtful = doubted || overdue;
     made.asked = asked.begin;
     made.sent = asked.end;
@@ -221,14 +248,66 @@ void Matcher::answer(Piece piece, bool in_doubt) {
     made.ended = piece.end;
     made.sampled = book_.first_asked(station, request, piece.end - settings_.late_window)
                        .value_or(asked.begin);
-    // A panel answers in order: no earlier reply is outstanding any more.
     if (!made.doubtful) habits.answered(think);
-    if (!made.doubtful || habits.answered_as_usual(think)) book_.settle(station);
-    book_.on_reply(station, piece.end, request, reply);
+    remember(made, in_doubt, claimed.outstanding);
     note(FrameKind::reply, made.station, piece);
-    report(std::move(made));
+    hold(std::move(made));
     noise_ = false;
     last_end_ = piece.end;
+}
+
+/// True if it repeats the reply to another request, and its station is known to send copies.
+bool Matcher::is_duplicate(const Piece& piece, const Bytes& request,
+                           const arbiter::Claims& claimed) const {
+    const std::uint8_t station = piece.bytes.front();
+    const auto repeated = habits_.at(station).repeated;
+    if (!repeated || piece.end - *repeated >= settings_.surplus_memory) return false;
+    return claimed.repeats_other ||
+           (repeats_last(piece) && request != book_.last_reply(station)->pdu);
+}
+
+/// Enters it in the book. A panel answers in order: after a reply that no other request can have
+/// had, no earlier one is outstanding. After another, one reply fewer has come than was asked for,
+/// and each of these requests may be the one without, until the window of the unanswered one is
+/// over.
+void Matcher::remember(const Transaction& made, bool in_doubt, bool outstanding) {
+    Habits& habits = of(made.station);
+    const TimePoint open = made.ended - settings_.late_window;
+    if (outstanding) {
+        if (!book_.first_asked(made.station, made.request, open))
+            book_.on_unanswered(made.station, book_.last_sent(made.station), made.request);
+    } else if (!made.doubtful) {
+        book_.settle(made.station);
+        habits.owed = 0;
+    }
+    const bool unanswered = in_doubt && is_read(made.request);
+    if (unanswered || announces_reply(made.reply)) {
+        book_.on_unanswered(made.station, made.asked, made.request);
+        ++habits.owed;
+    }
+    book_.on_reply(made.station, made.ended, made.request, made.reply);
+    if (!made.doubtful && is_read(made.request) &&
+        has_form_of_reply(modbus::encode_adu(made.station, made.request)))
+        habits.asks(made.request);
+}
+
+/// Another answer would come as late as this station has ever needed.
+void Matcher::hold(Transaction made) {
+    if (made.doubtful) return report(std::move(made));
+    const Duration longest = of(made.station).longest_think().value_or(Duration::zero());
+    const TimePoint latest = made.sent + longest + longest / 4;
+    held_until_ = std::max(latest, made.ended) + kQuickest;
+    held_ = std::move(made);
+}
+
+void Matcher::tell_held() {
+    if (held_) report(*std::exchange(held_, std::nullopt));
+}
+
+/// True if the request that was answered last has another answer now.
+bool Matcher::is_second_answer(const Piece& piece) const {
+    return held_ && held_->station == piece.bytes.front() &&
+           modbus::answers(held_->request, pdu_of(piece));
 }
 
 void Matcher::on_request(Piece piece) {
@@ -261,6 +340,8 @@ bool Matcher::repeats_last(const Piece& piece) const {
 
 /// True if it may be a late reply or a duplicate, by earlier requests and replies.
 bool Matcher::is_old_reply(const Piece& piece) const {
+    const auto known = habits_.find(piece.bytes.front());
+    if (known != habits_.end() && known->second.has_asked(pdu_of(piece))) return false;
     return has_form_of_reply(piece.bytes) && (repeats_last(piece) || claims(piece).outstanding);
 }
 
@@ -280,8 +361,10 @@ void Matcher::give_up_for(const Piece& request) {
 
 void Matcher::give_up(TimePoint now) {
     const Asked asked = *std::exchange(asked_, std::nullopt);
-    of(asked.pending.station).on_unanswered();
-    book_.on_unanswered(asked.pending.station, asked.begin, asked.pending.pdu);
+    if (!is_damaged_reply(asked.pending.pdu, asked.damaged_bytes)) {
+        ++of(asked.pending.station).owed;
+        book_.on_unanswered(asked.pending.station, asked.begin, asked.pending.pdu);
+    }
     Transaction made;
     made.station = asked.pending.station;
     made.request = asked.pending.pdu;
@@ -296,6 +379,7 @@ void Matcher::give_up(TimePoint now) {
 
 void Matcher::ask(const Piece& piece, bool doubtful) {
     const std::uint8_t station = piece.bytes.front();
+    tell_held();
     of(station);  // known from now on
     note(FrameKind::heard_request, station, piece);
     noise_ = false;
@@ -327,13 +411,18 @@ void Matcher::on_reply(Piece piece) {
         of(station).repeated = piece.end;
         return note(FrameKind::copy, station, piece);
     }
+    if (is_second_answer(piece)) {
+        held_->doubtful = true;
+        of(station).repeated = piece.end;
+        book_.on_reply(station, piece.end, held_->request, pdu_of(piece));
+    }
     const bool late = claims(piece).outstanding;
     if (late) close(piece);
     if (!late && asked_ && asked_->pending.station == station) asked_->wrong = true;
     note(late ? FrameKind::late : FrameKind::foreign, station, piece);
 }
 
-/// The late reply closes its request and all earlier ones.
+/// The late reply closes its request and all earlier ones; the last that was owed closes all.
 void Matcher::close(const Piece& piece) {
     const std::uint8_t station = piece.bytes.front();
     const ByteView reply = pdu_of(piece);
@@ -342,6 +431,9 @@ void Matcher::close(const Piece& piece) {
     book_.lapse(station, open);
     book_.close(station, reply, false);
     book_.on_reply(station, piece.end, request, reply);
+    Habits& habits = of(station);
+    habits.owed = std::max(habits.owed - 1, 0);
+    if (habits.owed == 0) book_.settle(station);
 }
 
 void Matcher::on_damaged(Piece piece) {

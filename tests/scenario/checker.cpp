@@ -17,7 +17,10 @@ Checker::Checker(const Plan& plan)
       calm_(plan.is_calm()),
       adaptive_(
           std::ranges::any_of(settings_.stations, &arbiter::StationSettings::adaptive_timeout)),
-      echoes_(plan.line.echo || plan.line.partial_echo > 0),
+      repeats_requests_(std::ranges::any_of(
+          plan.panels, [](const PanelPlan& p) { return p.repeats_request > 0; })),
+      echoes_(plan.line.echo || plan.line.echo_writes || plan.line.partial_echo > 0 ||
+              repeats_requests_),
       watch_(plan_),
       costs_(plan_, watch_) {
     for (const arbiter::StationSettings& station : settings_.stations) {
@@ -187,6 +190,7 @@ void Checker::check_values(TimePoint now, const Open& open, const arbiter::Finis
         // What one copy has displaced comes one late, until the next silence.
         const auto excused = excused_from_.find(open.job.station);
         if (excused != excused_from_.end() && now < excused->second + 1s) return;
+        if (attempt_.imitated && attempt_.station == open.job.station) return void(++excused_);
         const char* fault = truth_.fault_of(read, static_cast<std::uint16_t>(first + i), value);
         if (fault != nullptr && (is_luck(heard_for(open, reply)) || is_padded(open, reply))) return;
         if (fault != nullptr) return fail(fault);

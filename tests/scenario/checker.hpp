@@ -50,6 +50,11 @@ class Checker : public Witness {
         truth_.on_exception(now, station, pdu);
     }
     void on_copy(TimePoint now, std::uint8_t station) override;
+    void on_imitation(std::uint8_t station) override {
+        attempt_.imitated =
+            attempt_.imitated || (!attempt_.answered && attempt_.station == station);
+    }
+    void on_overtaken(ByteView adu) override;
     void on_said(TimePoint now, ByteView bytes) override { truth_.on_said(now, bytes); }
     void on_garbled(TimePoint now) override { garbled_ = now; }
     void on_collision(TimePoint now, std::uint8_t station) override;
@@ -141,6 +146,7 @@ class Checker : public Witness {
     const arbiter::Settings& settings_;
     bool calm_ = false;
     bool adaptive_ = false;
+    bool repeats_requests_ = false;  ///< one panel says them as an adapter does that hears itself
     bool echoes_ = false;
     std::string violation_;
     Truth truth_;
@@ -158,6 +164,7 @@ class Checker : public Witness {
     std::map<std::string, arbiter::Ticket> open_writes_;
     std::unordered_set<std::uint8_t> repeat_writes_;  ///< stations that allow it
     std::unordered_set<std::uint8_t> doublers_;       ///< that were heard to say a reply twice
+    std::unordered_set<std::uint8_t> overtakers_;     ///< that were heard to answer out of order
     std::unordered_set<std::uint8_t> retried_;        ///< whose last request was a retry
     std::map<std::uint8_t, Bytes> asked_;             ///< what each station was asked last
     std::map<Bytes, TimePoint> spread_;  ///< when broadcasts had left, by what would answer them

@@ -73,6 +73,17 @@ void Checker::on_copy(TimePoint now, std::uint8_t station) {
     excused_from_[station] = now;
 }
 
+/// Where it has the form of the answer to the last request, it is that for anybody, until one has
+/// come that has not.
+void Checker::on_overtaken(ByteView adu) {
+    const std::uint8_t station = adu[0];
+    if (!modbus::answers(asked_[station], adu.subspan(1, adu.size() - 3))) {
+        overtakers_.insert(station);
+    } else if (!overtakers_.contains(station) && attempt_.station == station) {
+        attempt_.imitated = attempt_.imitated || !attempt_.answered;
+    }
+}
+
 /// Bytes without a pause for longer than any frame: nobody's answer, and no reason to wait
 /// (LAT-02).
 bool Checker::is_noisy(TimePoint now) const {
@@ -111,6 +122,7 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     attempt_.answered = station == kBroadcast;
     attempt_.first = false;
     attempt_.heard = false;
+    attempt_.imitated = false;
     attempt_.span = test::read_span(station, pdu);
     attempt_.again = what == FrameKind::retry;
     const Bytes before = std::exchange(asked_[station], Bytes(pdu.begin(), pdu.end()));
@@ -193,8 +205,9 @@ void Checker::check_idling(TimePoint now) {
     // An answer that repeats another one may be held back for as long as its station needs: it
     // could be a copy of that, with its own still to come (P1). Values are not handed on then, but
     // asked for once more. So may a station's very first that
-    // equals its request, for a timeout: it could be the echo (P8).
-    const bool is_echo = attempt_.first && told_ < heard_until_;
+    // equals its request, for a timeout: it could be the echo (P8); so could each, until replies of
+    // others have shown that only one panel repeats requests.
+    const bool is_echo = (attempt_.first || repeats_requests_) && told_ < heard_until_;
     const Duration needs = is_echo ? settings_of(attempt_.station).response_timeout
                                    : watch_.own_slowest(attempt_.station);
     const TimePoint held = heard_until_ + needs + 20ms;

@@ -19,11 +19,12 @@ struct Attempt {
     bool was_silent = false;  ///< the station was silent before
     bool trusted = false;     ///< it answered the last time
     bool answered = true;
-    bool first = false;  ///< by the first answer of its station
-    bool heard = false;  ///< anything
-    bool again = false;  ///< it was on the wire before
-    bool same = false;   ///< its station was asked the very same before
-    bool owed = false;   ///< an earlier one may still be answered
+    bool first = false;     ///< by the first answer of its station
+    bool heard = false;     ///< anything
+    bool again = false;     ///< it was on the wire before
+    bool same = false;      ///< its station was asked the very same before
+    bool owed = false;      ///< an earlier one may still be answered
+    bool imitated = false;  ///< what had the form of its answer, and was none, came before that
     std::optional<arbiter::ReadSpan> span;
 };
 

@@ -11,6 +11,18 @@ struct Row {
     void (*make)(Plan& all, PanelPlan& panel);
 };
 
+/// Its client asks the very same without a pause, so that what is left over of a request meets the
+/// next one.
+void imitate(Plan& all, PanelPlan& panel, bool last) {
+    panel.imitates = 2s;
+    panel.imitates_last = last;
+    panel.overtakes = true;
+    panel.think = 100ms;
+    all.clients.back().same_read = last;
+    all.clients.back().writes = 0;
+    all.clients.back().pause = {};
+}
+
 constexpr Row kRows[] = {
     {Oddity::none, "none",
      [](Plan&, PanelPlan&) {
@@ -59,6 +71,38 @@ constexpr Row kRows[] = {
          p.max_registers = 20;
          p.refusal = 0;
      }},
+    {Oddity::unasked, "unasked", [](Plan& all, PanelPlan& p) { imitate(all, p, false); }},
+    {Oddity::repeats_last, "repeats_last", [](Plan& all, PanelPlan& p) { imitate(all, p, true); }},
+    {Oddity::writes_echoed, "writes_echoed",
+     [](Plan& all, PanelPlan& p) {
+         all.line.echo_writes = true;
+         all.settings.echo = EchoMode::automatic;
+         p.deaf_to_writes = 0.3;
+     }},
+    {Oddity::broadcasts_late, "broadcasts_late",
+     [](Plan& all, PanelPlan& p) {
+         p.answers_broadcasts = true;
+         p.broadcast_think = 150ms;
+         p.deaf_to_writes = 0.3;
+         for (ClientPlan& client : all.clients) client.broadcasts = 0.02;
+     }},
+    {Oddity::repeats_requests, "repeats_requests",
+     [](Plan&, PanelPlan& p) { p.repeats_request = 0.3; }},
+    {Oddity::overtakes, "overtakes",
+     [](Plan&, PanelPlan& p) {
+         p.overtakes = true;
+         p.late = 0.3;
+         p.late_limit = 1.8;
+     }},
+    {Oddity::outlives_connection, "outlives_connection",
+     [](Plan& all, PanelPlan& p) {
+         all.settings.may_stall = true;
+         all.settings.paced = false;
+         all.line.losses = 0.3;
+         p.any_connection = true;
+         p.late = 0.2;
+         p.late_limit = 1.8;
+     }},
 };
 
 const Row& row_of(Oddity oddity) { return *std::ranges::find(kRows, oddity, &Row::oddity); }
@@ -72,6 +116,7 @@ Plan without_oddity(Plan plan) {
     plain.think = plan.panels.back().think;
     plan.panels.back() = plain;
     plan.line.babble = {};
+    plan.line.echo_writes = false;
     return plan;
 }
 

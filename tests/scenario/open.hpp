@@ -23,6 +23,12 @@ struct OpenViolation {
 ///   - A reply with more values than were asked for, right count and good CRC: byte for byte the
 ///     late one to an earlier request of that length, or the answer to the present one
 ///     (Checker::is_padded(), looks_late()).
+///   - A frame that nobody asked for, of the form of the awaited reply, while that is thought
+///   about:
+///     to this question alone (Checker::on_imitation()). What it leaves over to the next ones comes
+///     much sooner than the panel has ever answered, which 24 replies have shown before.
+///   - A reply that a later one has overtaken, of the form of the awaited one: stations serve in
+///     order, until one has come that fits the last request in no way (Checker::on_overtaken()).
 inline constexpr auto kOpenViolations = std::to_array<OpenViolation>({
     // A reader's station rests in some of the turns, and its own writers have those that are left.
     {"company", "P9: five writes in a row"},

@@ -51,6 +51,8 @@ void Panel::hear(ByteView adu, std::uint64_t connection) {
         return;
     }
     if (random_.chance(plan_.drop)) return;
+    if (pdu[0] > 4 && plan_.deaf_to_writes > 0 && random_.chance(plan_.deaf_to_writes)) return;
+    if (plan_.overtakes) return begin({{pdu.begin(), pdu.end()}, agenda_.now(), connection});
     if (busy_ && (!plan_.ring || waiting_.size() >= kRing)) return;
     waiting_.push_back({{pdu.begin(), pdu.end()}, agenda_.now(), connection});
     if (!busy_) serve_next();
@@ -96,6 +98,7 @@ void Panel::begin(Request request) {
     const bool silent = request.pdu[0] <= 4 && is_silent_to(word(request.pdu, 3));
     const Bytes reply = silent ? Bytes{} : serve(request.pdu);
     const bool mute = silent || random_.chance(plan_.mute);
+    imitate(request, thinking);
     agenda_.at(agenda_.now() + thinking, [this, request = std::move(request), reply, mute] {
         if (mute || is_dead()) {
             serve_next();
@@ -105,12 +108,45 @@ void Panel::begin(Request request) {
     });
 }
 
+void Panel::imitate(const Request& request, Duration thinking) {
+    constexpr unsigned kElsewhere = 500;
+    constexpr unsigned kKnown = 24;  // replies, by which anybody may know its pace
+    const bool moves = request.pdu[0] <= 4 && word(request.pdu, 1) < kElsewhere;
+    if (plan_.imitates == Duration{} || !moves || served_ < kKnown ||
+        agenda_.now() < imitated_ + plan_.imitates)
+        return;
+    Bytes elsewhere = request.pdu;
+    elsewhere[1] = kElsewhere >> 8;
+    const Bytes reply = plan_.imitates_last ? last_reply_ : read(elsewhere);
+    if (reply.empty() || reply[0] != request.pdu[0]) return;
+    imitated_ = agenda_.now();
+    Said said;
+    said.bytes = spoken(line_.serial, plan_.id, reply, plan_.crc_order);
+    said.rate = plan_.own_rate;
+    said.station = plan_.id;
+    said.imitation = true;
+    said.connection = request.connection;
+    agenda_.at(agenda_.now() + thinking * 2 / 5, [this, said] { wire_.say(said); });
+}
+
 void Panel::answer(const Request& request, const Bytes& reply) {
     const Duration timeout = line_.unlisted.response_timeout;
     const Duration since = agenda_.now() - request.arrived;
     // What is late already says nothing but the reply.
     const Duration spare = timeout - since - silent_interval(line_.serial);
-    say_all(voice_.speak(reply, spare), 0, request.connection);
+    last_reply_ = reply;
+    std::vector<Utterance> all = voice_.speak(reply, spare);
+    for (Utterance& one : all) one.said.overtaken = request.arrived < answered_;
+    answered_ = std::max(answered_, request.arrived);
+    if (plan_.repeats_request > 0 && random_.chance(plan_.repeats_request)) {
+        Said said;
+        said.bytes = spoken(line_.serial, plan_.id, request.pdu, plan_.crc_order);
+        said.rate = plan_.own_rate;
+        said.station = plan_.id;
+        all.front().pause = silent_interval(line_.serial);
+        all.insert(all.begin(), {Duration{}, std::move(said)});
+    }
+    say_all(std::move(all), 0, plan_.any_connection ? wire_.connection() : request.connection);
 }
 
 /// One piece after another; the last one is the gap.

@@ -43,6 +43,7 @@ class Panel {
     void answer(const Request& request, const Bytes& reply);
     void say_all(std::vector<Utterance> all, std::size_t next, std::uint64_t connection);
     void answer_broadcast(ByteView pdu, std::uint64_t connection);
+    void imitate(const Request& request, Duration thinking);
     Bytes serve(ByteView pdu);
     Bytes refuse(ByteView pdu, unsigned code);
     Bytes read(ByteView pdu) const;
@@ -65,6 +66,9 @@ class Panel {
     std::deque<Request> waiting_;
     bool busy_ = false;
     TimePoint dark_until_{};
+    TimePoint imitated_{};
+    TimePoint answered_{};  ///< when the latest request had arrived that it has answered
+    Bytes last_reply_;
 };
 
 }  // namespace panelgate::scenario

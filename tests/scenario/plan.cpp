@@ -10,19 +10,21 @@ namespace panelgate::scenario {
 
 bool PanelPlan::is_sound(Duration timeout, Duration reply_hole) const {
     constexpr unsigned kLongestRead = 20;  // that a client asks for
-    const bool ever_silent = drop > 0 || mute > 0 || nap > 0 || late > 0 || dead ||
-                             flapping > Duration::zero() || reboots > Duration::zero() ||
+    const bool ever_silent = drop > 0 || deaf_to_writes > 0 || mute > 0 || nap > 0 || late > 0 ||
+                             dead || flapping > Duration::zero() || reboots > Duration::zero() ||
                              only_registers > 0 || (refusal == 0 && max_registers < kLongestRead);
     const bool ever_wrong = flip > 0 || truncate > 0 || noise > 0 || wrong_id > 0 || foreign > 0 ||
-                            wrong_function > 0 || damaged_first > 0 || padded_inside > 0;
+                            wrong_function > 0 || damaged_first > 0 || padded_inside > 0 ||
+                            imitates > Duration::zero() || repeats_request > 0;
     const Duration slowest = std::max(think, slow_think) + (fragment > 0 ? 40ms : 10ms);
     return !ever_silent && !ever_wrong && slowest < timeout &&
            (hole == 0 || hole_limit + 16ms < reply_hole);
 }
 
 bool PanelPlan::only_dies() const {
-    return drop == 0 && mute == 0 && nap == 0 && late == 0 && flip == 0 && truncate == 0 &&
-           wrong_id == 0 && wrong_function == 0 && foreign == 0 && slow_think == Duration::zero();
+    return drop == 0 && deaf_to_writes == 0 && mute == 0 && nap == 0 && late == 0 && flip == 0 &&
+           truncate == 0 && wrong_id == 0 && wrong_function == 0 && foreign == 0 &&
+           slow_think == Duration::zero();
 }
 
 bool Plan::is_sound(const PanelPlan& panel) const {

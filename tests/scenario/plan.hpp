@@ -58,6 +58,15 @@ struct PanelPlan {
     double damaged_first = 0;  ///< a damaged reply, and the good one 60 ms later
     double padded_inside = 0;  ///< two bytes too many under the CRC
     double padded_behind = 0;
+    // Habits
+    bool overtakes = false;       ///< thinks about each request by itself, whatever waits
+    double deaf_to_writes = 0;    ///< neither executed nor answered
+    double repeats_request = 0;   ///< it says the request before the reply
+    bool any_connection = false;  ///< replies are heard on whichever there is by then
+    /// In each such time it says once, while it thinks about a read, what has the form of the
+    /// awaited reply: its last reply, or values that nobody asked for.
+    Duration imitates{};
+    bool imitates_last = false;
 
     /// Its answers come in time and a gateway can find each of them: all but single bytes around
     /// them and pauses. `timeout`: of the line.
@@ -87,18 +96,19 @@ struct ClientPlan {
 struct LinePlan {
     double own_rate = 1;  ///< our characters take this much longer than computed
     bool echo = false;
-    double damaged_echo = 0;  ///< by request
-    double cut_echo = 0;      ///< the echo lacks its last byte
-    double partial_echo = 0;  ///< the first 1 to 7 bytes come back
-    double idle_noise = 0;    ///< bursts of noise a second
-    double floating = 0;      ///< by second: it floats for 1 to 4 s, a byte each 1.5 ms of silence
-    double losses = 0;        ///< the device goes away, by second
-    double handover = 0;      ///< share of them: back at once, what is under way is heard
-    double stalls = 0;        ///< by second: nothing gets through for 0.3 to 4 s, then all of it
-    bool hangs = false;       ///< a stall is a device server that hangs: it takes connections all
-                              ///< the while, and the newest is told what is said later
-    double pauses = 0;        ///< by second: nobody calls the arbiter for 0.1 to 5 s
-    Duration babble{};        ///< a good frame that nobody asked for, each such time
+    bool echo_writes = false;  ///< of writes alone
+    double damaged_echo = 0;   ///< by request
+    double cut_echo = 0;       ///< the echo lacks its last byte
+    double partial_echo = 0;   ///< the first 1 to 7 bytes come back
+    double idle_noise = 0;     ///< bursts of noise a second
+    double floating = 0;       ///< by second: it floats for 1 to 4 s, a byte each 1.5 ms of silence
+    double losses = 0;         ///< the device goes away, by second
+    double handover = 0;       ///< share of them: back at once, what is under way is heard
+    double stalls = 0;         ///< by second: nothing gets through for 0.3 to 4 s, then all of it
+    bool hangs = false;        ///< a stall is a device server that hangs: it takes connections all
+                               ///< the while, and the newest is told what is said later
+    double pauses = 0;         ///< by second: nobody calls the arbiter for 0.1 to 5 s
+    Duration babble{};         ///< a good frame that nobody asked for, each such time
     bool other_master = false;  ///< a polite one, with a panel of its own
 };
 
@@ -147,17 +157,40 @@ enum class Oddity : std::uint8_t {
     dies,
     refuses_long,
     ignores_long,
+    unasked,        ///< a frame too many, and its answers may be one behind
+    repeats_last,   ///< the same with a reply once more
+    writes_echoed,  ///< and it is deaf to some
+    broadcasts_late,
+    repeats_requests,
+    overtakes,
+    outlives_connection,
 };
-inline constexpr Oddity kOddities[] = {Oddity::wrong_function, Oddity::padded_inside,
-                                       Oddity::padded_behind,  Oddity::doubled,
-                                       Oddity::tails,          Oddity::fragments,
-                                       Oddity::glitches,       Oddity::damaged_first,
-                                       Oddity::holes,          Oddity::naps,
-                                       Oddity::mute,           Oddity::drops,
-                                       Oddity::flips,          Oddity::reboots,
-                                       Oddity::babbles,        Oddity::answers_broadcasts,
-                                       Oddity::dies,           Oddity::refuses_long,
-                                       Oddity::ignores_long};
+inline constexpr Oddity kOddities[] = {Oddity::wrong_function,
+                                       Oddity::padded_inside,
+                                       Oddity::padded_behind,
+                                       Oddity::doubled,
+                                       Oddity::tails,
+                                       Oddity::fragments,
+                                       Oddity::glitches,
+                                       Oddity::damaged_first,
+                                       Oddity::holes,
+                                       Oddity::naps,
+                                       Oddity::mute,
+                                       Oddity::drops,
+                                       Oddity::flips,
+                                       Oddity::reboots,
+                                       Oddity::babbles,
+                                       Oddity::answers_broadcasts,
+                                       Oddity::dies,
+                                       Oddity::refuses_long,
+                                       Oddity::ignores_long,
+                                       Oddity::unasked,
+                                       Oddity::repeats_last,
+                                       Oddity::writes_echoed,
+                                       Oddity::broadcasts_late,
+                                       Oddity::repeats_requests,
+                                       Oddity::overtakes,
+                                       Oddity::outlives_connection};
 std::string_view label(Oddity oddity);
 
 /// One run: a line, its panels, its clients. The same seed gives the same run.

@@ -57,7 +57,7 @@ void Wire::whisper(Bytes bytes) {
 
 void Wire::send(Bytes adu) {
     if (agenda_.now() < stalled_until_) {
-        held_out_.push_back({std::move(adu), false, connection_, 0});
+        held_out_.push_back({.bytes = std::move(adu), .connection = connection_});
     } else {
         leave(std::move(adu), connection_);
     }
@@ -80,7 +80,7 @@ void Wire::leave(Bytes adu, std::uint64_t connection) {
 /// lets through.
 void Wire::echo(const FramePtr& frame) {
     const LinePlan& line = plan_.line;
-    if (line.echo) {
+    if (line.echo || (line.echo_writes && frame->bytes[1] > 4)) {
         const bool damaged = random_.chance(line.damaged_echo);
         const bool cut = random_.chance(line.cut_echo);
         if (!damaged && !cut) return deliver_in_chunks(frame);
@@ -125,9 +125,19 @@ void Wire::deliver(const FramePtr& frame, std::size_t from, std::size_t to) {
     const std::size_t end = frame->answer_to;
     const bool answered = end > from && end <= to && !frame->garbled_from;
     const ByteView part = ByteView(frame->bytes).subspan(from, to - from);
-    const bool copied = frame->copy && to == frame->bytes.size() && !frame->garbled_from;
-    const std::uint8_t copy_of = copied ? frame->station : 0;
-    arrive({{part.begin(), part.end()}, answered, frame->connection, copy_of});
+    const auto said = [](const Frame& whole) {
+        return ByteView(whole.bytes)
+            .subspan(whole.answer_from, whole.answer_to - whole.answer_from);
+    };
+    const bool ends = to == frame->bytes.size() && !frame->garbled_from;
+    const auto its = [&](bool is) { return ends && is ? frame->station : std::uint8_t{0}; };
+    arrive(
+        {{part.begin(), part.end()},
+         answered,
+         frame->connection,
+         its(frame->copy),
+         its(frame->imitation),
+         answered && frame->overtaken ? understood(plan_.settings.serial, said(*frame)) : Bytes{}});
 }
 
 /// Something else than what was said; never a good frame by chance: that is the CRC's affair.
@@ -157,6 +167,9 @@ void Wire::arrive(Held held) {
     }
     if (held.copy_of != 0) agenda_.tell("next ends the copy of what was said before");
     if (held.copy_of != 0) witness_.on_copy(agenda_.now(), held.copy_of);
+    if (!held.overtaken.empty()) witness_.on_overtaken(held.overtaken);
+    if (held.imitation_of != 0) agenda_.tell("next ends what is no answer");
+    if (held.imitation_of != 0) witness_.on_imitation(held.imitation_of);
     hear_(held.bytes, held.answered);
 }
 

@@ -22,6 +22,8 @@ struct Said {
     std::size_t answer_from = 0;
     std::size_t answer_to = 0;
     bool copy = false;            ///< it was said before
+    bool imitation = false;       ///< it has the form of the answer, and is none
+    bool overtaken = false;       ///< a later request was answered before
     bool damaged = false;         ///< not what its speaker meant
     std::size_t hole_before = 0;  ///< this byte comes later by
     Duration hole{};
@@ -76,7 +78,9 @@ class Wire {
         Bytes bytes;
         bool answered = false;
         std::uint64_t connection = 0;
-        std::uint8_t copy_of = 0;  ///< the station whose answer it repeats
+        std::uint8_t copy_of = 0;       ///< the station whose answer it repeats
+        std::uint8_t imitation_of = 0;  ///< ... or imitates
+        Bytes overtaken{};              ///< an answer that another one has overtaken
     };
 
     FramePtr put(Said said);

@@ -173,7 +173,7 @@ def settled(listener, count):
 
 @unittest.skipIf(harness.SANITIZED, "a sanitizer takes the time that masters wait")
 class Tap(unittest.TestCase):
-    def check(self, zoo, log, listener, program):
+    def check(self, zoo, log, listener, program, doubt_percent=3):
         known = truth(log)
         settled(listener, len(known))
         heard = listener.pairs()
@@ -192,7 +192,7 @@ class Tap(unittest.TestCase):
         for _, a, b, c, d in differences[:3]:
             print(f"\n    on the bus {there[a:b]}, heard {here[c:d]}", end="")
         self.assertEqual((missing, wrong, sent), (0, [], 0))
-        self.assertLess(doubtful * 100, 3 * len(known))
+        self.assertLess(doubtful * 100, doubt_percent * len(known))
         return stations
 
     def test_each_pair_of_another_master_is_found_among_faults(self):
@@ -215,7 +215,9 @@ class Tap(unittest.TestCase):
             while_running(lambda: subprocess.run([PLAIN_MASTER, link, "115200", "5",
                                                   str(TRANSACTIONS / 190)],
                                                  stdout=subprocess.DEVNULL, check=True), listener)
-            self.check(zoo, log, listener, program)
+            # All reads have one length: behind one that is not answered the replies of that panel
+            # may be one behind for as long as this takes.
+            self.check(zoo, log, listener, program, doubt_percent=25)
 
     def test_the_device_is_open_for_reading_only(self):
         with tapped({}) as (zoo, _, program, _log):

@@ -81,6 +81,8 @@ struct Group {
     /// True if its reply shows the station's pace: the reply to a retry may answer the attempt
     /// before.
     bool shows_pace() const { return silent_after + cut_after == Duration::zero() && !odd_pace; }
+    /// True if a poll has brought it its turn.
+    bool is_poll() const { return !jobs.empty() && jobs.front().priority == PriorityClass::poll; }
     /// True if no client waits for it any more.
     bool abandoned() const { return std::ranges::all_of(jobs, &Job::gone); }
 };
@@ -232,6 +234,11 @@ class Attempt {
         return timing_.echoes && !echo_.complete() && !own_.fragment && !own_.behind &&
                noise_in_front_ == 0;
     }
+    /// True if the line usually echoes, and its echo came back changed: others have transmitted,
+    /// and the request may never have arrived.
+    bool may_have_collided() const {
+        return timing_.echoes && !echo_.complete() && (echo_.mismatch() || own_.fragment);
+    }
     /// True if the reply to a write equals the echo of its request: only timing distinguishes them.
     bool may_be_its_echo() const {
         return !group_.request.is_read() && !echo_.complete() && !own_.seen &&
@@ -299,6 +306,7 @@ class Attempt {
         reply,      ///< it has said something else
     };
     void drop_what_ended(TimePoint now, std::size_t size);
+    bool comes_back(ByteView bytes);
     Verdict hear(TimePoint now, ByteView bytes, const Ends& ends);
     /// Bytes until the frame that has begun can be judged. 0: each may decide.
     std::size_t missing() const;
@@ -362,6 +370,7 @@ class Attempt {
     bool heard_ = false;
     bool disturbed_ = false;
     std::size_t noise_in_front_ = 0;  ///< bytes
+    std::size_t came_back_ = 0;       ///< bytes, while it was leaving, which the filter let pass
     bool frames_in_front_ = false;    ///< good frames
     bool contested_ = false;
     bool refusal_rejected_ = false;

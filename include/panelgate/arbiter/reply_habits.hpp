@@ -99,7 +99,7 @@ class DuplicateHabit {
     static constexpr int kDenials = 3;  ///< after which they count as duplicates
 
     void on_reply(TimePoint now) {
-        if (now - learned_at_ > timing::kForgetDuplicates) learned_ = {};
+        if (now - learned_at_ > timing::kForgetDuplicates) learned_ = guessed_ = {};
         replied_ = now;
     }
     /// True if it repeats a reply as soon as duplicates come from this station.
@@ -108,6 +108,8 @@ class DuplicateHabit {
     }
     /// A duplicate came so long after its reply.
     void learn(TimePoint now, Duration delay) {
+        sooner_ = 2 * delay < guessed_ ? sooner_ + 1 : 0;
+        if (sooner_ >= kConfirmations) guessed_ = {};
         learned_ = std::max(learned_, delay);
         learned_at_ = now;
         confirmed_ = {};
@@ -144,12 +146,15 @@ class DuplicateHabit {
     }
     /// With nothing outstanding, one request got this reply at `first`, which `repeated` another,
     /// and again now: one of them is a duplicate: of the other, if that is how late this station's
-    /// duplicates come, else perhaps of an earlier reply.
+    /// duplicates come, else perhaps of an earlier reply, and so much later: a guess, until several
+    /// in a row have come in less than half of that.
     void on_repeated_reply(TimePoint now, TimePoint first, TimePoint repeated) {
         if (now - first > timing::kLatestRepetition) return;
-        if (known() && now - first <= settle_time()) return learn(now, now - first);
-        const Duration earlier = repeated == TimePoint{} ? Duration::zero() : first - repeated;
-        learn(now, std::max(now - first, earlier));
+        const bool is_usual = known() && now - first <= settle_time();
+        learn(now, now - first);
+        if (is_usual || repeated == TimePoint{}) return;
+        guessed_ = std::max(guessed_, first - repeated);
+        sooner_ = 0;
     }
     /// A second answer came so long after the first, and differs.
     void on_surplus(TimePoint now, Duration delay) {
@@ -170,15 +175,16 @@ class DuplicateHabit {
                    : Duration::zero();
     }
     /// Time for which the station is not asked after a reply.
-    Duration settle_time() const { return learned_ * 3 / 2; }
+    Duration settle_time() const { return delay() * 3 / 2; }
     /// ... after this reply, including the doubtful cases.
     Duration take_doubt() {
         return std::max(settle_time(), std::exchange(doubt_, Duration::zero()));
     }
     /// End of the rest after the last reply.
-    TimePoint rest_until() const { return replied_ + learned_ * 5 / 4; }
+    TimePoint rest_until() const { return replied_ + delay() * 5 / 4; }
 
   private:
+    Duration delay() const { return std::max(learned_, guessed_); }
     /// Values are trusted separately: two writes to one address have equal answers, and so do many
     /// exceptions.
     static std::size_t kind_of(ByteView request, ByteView reply) {
@@ -190,6 +196,8 @@ class DuplicateHabit {
     int denied_ = 0;  ///< in a row
     Duration doubt_{};
     Duration learned_{};  ///< from a reply to its duplicate
+    Duration guessed_{};  ///< ... if one was not that of the reply before
+    int sooner_ = 0;      ///< duplicates in a row that came in less than half of that
     TimePoint learned_at_{};
     TimePoint replied_{};
     static constexpr int kSurplus = 2;
@@ -319,7 +327,8 @@ class ReplyHabits {
     }
     /// True if it may be a duplicate: it repeats a reply, and duplicates come from this station, or
     /// it has not yet shown that it gives equal answers to different requests, or it came `early`
-    /// or `quicker` than ever. A doubted reply that comes again is no duplicate.
+    /// or `quicker` than ever, or is a refusal behind a collision. A doubted reply that comes again
+    /// is no duplicate.
     bool may_be_duplicate(TimePoint now, const Attempt& attempt, const Claims& claims, bool early,
                           bool quicker) const;
     /// Time of the latest request that this reply proves to have reached the station: an attempt

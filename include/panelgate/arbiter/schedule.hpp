@@ -142,6 +142,8 @@ class Schedule {
     std::optional<Group> next_retry(const Line& line);
     std::optional<Group> next_probe(const Line& line) const;
     Next next_job(const Line& line);
+    JobQueue::Choice own_turn(const Line& line, JobQueue::Choice next,
+                              const JobQueue::Test& may_run) const;
     std::optional<Next> proof_before(const Line& line, const Job& job) const;
     std::optional<Next> read_before(const Line& line, const Job& job);
     bool may_run(const Line& line, const Job& job) const;

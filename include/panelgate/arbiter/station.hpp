@@ -40,8 +40,12 @@ class Station {
     /// it has had four writes in a row (P9). Where it rests after each reply, other stations have
     /// the turns between, and its reads would have too few: then every other one.
     bool has_read_turn() const {
-        const bool rests = replies_.duplicates_until(Duration::max()) != TimePoint{};
-        return read_turn_ || writes_in_a_row_ >= (rests ? 1 : kWritesInARow);
+        return read_turn_ || writes_in_a_row_ >= (rests_after_replies() ? 1 : kWritesInARow);
+    }
+    /// True if a waiting poll goes before its reads: where it rests after each reply, polls of
+    /// other stations have the turns of their class.
+    bool has_poll_turn() const {
+        return rests_after_replies() && polls_passed_over_ >= kPollsPassedOver;
     }
     /// True if it has answered reads and the last one too: failed writes do not postpone reads.
     bool answers_reads() const { return replies_.reads().any() && !read_missed_; }
@@ -118,12 +122,14 @@ class Station {
     }
     /// ... by a wide margin.
     bool is_far_too_quick(Duration first_sign) const {
-        return is_far_too_quick(first_sign, times_);
+        return times_.is_significant() && first_sign < *times_.shortest() * 3 / 4;
     }
-    /// ... compared with the whole `line` if few replies of the station are known.
+    /// ... compared with the whole `line` if few replies of the station are known. Where few of
+    /// that are, too: before the request had left, and none of them had.
     bool is_far_too_quick(Duration first_sign, const RecentTimes& line) const {
-        const RecentTimes& seen = times_.is_significant() ? times_ : line;
-        return seen.is_significant() && first_sign < *seen.shortest() * 3 / 4;
+        if (times_.is_significant()) return is_far_too_quick(first_sign);
+        if (line.is_significant()) return first_sign < *line.shortest() * 3 / 4;
+        return first_sign <= Duration::zero() && line.shortest() > Duration::zero();
     }
 
     // How to ask it
@@ -206,6 +212,7 @@ class Station {
     static constexpr int kFlaky = 4;            ///< silent ones of the last 8 attempts
     static constexpr int kUnusualReplies = 16;  ///< replies until an exception is unexpected again
     static constexpr int kWritesInARow = 4;     ///< while a read waits for it
+    static constexpr int kPollsPassedOver = 3;  ///< while a poll waits for it
     static constexpr int kCredit = 2;           ///< whole timeouts of credit
     static constexpr int kBudgetMemory = 3;     ///< whole timeouts that are remembered
 
@@ -213,6 +220,9 @@ class Station {
     /// Time in which its share of the line covers one whole timeout.
     Duration timeout_cost() const {
         return static_cast<int>(1 / ProbeBudget::kFailing) * settings_.response_timeout;
+    }
+    bool rests_after_replies() const {
+        return replies_.duplicates_until(Duration::max()) != TimePoint{};
     }
     void spend(TimePoint now, Duration cost, bool is_read = true) {
         (is_read ? budget_ : writes_).spend(now, cost, kBudgetMemory * timeout_cost());
@@ -247,7 +257,8 @@ class Station {
     Bytes ignored_;        ///< the last write that it did not answer
     bool read_turn_ = false;
     int writes_in_a_row_ = 0;
-    bool read_missed_ = false;  ///< the last read was unanswered
+    int polls_passed_over_ = 0;  ///< its turns since its last poll
+    bool read_missed_ = false;   ///< the last read was unanswered
     bool wants_check_ = false;
     bool woken_by_write_ = false;  ///< its last probe was a client's write
     int probes_ = 0;               ///< unanswered, since it was last heard

@@ -10,56 +10,16 @@
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/tap/cutter.hpp"
+#include "panelgate/tap/habits.hpp"
 #include "panelgate/tap/heard.hpp"
 #include "panelgate/tap/settings.hpp"
 
 namespace panelgate::tap {
 
-/// The time after which the line's master gives up without an answer, learned from requests that
-/// were surely not answered: the least of the last ones, at least three. A master's timeout may be
-/// changed, so the value is dropped after the master has waited for later replies three times
-/// without giving up in between.
-class GiveUp {
-  public:
-    void seen(Duration interval);
-    /// A reply came this long after its request, and the master had still waited.
-    void outwaited(Duration interval);
-    std::optional<Duration> least() const;
-    /// True if the master's timeout for other stations does not apply here.
-    bool is_different() const { return refuted_; }
-
-  private:
-    static constexpr std::size_t kNeeded = 3;
-    static constexpr std::size_t kKept = 8;
-    std::deque<Duration> seen_;
-    std::deque<Duration> outwaited_;  ///< since the last one seen
-    bool refuted_ = false;            ///< by longer waits
-};
-
-/// How soon one station answers, as far as it helps to match replies to requests.
-class Habits {
-  public:
-    /// A reply that surely answers its request came `think` after it.
-    void answered(Duration think);
-    /// A reply came that may answer an older request. Returns true after two in a row with the
-    /// usual think time: late ones would not keep it.
-    bool answered_as_usual(Duration think);
-    void on_unanswered() { usual_ = 0; }
-
-    /// Longest recent think time; empty before the first reply.
-    std::optional<Duration> longest_think() const { return longest_; }
-
-    GiveUp give_up;
-    std::optional<TimePoint> repeated;  ///< when it last sent a reply twice
-
-  private:
-    std::optional<Duration> longest_;
-    int usual_ = 0;  ///< replies in a row with the usual think time while others were outstanding
-};
-
 /// Listens to a line with another master, and matches replies to requests. Pure: bytes and time in,
-/// events out. A reply that may belong to another request is always marked `doubtful`. Memory is
-/// bounded.
+/// events out. A reply that may belong to another request is always marked `doubtful`. One that is
+/// believed is told when its master goes on, or no second one has come for a while: two different
+/// answers to one request are both in doubt. Memory is bounded.
 class Matcher {
   public:
     explicit Matcher(const Settings& settings);
@@ -89,12 +49,20 @@ class Matcher {
     void cut(bool silence);
     void take(Piece piece);
     bool resolve(Piece& piece);
+    bool resolve_echo(Piece& candidate, Piece& piece);
+    bool resolve_read(Piece& candidate, Piece& piece);
     void on_answer(Piece piece);
     void on_request(Piece piece);
     void on_reply(Piece piece);
     void close(const Piece& piece);
     void on_damaged(Piece piece);
     void answer(Piece piece, bool in_doubt);
+    void remember(const Transaction& made, bool in_doubt, bool outstanding);
+    bool is_duplicate(const Piece& piece, const Bytes& request,
+                      const arbiter::Claims& claimed) const;
+    void hold(Transaction made);
+    void tell_held();
+    bool is_second_answer(const Piece& piece) const;
     void ask(const Piece& piece, bool doubtful);
     void give_up(TimePoint now);
     void give_up_for(const Piece& request);
@@ -103,6 +71,7 @@ class Matcher {
     bool is_old_reply(const Piece& piece) const;
     Reading read(const Piece& piece) const;
     Duration quick(const Habits& habits) const;
+    Duration usual(const Habits& habits) const;
     Duration patience(const Habits& habits) const;
     std::optional<TimePoint> resolved_at() const;
     Habits& of(std::uint8_t station);
@@ -115,6 +84,8 @@ class Matcher {
     std::optional<Asked> asked_;
     std::optional<Piece>
         candidate_;  ///< its answer, or the same request again: later frames decide
+    std::optional<Transaction> held_;  ///< believed, if no second answer comes
+    TimePoint held_until_{};
     std::map<std::uint8_t, Habits> habits_;
     arbiter::OutstandingRequests book_;  ///< what the line's master has asked, seen from it
     GiveUp give_up_;                     ///< of the whole line

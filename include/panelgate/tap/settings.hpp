@@ -16,6 +16,8 @@ struct Settings {
     Duration patience = 10s;
     /// How long after its request a reply may still come, although its master has gone on.
     Duration late_window = 5s;
+    /// A station that has sent more than it was asked for may do so again, for so long.
+    Duration surplus_memory = 1min;
     /// Until a timeout was learned: a frame that may be an echo or a repeated request is the
     /// request after this time.
     Duration usual_give_up = 1s;

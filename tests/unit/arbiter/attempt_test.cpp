@@ -83,6 +83,17 @@ TEST_F(AttemptTest, AHoleInAReplyIsWaitedForAndALongerOneMakesItDamage) {
     EXPECT_EQ(run_to_verdict(), Verdict::damaged);
 }
 
+TEST_F(AttemptTest, WhatComesBackWhileItLeavesIsNoNoiseBehindTheLastReply) {
+    const Bytes frame = encode_adu(kStation, kRead);
+    attempt_ = Attempt(group_of(kStation, kRead), timing_of(100ms),
+                       EchoFilter(frame, EchoFilter::Expect::nothing));
+    hear(-5ms, {frame.begin(), frame.begin() + 2});
+    hear(-4ms, {frame.begin() + 2, frame.begin() + 5});
+    EXPECT_FALSE(attempt_.early_noise());
+    hear(-3ms, "00"_hex);
+    EXPECT_TRUE(attempt_.early_noise());
+}
+
 TEST_F(AttemptTest, DamageDoesNotEndItBeforeTheStationsUsualTime) {
     EXPECT_EQ(hear(5ms, "11 03 06 02"_hex), Verdict::open);
     Attempt other = attempt_;

@@ -222,6 +222,32 @@ TEST_F(LearnedEcho, P8AReplyAfterARequestOfAnotherMasterShowsNothingAboutAnEcho)
     EXPECT_NE(bus.arbiter().echo(), EchoState::absent) << "a damaged echo stood there as well";
 }
 
+TEST_F(LearnedEcho, P8TheFirstWriteOfALineIsNotConfirmedByWhatComesSoonerThanAnyReplyHas) {
+    read_once(bus, false);
+    const Ticket ticket = bus.submit(17, kWrite);
+    hear_echo(bus);
+    bus.run_for(2s);
+    EXPECT_FALSE(bus.answer(ticket).pdu);
+}
+
+/// The panel may not have heard the request, and says its refusal of the one before once more.
+TEST_F(LearnedEcho, P1ARefusalSaidAgainBehindACollisionIsAskedForOnceMore) {
+    read_once(bus, true);
+    bus.submit(17, "03 00 6C 00 01"_hex);
+    hear_echo(bus);
+    reply(bus, "83 06"_hex);
+    bus.run_for(10ms);
+    const Ticket ticket = bus.submit(17, kRead);
+    Bytes damaged = bus.sent.back().adu;
+    damaged[damaged.size() - 3] ^= 0x10;
+    bus.hear_paced(damaged);
+    reply(bus, "83 06"_hex);
+    ASSERT_EQ(bus.next_sent(2s).value().kind, FrameKind::retry);
+    hear_echo(bus);
+    reply(bus, kReply);
+    EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
+}
+
 TEST_F(Echo, P4AnotherMastersRepliesOfOurStationMakeItRestForNothing) {
     BusScript bus(with(EchoMode::off));
     for (int i = 0; i < 20; ++i) {

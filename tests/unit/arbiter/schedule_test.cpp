@@ -162,6 +162,25 @@ TEST_F(ScheduleTest, P9AReaderWaitsForFourWritesAlsoBesideARetry) {
     EXPECT_EQ(writes, 4);
 }
 
+/// While it rests after each reply the polls of another station have the turns of their class.
+TEST_F(ScheduleTest, P9ReadsOfAStationThatSaysItsRepliesTwiceLeaveTurnsToItsPolls) {
+    const Bytes reply = "03 02 00 07"_hex;
+    stations.book().on_reply(1, now - 50ms, read_of(9999), reply);
+    stations.of(1).on_unsolicited_frame(stations.book(), now, Done::duplicate, reply);
+    now += 1s;
+    Job poll = job(1);
+    poll.priority = PriorityClass::poll;
+    EXPECT_TRUE(schedule.backlog().queue().push(std::move(poll)).taken);
+    std::string asked;
+    for (int i = 0; i <= Station::kPollsPassedOver; ++i) {
+        wait(1);
+        const Group group = next().group.value();
+        asked += group.is_poll() ? 'p' : 'r';
+        stations.of(1).on_asked(stations.book(), now, group);
+    }
+    EXPECT_EQ(asked, "rrrp");
+}
+
 /// Its station has had its writes in a row, so that a read of it is due, which is the last of a
 /// long round: that takes the write's turn, and does not hold it back until its own has come.
 TEST_F(ScheduleTest, P9AWriteIsNotHeldBackByAReadWhoseHostHasOtherReads) {

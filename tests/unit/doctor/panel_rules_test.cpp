@@ -21,6 +21,13 @@ Mix wrong(std::uint64_t n) { return Mix().with(&Symptoms::wrong, n); }
 /// Fifty replies, some of them twice.
 Mix doubled(std::uint64_t n) { return Mix().answered(50).with(&Symptoms::doubled, n); }
 
+/// The other order would damage those that are right now.
+TEST_F(Diagnose, SomeRepliesWithTheCrcsBytesSwappedAreNoWrongOrder) {
+    Mix some = swapped(8);
+    EXPECT_EQ(alone(some.answered(7)), "wrong-crc-order 1");
+    EXPECT_THAT(alone(some.answered(33)), Not(HasSubstr("crc-order")));
+}
+
 TEST_F(Diagnose, ForAPanelThatWritesInLowerCaseTheSettingIsNamed) {
     const Mix panel = Mix().answered(4).damaged(6).with(&Symptoms::lower_case, 6);
     facts.serial.mode = SerialMode::ascii;

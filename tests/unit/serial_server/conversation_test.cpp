@@ -76,11 +76,29 @@ constexpr Row kEchoRows[] = {
     // One that collided with the master is not absent.
     {"read 10 answer collided-echo~ 1000 write 10 answer echo~ 1000",
      "ask 31, reply 31, ask 31, reply 31"},
-    // One that is known to be absent hides no retry: the reply was damaged at the master.
-    {"read 10 answer 1000 write 10 answer 15 write", "ask 31, reply 31, ask 31, reply 31, ask 31"},
+    // One that is known to be absent hides no retry: the reply was damaged at the master. What was
+    // done just now is not done again (P2).
+    {"read 10 answer 1000 write 10 answer 40 write 100",
+     "ask 31, reply 31, ask 31, reply 31, reply 31"},
+    {"read 10 answer 1000 write 10 answer 40 write 40 write 40 write 40 write 40 write",
+     "ask 31, reply 31, ask 31, reply 31, reply 31, reply 31, reply 31, reply 31, ask 31"},
+    {"read 10 answer 1000 write 10 answer 200 write 10 answer",
+     "ask 31, reply 31, ask 31, reply 31, ask 31, reply 31"},
+    {"read 10 answer 1000 write 10 answer 20 read 10 answer 20 write",
+     "ask 31, reply 31, ask 31, reply 31, ask 31, reply 31, ask 31"},
+    // No master has sent this: it has come before the reply was out.
+    {"read 10 answer 1000 write 10 answer 5 echo 1000", "ask 31, reply 31, ask 31, reply 31"},
     // One that may be a retry hides it once at most.
     {"write 10 answer 15 write", "ask 31, reply 31"},
     {"write 10 answer 15 write 500 write", "ask 31, reply 31, ask 31"},
+    // It comes behind the master's next request, and in one piece with it.
+    {"write 10 answer 20 read write 10 answer 1000", "ask 31, reply 31, ask 31, reply 31"},
+    {"write 10 answer 20 read/5 1 rest+write 10 answer 1000", "ask 31, reply 31, ask 31, reply 31"},
+    // ... or behind the reply to that.
+    {"write 10 answer 20 read 10 answer write echo 1000", "ask 31, reply 31, ask 31, reply 31"},
+    // Now and then: what has come once may come again.
+    {"read 10 answer 1000 read 10 answer 30 echo 1000 write 10 answer 1000 write 10 answer 30 echo",
+     "ask 31, reply 31, ask 31, reply 31, ask 31, reply 31, ask 31, reply 31"},
 };
 
 TEST(Conversation, TakesItsOwnEchoForNoRequest) {

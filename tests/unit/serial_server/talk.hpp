@@ -124,8 +124,13 @@ struct Talk {
     Conversation machine;
 
   private:
-    /// "read/5" is the first five bytes, and "rest" then the others; "echo" is what was sent last.
+    /// "read/5" is the first five bytes, and "rest" then the others; "echo" is what was sent last;
+    /// "+" joins.
     Bytes frame(const std::string& word) {
+        if (const auto plus = word.find('+'); plus != std::string::npos) {
+            const Bytes first = frame(word.substr(0, plus));
+            return joined({first, frame(word.substr(plus + 1))});
+        }
         Bytes damaged =
             modbus::encode_adu(kOurs, modbus::encode_read(modbus::Table::holding_registers, 9, 1));
         damaged[4] ^= 0x10;
