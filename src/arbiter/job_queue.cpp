@@ -51,19 +51,34 @@ const Job* JobQueue::Source::first(std::uint8_t station) const {
     return std::ranges::all_of(lanes | std::views::values, is_before) ? job : nullptr;
 }
 
+/// False if a host with an earlier turn was found in each class that waits.
+bool JobQueue::may_be_next(const Origin& origin, const Choice& choice) const {
+    for (std::size_t rank = 0; rank < kRanks; ++rank) {
+        const Choice::First& first = choice.first_[rank];
+        const bool is_earlier = first.job != nullptr && first.turn[0] < origin.turns[rank];
+        if (firsts_[rank] > 0 && !is_earlier) return true;
+    }
+    return false;
+}
+
 /// A lower class never goes ahead twice in a row, so that a write waits for only one.
 JobQueue::Choice JobQueue::choose(const Test& may_run) const {
     Choice choice;
-    any_lane([&](const Found& at) {
+    const auto look_at = [&](const Found& at) {
         const std::size_t rank = rank_of(at.lane.jobs.front().job);
-        choice.waits_[rank] = true;
         Choice::First& first = choice.first_[rank];
         const std::array turn{at.origin.turns[rank], at.source.turns[rank], at.lane.turns[rank]};
-        if (first.job != nullptr && first.turn < turn) return false;
+        if (first.job != nullptr && first.turn < turn) return;
         const Job* const job = at.source.first(at.place.station);
         if (job != nullptr && may_run(*job)) first = {job, at.place, turn};
-        return false;
-    });
+    };
+    for (const auto& [host, origin] : hosts_) {
+        if (!may_be_next(origin, choice)) continue;
+        for (const auto& [client, source] : origin.sources) {
+            for (const auto& [station, lane] : source.lanes)
+                look_at({{host, client, station}, origin, source, lane});
+        }
+    }
     std::size_t top = 0;
     while (top < kRanks && choice.first_[top].job == nullptr) ++top;
     choice.rank_ = top;
@@ -91,7 +106,7 @@ bool JobQueue::is_polls_turn(const Choice& choice, std::size_t top) const {
 void JobQueue::count_turn(const Choice& choice) {
     last_was_passed_over_ = choice.passed_over_;
     for (const std::size_t rank : {kRead, kPoll}) {
-        if (rank == choice.rank_ || !choice.waits_[rank]) {
+        if (rank == choice.rank_ || firsts_[rank] == 0) {
             passed_[rank] = 0;
         } else if (choice.first_[rank].job != nullptr) {
             ++passed_[rank];
@@ -207,9 +222,11 @@ void JobQueue::insert(Entry entry) {
     } else {
         count(entry.job.client, 1);
     }
+    if (!jobs.empty()) --firsts_[rank_of(jobs.front().job)];
     auto at = jobs.end();
     while (at != jobs.begin() && std::prev(at)->job.ticket > entry.job.ticket) --at;
     jobs.insert(at, std::move(entry));
+    ++firsts_[rank_of(jobs.front().job)];
 }
 
 Job JobQueue::take(const Place& place, std::size_t index) {
@@ -223,9 +240,14 @@ Job JobQueue::take(const Place& place, std::size_t index) {
     } else {
         count(place.client, -1);
     }
+    --firsts_[rank_of(jobs.front().job)];
     Job job = std::move(at->job);
     jobs.erase(at);
-    if (jobs.empty()) source.lanes.erase(place.station);
+    if (jobs.empty()) {
+        source.lanes.erase(place.station);
+    } else {
+        ++firsts_[rank_of(jobs.front().job)];
+    }
     if (source.lanes.empty()) {
         origin.sources.erase(place.client);
         home_.erase(place.client);
@@ -260,18 +282,23 @@ bool JobQueue::consistent() const {
     std::size_t counting = 0;
     std::size_t waiting = 0;
     std::size_t clients = 0;
+    std::array<std::size_t, kRanks> firsts{};
     for (const auto& [host, origin] : hosts_) {
         std::size_t of_host = 0;
         for (const auto& [client, source] : origin.sources) {
             if (!source_consistent(client, host, source)) return false;
             of_host += source.counting;
             ++clients;
-            for (const auto& [station, lane] : source.lanes) waiting += lane.jobs.size();
+            for (const auto& [station, lane] : source.lanes) {
+                waiting += lane.jobs.size();
+                ++firsts[rank_of(lane.jobs.front().job)];
+            }
         }
         if (origin.sources.empty() || of_host != origin.counting) return false;
         counting += of_host;
     }
-    return counting == size_ && waiting == expiries_.size() && clients == home_.size();
+    return counting == size_ && waiting == expiries_.size() && clients == home_.size() &&
+           firsts == firsts_;
 }
 
 // Admission to the queue, and dropping jobs for it.

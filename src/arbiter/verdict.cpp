@@ -54,17 +54,14 @@ void Arbiter::conclude(TimePoint now, Verdict verdict) {
 
 /// The last bit of a broadcast has left: no reply comes, the line rests for the turnaround.
 void Arbiter::end_broadcast(TimePoint now) {
-    const Attempt attempt = take_active(now);
+    Attempt attempt = take_active(now);
     quiet_.rest_until(attempt.timing().sent + settings_.broadcast_turnaround + latency_);
     stations_.book().on_broadcast(attempt.timing().sent, attempt.group().request.pdu());
     outbox_.report(attempt, TransactionEnd::ok);
-    for (const Job& job : attempt.group().jobs) {
-        if (job.deadline <= now) {  // the deadline passed unnoticed while it was leaving
-            outbox_.finish(job, Fault::timeout);
-        } else {
-            outbox_.finish(job, modbus::normal_write_reply(job.request.pdu()));
-        }
-    }
+    // Their deadline passed unnoticed while it was leaving.
+    for (const Job& job : attempt.group().expire(now)) outbox_.finish(job, Fault::timeout);
+    for (const Job& job : attempt.group().jobs)
+        outbox_.finish(job, modbus::normal_write_reply(job.request.pdu()));
 }
 
 /// What is true of the frame that has the form of the answer.
@@ -94,7 +91,6 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
                                 habits.may_answer_broadcast(book.behind_broadcast(now, reply));
     const bool too_soon = first && group.attempts <= 1 && station.is_far_too_quick(first_sign);
     const bool contradicted = attempt.contradicted() && group.doubts == 0;
-    const bool may_be_followed = first && habits.holds_answers(now) > Duration::zero();
     const bool misnumbered = refusal && group.may_doubt_refusal() && first &&
                              habits.may_refuse_other(book, now, claims, group.request.function());
     const bool repeats = station.may_be_duplicate(now, attempt, claims, is_early);
@@ -106,8 +102,8 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
            when(misnumbered, fact::misnumbered) | when(repeats, fact::repeats) |
            when(like_broadcast, fact::like_broadcast) | when(too_soon, fact::too_soon) |
            when(before_end, fact::before_end) | when(contradicted, fact::contradicted) |
-           when(may_be_followed, fact::may_be_followed) | when(may_ask, fact::may_ask) |
-           when(first && attempt.precedes_echo(), fact::before_echo);
+           when(first && habits.holds_answers(now) > Duration::zero(), fact::may_be_followed) |
+           when(may_ask, fact::may_ask) | when(first && attempt.precedes_echo(), fact::before_echo);
 }
 
 /// Returns true if it is the answer.
@@ -182,13 +178,8 @@ void Arbiter::confirm(const Group& group, ByteView reply, bool echoed) {
     if (broadcast && holds) habits.on_broadcast_unanswered();
     if (broadcast && !holds && !modbus::exception_of(reply))
         habits.on_broadcast_answered(*broadcast, false);
-    for (const Job& job : group.jobs) {
-        if (is_answer) {
-            outbox_.finish(job, group.confirms);
-        } else {
-            outbox_.finish(job, Fault::timeout);
-        }
-    }
+    const Result<Bytes> outcome = is_answer ? Result<Bytes>(group.confirms) : Fault::timeout;
+    for (const Job& job : group.jobs) outbox_.finish(job, outcome);
 }
 
 /// The reply may be a duplicate of an earlier one, and the real one may still come. The station's

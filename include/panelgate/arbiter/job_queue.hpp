@@ -147,6 +147,7 @@ class JobQueue {
     template <class Visit>
     bool any_lane(const Visit& visit) const;
     const Source* find(Client client) const;
+    bool may_be_next(const Origin& origin, const Choice& choice) const;
     bool is_polls_turn(const Choice& choice, std::size_t top) const;
     void count_turn(const Choice& choice);
 
@@ -168,6 +169,7 @@ class JobQueue {
     WaitingReads reads_;
     PoolMultiset<TimePoint> expiries_;  ///< of all waiting jobs
     std::size_t size_ = 0;
+    std::array<std::size_t, kRanks> firsts_{};  ///< lanes whose first job is of the class
     std::uint64_t turns_ = 0;
     /// Turns of other classes while one of this class was runnable.
     std::array<int, kRanks> passed_{};
@@ -187,7 +189,6 @@ class JobQueue::Choice {
         std::array<std::uint64_t, 3> turn{};  ///< of its host, client and lane
     };
     std::array<First, kRanks> first_;
-    std::array<bool, kRanks> waits_{};  ///< one of the class is first in a lane, runnable or not
     std::size_t rank_ = kRanks;
     bool passed_over_ = false;
 };

@@ -86,6 +86,8 @@ TEST_F(StationTest, AnAdaptiveTimeoutFollowsTheTurnaroundBetweenFloorAndWhatIsCo
     EXPECT_EQ(station_.response_timeout(), kTimeout) << "nothing is known yet";
     for (int i = 0; i < 10; ++i) answer(kRead, kReply);
     EXPECT_EQ(station_.response_timeout(), settings.timeout_floor + 2 * Duration(25ms));
+    EXPECT_EQ(patience(kRead), station_.response_timeout());
+    EXPECT_EQ(patience(kWrite), kTimeout) << "only its reply shows whether it was executed";
     miss(kRead);
     EXPECT_EQ(station_.response_timeout(), 2 * (settings.timeout_floor + 2 * Duration(25ms)));
     for (int i = 0; i < 100; ++i) miss(kRead);
@@ -306,6 +308,31 @@ TEST_F(StationTest, P4HalfOfTheLastAttemptsInVainMakeItFlakyAndLateRepliesDoNotM
     EXPECT_FALSE(station_.flaky());
     for (int i = 0; i < 8; ++i) miss(kRead, Verdict::damaged);
     EXPECT_FALSE(station_.flaky()) << "damaged replies are no silence";
+}
+
+TEST_F(StationTest, P4ReadsDoNotPayForAWriteThatItIgnores) {
+    answer(kRead, kReply);
+    const modbus::Request ignored = test::request_of(kWrite);
+    for (int i = 0; i < 5; ++i) {
+        now_ += kTimeout;
+        station_.on_failed(now_, Verdict::silent, kTimeout, &ignored);
+    }
+    EXPECT_TRUE(station_.may_spend(now_));
+    EXPECT_FALSE(station_.may_spend(now_, &ignored));
+    const modbus::Request other = test::request_of("06 00 6C 00 01"_hex);
+    EXPECT_TRUE(station_.may_spend(now_, &other));
+}
+
+TEST_F(StationTest, P4OneThatIsBackIsNoLongerFlaky) {
+    for (int i = 0; i < 8; ++i) {
+        miss(kRead);
+        station_.on_given_up(now_, Fault::timeout);
+    }
+    EXPECT_TRUE(station_.flaky());
+    EXPECT_EQ(station_.condition(), Condition::offline);
+    answer(kRead, kReply);
+    EXPECT_FALSE(station_.flaky());
+    EXPECT_EQ(station_.condition(), Condition::well);
 }
 
 TEST_F(StationTest, OnlyAnUnheardStationIsForgottenWhenNotWantedForAMinute) {
