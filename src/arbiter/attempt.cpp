@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
+#include <iterator>
 #include <utility>
 
 #include "panelgate/arbiter/job_queue.hpp"
 #include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::arbiter {
@@ -107,7 +110,7 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
         return Verdict::open;
     }
     drop_what_ended(now, rest.size());
-    if (!heard_) first_byte_ = now;
+    if (!heard_ || std::exchange(begins_anew_, false)) first_byte_ = now;
     // The bytes buffered as an echo were the beginning, where only we delay the rest.
     if (!heard_ && timing_.steady && echo_since_ && !echo_.complete())
         first_byte_ = std::min(now, std::max(*echo_since_, timing_.sent));
@@ -149,18 +152,37 @@ Verdict Attempt::feed(ByteView bytes, const Ends& ends) {
 }
 
 Verdict Attempt::accept(std::optional<Bytes> reply) {
-    collect();
+    const std::size_t behind = collect();
     if (!reply) return Verdict::open;
     if (own_.may_be_echo(echo_, *reply)) return Verdict::open;
+    contradicted_ = is_contradicted(*reply, behind) || contradicted_;
     // Two equal replies cannot be distinguished.
     if (const auto candidate = std::exchange(candidate_, std::nullopt);
         candidate && candidate != reply) {
-        add_unsolicited(*candidate);
+        contradicted_ = contradicted_ || kept_ == Candidate::held;
+        const bool aside = candidate_early_ || kept_ == Candidate::held;
+        (aside ? set_aside_ : unsolicited_).push_back(own_frame(*candidate));
     } else if (candidate) {
         first_reply_at_ = candidate_at_;
     }
     reply_ = std::move(reply);
     return Verdict::replied;
+}
+
+bool Attempt::is_contradicted(const Bytes& reply, std::size_t behind) {
+    if (!group_.is_values(reply)) return false;
+    const auto differs = [&](const Unused& part) {
+        if (part.kind != Unused::Kind::own) return false;
+        const ByteView pdu = modbus::pdu_of(part.bytes);
+        return group_.is_values(pdu) && !std::ranges::equal(pdu, reply) &&
+               modbus::answers(group_.request.pdu(), pdu);
+    };
+    const auto first = unsolicited_.end() - static_cast<std::ptrdiff_t>(behind);
+    const auto found = std::partition(first, unsolicited_.end(), std::not_fn(differs));
+    const bool any = found != unsolicited_.end();
+    std::move(found, unsolicited_.end(), std::back_inserter(set_aside_));
+    unsolicited_.erase(found, unsolicited_.end());
+    return any;
 }
 
 /// Turns pending bytes into unsolicited parts. Did the station send them instead of the reply?
@@ -191,7 +213,7 @@ void Attempt::judge_unsolicited(std::size_t from, const Ends& ends) {
     }
 }
 
-void Attempt::collect() {
+std::size_t Attempt::collect() {
     const std::size_t behind = framer_.parts_behind();
     std::vector<Unused> parts = framer_.take_unused();
     for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -209,6 +231,7 @@ void Attempt::collect() {
         }
         unsolicited_.push_back(std::move(parts[i]));
     }
+    return std::min(behind, parts.size());
 }
 
 /// The candidate came before our own request.
@@ -247,11 +270,14 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
     if (candidate_ && usual_is_over && is_doubted()) return Verdict::doubtful;
     if (candidate_ && usual_is_over) {
         reply_ = std::exchange(candidate_, std::nullopt);
+        first_byte_ = candidate_began_;
+        believed_ = candidate_at_;
         return Verdict::replied;
     }
     if (instead_ == Instead::reply) return Verdict::wrong;
+    beheaded_ = beheaded_ || framer_.ends_beheaded(damaged_bytes_);
     const bool damaged = framer_.was_damaged() || echo_.mismatch() || contested_;
-    if (framer_.was_damaged_whole()) return Verdict::damaged;
+    if (framer_.was_damaged_whole() || beheaded_) return Verdict::damaged;
     const Duration wait = in_doubt() ? timing_.usual : timing_.patience;
     if (now < timing_.sent + wait) return Verdict::open;
     if (instead_ == Instead::unrelated) return Verdict::wrong;
@@ -296,7 +322,7 @@ void Attempt::teach(EchoMemory& memory) const {
 Duration Attempt::waited(TimePoint now) const {
     if (pace_.is_shorter()) return std::max(first_byte_ - timing_.sent, Duration::zero());
     const Duration reply = frame_time(timing_.serial, reply_->size() + modbus::kAduOverhead);
-    return std::max(now - timing_.sent - reply, Duration::zero());
+    return std::max(came_at(now) - timing_.sent - reply, Duration::zero());
 }
 
 TimePoint Attempt::first_byte() const {
@@ -312,12 +338,12 @@ bool Attempt::came_damaged_before() const {
     return behind != damaged_bytes_.end() && *behind != group_.request.pdu()[1];
 }
 
-void Attempt::add_unsolicited(const Bytes& pdu) {
+Unused Attempt::own_frame(const Bytes& pdu) const {
     Unused part;
     part.kind = Unused::Kind::own;
     part.station = group_.station;
     part.bytes = adu_of(pdu);
-    unsolicited_.push_back(std::move(part));
+    return part;
 }
 
 void Attempt::reject_reply() {
@@ -331,10 +357,12 @@ void Attempt::keep_candidate(Duration needed, Candidate kind) {
     kept_ = kind;
     timing_.usual = std::min(timing_.usual, needed);
     // The reply that the duplicate has delayed comes after it.
-    if (is_doubted())
+    if (is_doubted() || kind == Candidate::held)
         timing_.usual = std::min(last_byte_ - timing_.sent + needed, timing_.patience);
     candidate_ = std::exchange(reply_, std::nullopt);
     candidate_at_ = last_byte_;
+    candidate_began_ = first_byte_;
+    begins_anew_ = true;
     disturbed_ = true;
 }
 

@@ -16,6 +16,16 @@ using State = Asked::State;
 
 bool is_outstanding(const Asked& one) { return one.state == State::outstanding; }
 
+/// What was announced is not announced, or refused for being busy, once more.
+bool may_answer(const Asked& one, ByteView reply) {
+    const auto code = one.announced ? modbus::exception_of(reply) : std::nullopt;
+    const auto is = [&](modbus::ExceptionCode what) {
+        return code == static_cast<std::uint8_t>(what);
+    };
+    return !is(modbus::ExceptionCode::acknowledge) &&
+           !is(modbus::ExceptionCode::server_device_busy) && modbus::answers(one.pdu, reply);
+}
+
 bool is_closed(const Asked& one) {
     return one.state == State::passed || one.state == State::lapsed;
 }
@@ -26,9 +36,7 @@ bool is_recent_reply(const Asked& one, TimePoint now) {
 
 /// True if it may be answered by this, as an outstanding request.
 auto outstanding_for(ByteView reply) {
-    return [reply](const Asked& one) {
-        return is_outstanding(one) && modbus::answers(one.pdu, reply);
-    };
+    return [reply](const Asked& one) { return is_outstanding(one) && may_answer(one, reply); };
 }
 
 auto closed_for(ByteView reply, TimePoint open) {
@@ -50,9 +58,13 @@ void add_closed(Claims& claims, const Asked& one, ByteView reply,
 
 /// A reply that was given before.
 void add_reply(Claims& claims, const Asked& one, TimePoint now, ByteView reply, bool is_same) {
-    if (!is_recent_reply(one, now) || !std::ranges::equal(one.reply, reply)) return;
-    claims.repeats = true;
+    if (!std::ranges::equal(one.reply, reply)) return;
+    const bool values = modbus::is_pure_read(one.pdu) && reply[0] == one.pdu[0];
+    const bool recent = is_recent_reply(one, now);
+    if (!recent && !(values && now - one.replied <= timing::kLatestCopy)) return;
     claims.repeats_other = claims.repeats_other || !is_same;
+    if (!recent) return;
+    claims.repeats = true;
     claims.repeated = std::max(claims.repeated, one.replied);
 }
 
@@ -65,7 +77,7 @@ void add_claim(Claims& claims, const Asked& one, TimePoint now, ByteView reply,
     };
     switch (one.state) {
         case State::outstanding:
-            if (one.sent <= windows.outstanding || !fits(one.sent)) return;
+            if (one.sent <= windows.outstanding || !may_answer(one, reply)) return;
             claims.outstanding = true;
             claims.other_outstanding = claims.other_outstanding || !same;
             return;
@@ -161,6 +173,12 @@ const Bytes* OutstandingRequests::given_in(TimePoint now, std::uint8_t station, 
     return nullptr;
 }
 
+bool OutstandingRequests::any_announced(std::uint8_t station) const {
+    return any(station) && std::ranges::any_of(of(station).asked, [](const Asked& one) {
+               return is_outstanding(one) && one.announced;
+           });
+}
+
 TimePoint OutstandingRequests::first_sent(std::uint8_t station) const {
     return std::ranges::find_if(of(station).asked, is_outstanding)->sent;
 }
@@ -217,8 +235,15 @@ TimePoint OutstandingRequests::broadcasts_over(const modbus::Request& request, D
     return over;
 }
 
-void OutstandingRequests::on_unanswered(std::uint8_t station, TimePoint sent, const Bytes& pdu) {
-    enter(at(station), {.sent = sent, .pdu = pdu}, most_);
+void OutstandingRequests::on_unanswered(std::uint8_t station, TimePoint sent, const Bytes& pdu,
+                                        bool announced) {
+    enter(at(station), {.sent = sent, .pdu = pdu, .announced = announced}, most_);
+}
+
+void OutstandingRequests::announce(std::uint8_t station, ByteView exception) {
+    PoolVector<Asked>& all = at(station).asked;
+    const auto found = std::ranges::find_if(all, outstanding_for(exception));
+    if (found != all.end()) found->announced = true;
 }
 
 void OutstandingRequests::on_damaged(std::uint8_t station, TimePoint sent, const Bytes& pdu) {
@@ -361,6 +386,7 @@ void OutstandingRequests::take_first(Page& page) {
 void OutstandingRequests::close(Page& page, State state, TimePoint since, TimePoint before) {
     for (Asked& one : page.asked) {
         if (!is_outstanding(one) || one.sent < since || one.sent >= before) continue;
+        if (one.announced && state == State::passed) continue;
         one.state = state;
         --page.outstanding;
     }

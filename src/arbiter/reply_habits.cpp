@@ -9,6 +9,14 @@ namespace panelgate::arbiter {
 
 using fact::when;
 
+namespace {
+
+constexpr std::uint8_t code_of(modbus::ExceptionCode code) {
+    return static_cast<std::uint8_t>(code);
+}
+
+}  // namespace
+
 modbus::Request ReplyHabits::proof(const OutstandingRequests& book) const {
     modbus::Request read = reads_.probe();
     if (reconnect_.only_known_reads() || !book.is_ambiguous(id_, read)) return read;
@@ -66,12 +74,20 @@ void ReplyHabits::on_asked(OutstandingRequests& book, TimePoint now, const Group
     if (group.span && !group.distinct_length) reads_.on_wanted(group.request);
 }
 
+bool ReplyHabits::announces(ByteView reply) const {
+    const auto code = modbus::exception_of(reply);
+    return code &&
+           (*code == code_of(modbus::ExceptionCode::acknowledge) ||
+            (*code == code_of(modbus::ExceptionCode::server_device_busy) && unkept_ < kUnkept));
+}
+
 void ReplyHabits::on_unanswered(OutstandingRequests& book, TimePoint now, const Bytes& pdu,
-                                TimePoint sent) {
+                                TimePoint sent, bool announced) {
     book.forget_damaged(id_);
     proved_ = false;
     reconnect_.on_outstanding();
-    book.on_unanswered(id_, sent, pdu);
+    if (announced) ++unkept_;
+    book.on_unanswered(id_, sent, pdu, announced);
     rest(book, now);
 }
 
@@ -127,6 +143,7 @@ void ReplyHabits::learn_of_duplicates(OutstandingRequests& book, TimePoint now,
     const auto given = [&](TimePoint at, const Bytes& said, TimePoint before = TimePoint::max()) {
         return book.given(id_, at, said, before);
     };
+    if (!group.doubted.empty()) duplicates_.on_asked_again(attempt.contradicted());
     const bool was_candidate = attempt.had_candidate() && given(now, reply) != TimePoint{};
     if (reply == group.doubted || (was_candidate && !group.is_values(reply))) {
         duplicates_.on_confirmed(group.request.pdu(), reply);
@@ -145,12 +162,14 @@ void ReplyHabits::learn_of_duplicates(OutstandingRequests& book, TimePoint now,
 
 /// Updates what is outstanding after this reply.
 void ReplyHabits::settle(OutstandingRequests& book, TimePoint now, const Attempt& attempt) {
-    constexpr auto kAcknowledge = static_cast<std::uint8_t>(modbus::ExceptionCode::acknowledge);
     const Group& group = attempt.group();
     const TimePoint sent = attempt.timing().sent;
     if (attempt.reply() == group.doubted && book.count(id_) <= 1) {
         book.settle(id_);  // both have come
         rest_is_over(now + duplicates_.take_doubt());
+    } else if (announces(attempt.reply())) {
+        // The reply comes later. Of another request's, too: which one it refers to is unknown.
+        on_unanswered(book, now, group.request.pdu(), sent, true);
     } else if (book.first(id_, attempt.reply()) != nullptr) {
         // Each attempt may have been answered with it, this one too.
         close(book, attempt.reply(), true);
@@ -158,9 +177,6 @@ void ReplyHabits::settle(OutstandingRequests& book, TimePoint now, const Attempt
         rest(book, now);
     } else if (now < again_until_ && late_.worst() > Duration::zero()) {
         // It may be the damaged reply resent, and the reply to this attempt is late.
-        on_unanswered(book, now, group.request.pdu(), sent);
-    } else if (modbus::exception_of(attempt.reply()) == kAcknowledge) {
-        // It announces the reply, which comes later.
         on_unanswered(book, now, group.request.pdu(), sent);
     } else {
         if (!disordered_at_) book.pass(id_, sent);
@@ -174,6 +190,11 @@ ReplyHabits::Heard ReplyHabits::on_unsolicited(OutstandingRequests& book, TimePo
     const bool may_repeat =
         now < std::exchange(again_until_, TimePoint{}) || book.given(id_, now, pdu) != TimePoint{};
     if (modbus::exception_of(pdu)) book.on_refusal(id_, now, pdu);
+    // Right behind the last reply and answering the same: one of the two is surplus.
+    const Asked* const last = book.last_reply(id_);
+    if ((done == Done::second || done == Done::disorder) && last != nullptr &&
+        modbus::answers(last->pdu, pdu))
+        duplicates_.on_surplus(now, now - last->replied);
     if (done == Done::late) return on_late(book, now, pdu, asked, may_repeat);
     if (done == Done::disorder) return on_disorder(book, now, pdu);
     on_unasked(book, now, done, pdu);
@@ -196,6 +217,7 @@ ReplyHabits::Heard ReplyHabits::on_late(OutstandingRequests& book, TimePoint now
     // The oldest one whose reply could still come: an older one would overstate the lateness.
     const Asked answered = *book.first(id_, pdu, now - latest_reply());
     const TimePoint due = answered.sent + late_.timeout();
+    if (answered.announced) unkept_ = 0;
     // After a shortened wait it shows how long the panel needs; a reply delayed beyond the whole
     // timeout does not.
     if (now <= due) heard.needed = now - answered.sent;
@@ -205,6 +227,8 @@ ReplyHabits::Heard ReplyHabits::on_late(OutstandingRequests& book, TimePoint now
     // A repetition of the previous reply may be a duplicate, and the outstanding reply still comes.
     if (may_repeat) {
         duplicates_.on_ambiguous(now, book.given(id_, now, pdu));
+    } else if (announces(pdu)) {
+        book.announce(id_, pdu);
     } else {
         close(book, pdu, may_be_meant);
     }

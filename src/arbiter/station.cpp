@@ -33,6 +33,8 @@ Station::Heard Station::on_unsolicited_frame(OutstandingRequests& book, TimePoin
                                              ByteView pdu, bool asked) {
     Heard heard{replies_.on_unsolicited(book, now, done, pdu, asked)};
     if (done == Done::duplicate) trail_.on_unsolicited(now);
+    // It may be the true answer to the last request: then the one before it shows no pace.
+    if (done == Done::second) times_ = times_before_;
     if (!is_late(done)) return heard;
     if (heard.needed) times_.add_long(*heard.needed);
     heard.back = health_.on_late_reply(now);
@@ -54,12 +56,16 @@ Station::Replied Station::on_reply(OutstandingRequests& book, TimePoint now, con
     failing_.clear();
     missed_ = false;
     lately_ = result.back ? 0 : static_cast<std::uint8_t>(lately_ << 1);
-    if (group.shows_pace()) times_.add(waited);
+    if (group.shows_pace()) {
+        times_before_ = times_;
+        times_.add(waited);
+    }
     turnaround_.add(think);
     result.drift = turnaround_.take_report(settings_.response_timeout);
     result.trailed = trail_.seen();
-    trail_.on_reply(now);
-    replies_.on_answered(book, now, attempt, waited);
+    const TimePoint came = attempt.came_at(now);
+    trail_.on_reply(came);
+    replies_.on_answered(book, came, attempt, waited);
     result.trail = trail_.take_report();
     const bool exception = modbus::exception_of(attempt.reply()).has_value();
     hole_.on_reply(now, attempt.longest_pause());
@@ -115,7 +121,7 @@ bool Station::may_retry(const Group& group) const {
     if (group.abandoned() || health_.offline() || failing() || speculative()) return false;
     if (missed_last() && !group.first_silence) return false;
     const bool harmless = group.request.is_read() || (settings_.retry_writes && group.repeatable);
-    const int failed = group.attempts - (group.doubted.empty() ? 0 : 1);
+    const int failed = group.attempts - group.doubts;
     return harmless && failed <= settings_.retries;
 }
 

@@ -38,9 +38,12 @@ void Arbiter::conclude(TimePoint now, Verdict verdict) {
             part.bytes[0] == station)
             stations_.book().on_foreign(now, part.bytes, true);
     }
+    const std::vector<modbus::Unused> set_aside = active_->take_set_aside();
     outbox_.inside_attempt(true);
     if (verdict == Verdict::replied) settle(now);
     note(now, unsolicited);
+    for (const modbus::Unused& part : set_aside)
+        outbox_.on_unsolicited(now, part, Done::unasked, station);
     if (verdict == Verdict::doubtful) {
         ask_again(now);
     } else if (verdict != Verdict::open && verdict != Verdict::replied) {
@@ -73,6 +76,7 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
     const bool refusal = modbus::exception_of(reply).has_value();
     const bool first = !attempt.had_candidate();
     const bool is_early = early && !settings_.paced && pace_.believed();
+    const bool before_end = early && first && !settings_.paced && pace_.expects_none_early();
     // An earlier request may have been refused; the next refusal may be that again.
     const bool refuses_other =
         refusal && !group.probe && (attempt.refusal_was_rejected() || claims.other_outstanding);
@@ -86,6 +90,7 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
                                 !group.request.is_read() &&
                                 habits.may_answer_broadcast(book.behind_broadcast(now, reply));
     const bool too_soon = first && group.attempts <= 1 && station.is_far_too_quick(first_sign);
+    const bool contradicted = attempt.contradicted() && group.doubts == 0;
     const bool misnumbered = refusal && group.may_doubt_refusal() && first &&
                              habits.may_refuse_other(book, now, claims, group.request.function());
     const bool repeats = station.may_be_duplicate(now, attempt, claims, is_early);
@@ -96,19 +101,27 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
            when(overdue, fact::overdue) | when(like_echo, fact::like_echo) |
            when(misnumbered, fact::misnumbered) | when(repeats, fact::repeats) |
            when(like_broadcast, fact::like_broadcast) | when(too_soon, fact::too_soon) |
+           when(before_end, fact::before_end) | when(contradicted, fact::contradicted) |
+           when(first && habits.holds_answers(now) > Duration::zero(), fact::may_be_followed) |
            when(may_ask, fact::may_ask) | when(first && attempt.precedes_echo(), fact::before_echo);
 }
 
 /// Returns true if it is the answer.
 bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     Attempt& attempt = *active_;
-    const Done done = judge(facts_of_reply(now, station, early));
+    const Facts facts = facts_of_reply(now, station, early);
+    const Done done = judge(facts);
     if (done == Done::contested) attempt.reject_contested();
     if (done == Done::reject) attempt.reject_reply();
     const auto keep = [&](Attempt::Candidate as) { attempt.keep_candidate(station.needed(), as); };
     if (done == Done::keep) keep(Attempt::Candidate::believed);
     if (done == Done::ask_again) keep(Attempt::Candidate::doubted);
     if (done == Done::suspect_echo) keep(Attempt::Candidate::echo);
+    if (done == Done::hold)
+        attempt.keep_candidate(station.replies().holds_answers(now), Attempt::Candidate::held);
+    if (done != Done::accept && (facts & fact::before_end) != 0) attempt.mark_candidate_early();
+    attempt.group().odd_pace =
+        early && !settings_.paced && !pace_.unbound() && attempt.group().attempts <= 1;
     return done == Done::accept;
 }
 
@@ -172,15 +185,17 @@ void Arbiter::confirm(const Group& group, ByteView reply, bool echoed) {
 /// The reply may be a duplicate of an earlier one, and the real one may still come. The station's
 /// health is not affected.
 void Arbiter::ask_again(TimePoint now) {
+    if (active_->candidate_is_early()) pace_.on_doubted();
     active_->remember_doubt();
     Attempt attempt = take_active(now);
     outbox_.report(attempt, TransactionEnd::doubtful);
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
     station.replies().on_doubted(stations_.book(), now, group, attempt.timing().sent);
+    if (attempt.contradicted()) station.replies().on_contradicted(now);
     group.silent_after = group.cut_after = {};
     finish_barred(group);
-    if (in_time(now, group) && !group.abandoned()) {
+    if (group.doubts <= Group::kMostDoubts && in_time(now, group) && !group.abandoned()) {
         if (!group.request.is_read()) return schedule_.retry(now, confirming(group, station), {});
         outbox_.decide(now, Decision::Kind::doubted, group.jobs.front());
         return schedule_.retry(now, std::move(group), station.usual());

@@ -302,6 +302,25 @@ bool ReplyFramer::is_own_reply(ByteView damaged) const {
            damaged[1] == request_[0] && damaged[2] == count && request_[1] != count;
 }
 
+bool ReplyFramer::ends_beheaded(ByteView damaged) const {
+    if (ends_ == Ends::told || !expected_) return false;
+    const bool writes = is_broadcastable(request_[0]);
+    if (!writes && !is_read(request_[0])) return false;
+    Bytes head{station_};
+    const Bytes reply =
+        writes ? normal_write_reply(request_)
+               : Bytes{request_[0], static_cast<std::uint8_t>(*expected_ - kReadReplyOverhead)};
+    head.insert(head.end(), reply.begin(), reply.begin() + kHeader - 1);
+    for (std::size_t lost = 1; lost <= kHeader; ++lost) {
+        const std::size_t rest = *expected_ - lost;
+        if (rest > damaged.size()) continue;
+        Bytes whole(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(lost));
+        whole.insert(whole.end(), damaged.end() - static_cast<std::ptrdiff_t>(rest), damaged.end());
+        if (crc_ok(whole, orders_) && answers(request_, pdu_of(whole))) return true;
+    }
+    return false;
+}
+
 void ReplyFramer::classify(ByteView bytes) {
     if (ends_ == Ends::told) {
         if (!bytes.empty()) step_over(classify_frame(bytes, station_, false));

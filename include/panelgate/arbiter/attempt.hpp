@@ -46,6 +46,10 @@ struct Group {
     bool first_silence = false;  ///< its station was healthy when it was first sent
     /// The queued job for which this read only detects the echo.
     Ticket learns_for = 0;
+    int doubts = 0;         ///< attempts whose answer was doubtful
+    bool odd_pace = false;  ///< its reply began before it had left, where that is unusual
+
+    static constexpr int kMostDoubts = 2;  ///< after which there is no sure answer
 
     /// True if it asks for more than any of its jobs.
     bool joined() const {
@@ -65,9 +69,7 @@ struct Group {
     }
     /// True if a reply that may be a duplicate must be confirmed by asking again: values, for
     /// clients. Exceptions are not asked for again; they may be gone by then.
-    bool may_doubt(ByteView reply) const {
-        return is_values(reply) && doubted.empty() && !jobs.empty();
-    }
+    bool may_doubt(ByteView reply) const { return is_values(reply) && !jobs.empty(); }
     /// True if an exception reply to it may be confirmed by asking again.
     bool may_doubt_refusal() const {
         return request.is_read() && doubted.empty() && !jobs.empty() && confirms.empty();
@@ -78,7 +80,7 @@ struct Group {
     }
     /// True if its reply shows the station's pace: the reply to a retry may answer the attempt
     /// before.
-    bool shows_pace() const { return silent_after + cut_after == Duration::zero(); }
+    bool shows_pace() const { return silent_after + cut_after == Duration::zero() && !odd_pace; }
     /// True if a poll has brought it its turn.
     bool is_poll() const { return !jobs.empty() && jobs.front().priority == PriorityClass::poll; }
     /// True if no client waits for it any more.
@@ -185,6 +187,8 @@ class Attempt {
     bool replied_early() const { return first_byte_ < timing_.sent && noise_in_front_ == 0; }
     /// ... and earlier than a clock difference of kRatesDiffer explains.
     bool replied_too_early() const { return replied_early() && first_byte_ < earliest_end(); }
+    /// When the reply came that is judged now: before, if it was a candidate.
+    TimePoint came_at(TimePoint now) const { return believed_.value_or(now); }
     /// Time from the end of the request to the start of the reply, whose last byte came now.
     Duration waited(TimePoint now) const;
     /// Time from the end of the request to the first sign of a reply, as received: adapters buffer
@@ -209,12 +213,20 @@ class Attempt {
         none,      ///< there has been no candidate
         believed,  ///< it is the answer
         doubted,   ///< the attempt is doubtful
+        held,      ///< it is the answer, unless another one differs
         echo,      ///< the same: it may be the echo, on a line that had none so far
     };
     /// Keeps the reply as a candidate because it may be a duplicate. Nothing else comes: until
     /// `needed` after the request, the longest time the station has needed, or, if doubted, after
     /// the candidate.
     void keep_candidate(Duration needed, Candidate kind);
+    /// The candidate began before the request had left: no reply of any request here.
+    void mark_candidate_early() { candidate_early_ = true; }
+    bool candidate_is_early() const { return candidate_early_; }
+    /// Takes the frames that were answers, but began too early or contradict another one.
+    std::vector<modbus::Unused> take_set_aside() { return std::exchange(set_aside_, {}); }
+    /// True if two answers came that differ, before one was given.
+    bool contradicted() const { return contradicted_; }
     bool had_candidate() const { return kept_ != Candidate::none; }
     /// True if the reply came where the line's echo was expected: if the echo follows, it is
     /// another master's.
@@ -249,6 +261,7 @@ class Attempt {
     void remember_doubt() {
         group_.doubted = std::exchange(candidate_, std::nullopt).value_or(Bytes{});
         group_.doubted_at = candidate_at_;
+        ++group_.doubts;
     }
 
     const EchoFilter& echo() const { return echo_; }
@@ -258,8 +271,8 @@ class Attempt {
     bool heard_itself() const { return own_.came_back; }
     /// Updates what is known of the line's echo from this reply.
     void teach(EchoMemory& memory) const;
-    /// True if its own reply came damaged, but with the header intact.
-    bool came_damaged() const { return framer_.had_own_header(); }
+    /// True if its own reply came damaged, but with the header intact, or without its beginning.
+    bool came_damaged() const { return framer_.had_own_header() || beheaded_; }
     /// True if what may have been its own reply broke off before its full length.
     bool was_cut_off() const { return framer_.was_damaged() && !framer_.was_damaged_whole(); }
     /// True if the station sent an exception for another function than was asked.
@@ -304,14 +317,18 @@ class Attempt {
     Verdict take_from_echo(const Ends& ends);
     Verdict feed(ByteView bytes, const Ends& ends);
     Verdict accept(std::optional<Bytes> reply);
+    /// Sets the parts behind this reply aside that answer the request and differ. True if any do.
+    bool is_contradicted(const Bytes& reply, std::size_t behind);
     Verdict judge_pending(const Ends& ends);
-    void add_unsolicited(const Bytes& pdu);
+    void add_unsolicited(const Bytes& pdu) { unsolicited_.push_back(own_frame(pdu)); }
+    modbus::Unused own_frame(const Bytes& pdu) const;
     /// The ADU of this reply of the station.
     Bytes adu_of(ByteView reply) const {
         return modbus::encode_adu(group_.station, reply, orders_.of(group_.station));
     }
     void judge_unsolicited(std::size_t from, const Ends& ends);
-    void collect();
+    /// Returns how many of the parts follow the reply.
+    std::size_t collect();
     void on_echo_behind();
     bool is_stale(TimePoint now, std::size_t size) const;
     /// True if other bytes were heard: the reply may be lost, so wait only the usual time.
@@ -332,6 +349,13 @@ class Attempt {
     std::optional<Bytes> candidate_;  ///< a reply that may be a duplicate
     Candidate kept_ = Candidate::none;
     TimePoint candidate_at_{};
+    TimePoint candidate_began_{};
+    std::optional<TimePoint> believed_;  ///< when the reply came that was a candidate
+    bool candidate_early_ = false;
+    bool begins_anew_ = false;  ///< the next byte is not the candidate's
+    bool contradicted_ = false;
+    bool beheaded_ = false;  ///< the reply lost its first bytes
+    std::vector<modbus::Unused> set_aside_;
     std::optional<TimePoint> first_reply_at_;
     std::vector<modbus::Unused> unsolicited_;
     Bytes damaged_bytes_;

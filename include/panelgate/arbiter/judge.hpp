@@ -23,11 +23,14 @@ inline constexpr Facts refuses_other = 1 << 3;  ///< or refuses another outstand
 inline constexpr Facts impossible = 1 << 4;     ///< a repetition, sooner than the request arrived
 inline constexpr Facts overdue = 1 << 5;    ///< slower than ever, and may be to one that has passed
 inline constexpr Facts like_echo = 1 << 6;  ///< equals its request, and came too soon
-inline constexpr Facts misnumbered = 1 << 7;      ///< may refuse a request of another function
-inline constexpr Facts may_ask = 1 << 8;          ///< asking once more would tell
-inline constexpr Facts before_echo = 1 << 9;      ///< our own frame may still come behind it
-inline constexpr Facts like_broadcast = 1 << 20;  ///< may be the answer to a broadcast
-inline constexpr Facts too_soon = 1 << 19;        ///< by a wide margin sooner than ever
+inline constexpr Facts misnumbered = 1 << 7;       ///< may refuse a request of another function
+inline constexpr Facts may_ask = 1 << 8;           ///< asking once more would tell
+inline constexpr Facts before_echo = 1 << 9;       ///< our own frame may still come behind it
+inline constexpr Facts like_broadcast = 1 << 20;   ///< may be the answer to a broadcast
+inline constexpr Facts too_soon = 1 << 19;         ///< by a wide margin sooner than ever
+inline constexpr Facts before_end = 1 << 21;       ///< began before the request had left
+inline constexpr Facts contradicted = 1 << 22;     ///< another one came that differs
+inline constexpr Facts may_be_followed = 1 << 23;  ///< its station sends surplus answers
 
 // Of one that does not.
 inline constexpr Facts own_frame = 1 << 10;    ///< is the frame that was sent last
@@ -49,6 +52,7 @@ enum class Done : std::uint8_t {
     contested,     ///< the attempt is damaged
     reject,        ///< another request's: the attempt goes on
     keep,          ///< a candidate: the answer if nothing else comes
+    hold,          ///< the same, for a short time: another answer contradicts it
     ask_again,     ///< a candidate: the request is sent once more
     suspect_echo,  ///< the same, and a read goes out that has no equal echo
     // It does not.
@@ -79,29 +83,33 @@ struct JudgeRow {
     Done done;
 };
 inline constexpr JudgeRow kJudgeRows[] = {
-    {fact::answers | fact::other_master, Done::contested},              // P1
-    {fact::answers | fact::refuses_other, Done::reject},                // P1
-    {fact::answers | fact::impossible, Done::reject},                   // P1
-    {fact::answers | fact::overdue, Done::reject},                      // P1
-    {fact::answers | fact::like_echo, Done::suspect_echo},              // P8
-    {fact::answers | fact::like_broadcast, Done::suspect_echo},         // P8
-    {fact::answers | fact::misnumbered, Done::ask_again},               // P1
-    {fact::answers | fact::repeats | fact::may_ask, Done::ask_again},   // P1
-    {fact::answers | fact::repeats, Done::keep},                        // P1
-    {fact::answers | fact::too_soon | fact::may_ask, Done::ask_again},  // P1
-    {fact::answers | fact::before_echo, Done::keep},                    // P8
-    {fact::answers, Done::accept},                                      // P1, P3
-    {fact::own_frame, Done::echo},                                      // P8
-    {fact::request, Done::request},                                     // P1
-    {fact::damaged, Done::damaged},                                     // MST-04
-    {fact::other_master, Done::nobodys},                                // P1
-    {fact::repeats | fact::sends_twice, Done::duplicate},               // P1
-    {fact::outstanding, Done::late},                                    // P1, P4
-    {fact::repeats, Done::duplicate},                                   // P1
-    {fact::closed, Done::disorder},                                     // P1
-    {fact::last_form, Done::second},                                    // P1
-    {fact::broadcast, Done::broadcast},                                 // P8
-    {fact::known, Done::unasked},                                       // P3
+    {fact::answers | fact::other_master, Done::contested},                  // P1
+    {fact::answers | fact::refuses_other, Done::reject},                    // P1
+    {fact::answers | fact::impossible, Done::reject},                       // P1
+    {fact::answers | fact::overdue, Done::reject},                          // P1
+    {fact::answers | fact::like_echo, Done::suspect_echo},                  // P8
+    {fact::answers | fact::like_broadcast, Done::suspect_echo},             // P8
+    {fact::answers | fact::misnumbered, Done::ask_again},                   // P1
+    {fact::answers | fact::before_end | fact::may_ask, Done::ask_again},    // P1
+    {fact::answers | fact::before_end, Done::keep},                         // P1
+    {fact::answers | fact::contradicted | fact::may_ask, Done::ask_again},  // P1
+    {fact::answers | fact::repeats | fact::may_ask, Done::ask_again},       // P1
+    {fact::answers | fact::repeats, Done::keep},                            // P1
+    {fact::answers | fact::too_soon | fact::may_ask, Done::ask_again},      // P1
+    {fact::answers | fact::before_echo, Done::keep},                        // P8
+    {fact::answers | fact::may_be_followed | fact::may_ask, Done::hold},    // P1
+    {fact::answers, Done::accept},                                          // P1, P3
+    {fact::own_frame, Done::echo},                                          // P8
+    {fact::request, Done::request},                                         // P1
+    {fact::damaged, Done::damaged},                                         // MST-04
+    {fact::other_master, Done::nobodys},                                    // P1
+    {fact::repeats | fact::sends_twice, Done::duplicate},                   // P1
+    {fact::outstanding, Done::late},                                        // P1, P4
+    {fact::repeats, Done::duplicate},                                       // P1
+    {fact::closed, Done::disorder},                                         // P1
+    {fact::last_form, Done::second},                                        // P1
+    {fact::broadcast, Done::broadcast},                                     // P8
+    {fact::known, Done::unasked},                                           // P3
     {0, Done::nobodys},
 };
 

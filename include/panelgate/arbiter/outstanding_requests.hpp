@@ -29,8 +29,9 @@ struct Asked {
     TimePoint sent{};  ///< its last bit; of another master's: when it was heard
     Bytes pdu{};
     TimePoint replied{};
-    Bytes reply{};          ///< of a broadcast: the normal one
-    bool followed = false;  ///< a frame of the form of its reply came behind that
+    Bytes reply{};           ///< of a broadcast: the normal one
+    bool followed = false;   ///< a frame of the form of its reply came behind that
+    bool announced = false;  ///< an exception has announced its reply: the next one is not its
 
     /// When it came to be what it is.
     TimePoint since() const { return sent < replied ? replied : sent; }
@@ -110,6 +111,8 @@ class OutstandingRequests {
     bool any_since(std::uint8_t station, TimePoint since) const {
         return any(station) && last_sent(station) >= since;
     }
+    /// True if the reply to one was announced: it comes later, out of turn.
+    bool any_announced(std::uint8_t station) const;
     /// When the first and the last of the outstanding left; there must be one.
     TimePoint first_sent(std::uint8_t station) const;
     TimePoint last_sent(std::uint8_t station) const;
@@ -143,7 +146,11 @@ class OutstandingRequests {
 
     // Entries
 
-    void on_unanswered(std::uint8_t station, TimePoint sent, const Bytes& pdu);
+    /// `announced`: by an exception.
+    void on_unanswered(std::uint8_t station, TimePoint sent, const Bytes& pdu,
+                       bool announced = false);
+    /// An exception announces the reply to the first outstanding request that it may answer.
+    void announce(std::uint8_t station, ByteView exception);
     /// Its reply came, but damaged.
     void on_damaged(std::uint8_t station, TimePoint sent, const Bytes& pdu);
     void forget_damaged(std::uint8_t station);
@@ -157,7 +164,8 @@ class OutstandingRequests {
     void on_foreign(TimePoint now, ByteView bytes, bool maybe);
     void on_broadcast(TimePoint sent, const Bytes& pdu);
 
-    /// A request that left at `sent` was served: those before it on its connection have passed.
+    /// A request that left at `sent` was served: those before it on its connection have passed,
+    /// except those whose reply was announced.
     void pass(std::uint8_t station, TimePoint sent);
     /// This reply came: takes out the first request that it may answer; those before it on its
     /// connection have passed. Does nothing if what it may answer left over the present connection

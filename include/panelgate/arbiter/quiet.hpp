@@ -99,6 +99,8 @@ class Quiet {
 class Pace {
   public:
     void on_reply(bool early) {
+        doubted_ = 0;
+        in_time_ = early ? 0 : std::min(in_time_ + 1, kAgain);
         if (early) {
             kept_ = false;
             ++early_;
@@ -107,6 +109,8 @@ class Pace {
             early_ = 0;
         }
     }
+    /// An early reply was all that came.
+    void on_doubted() { ++doubted_; }
     /// `hasty`: bytes of a reply came faster than the line's rate allows.
     void on_rate(bool hasty) {
         hasty_ = hasty ? std::min(hasty_ + kWeight, kHasty * kWeight) : std::max(hasty_ - 1, 0);
@@ -114,6 +118,11 @@ class Pace {
     /// True if nothing comes faster than the line's rate, except in one of kWeight replies.
     bool kept() const { return kept_ && hasty_ <= (kHasty - 1) * kWeight; }
     bool believed() const { return kept_ && timely_ >= kEnough; }
+    /// True if an early frame is no reply, as far as the last ones show: then only asking again
+    /// tells. Twice in a row nothing else came: it may be one.
+    bool expects_none_early() const {
+        return (believed() || in_time_ >= kAgain) && doubted_ < kDoubts;
+    }
     /// True if the line does not keep its rate. A single early reply may be a late one to an
     /// earlier attempt.
     bool unbound() const { return early_ >= kEnough; }
@@ -121,10 +130,14 @@ class Pace {
   private:
     static constexpr int kEnough = 3;
     static constexpr int kHasty = 3;
+    static constexpr int kAgain = 8;
+    static constexpr int kDoubts = 2;
     static constexpr int kWeight = 8;
 
     int timely_ = 0;
-    int early_ = 0;  // in a row
+    int early_ = 0;    // in a row
+    int in_time_ = 0;  // in a row
+    int doubted_ = 0;  // early ones in a row
     bool kept_ = true;
     int hasty_ = 0;  // +kWeight for each hasty reply, -1 for any other
 };

@@ -128,7 +128,7 @@ class DuplicateHabit {
     bool suspicious(TimePoint now, ByteView request, ByteView reply, const Claims& claims) const {
         if (confirmed_[kind_of(request, reply)].trusts(reply)) return false;
         const bool any = denied_ > 0 && now - denied_at_ <= timing::kForgetDuplicates;
-        return any ? claims.repeats : claims.repeats_other;
+        return claims.repeats_other || (any && claims.repeats);
     }
     /// The reply was no duplicate: a read had the same values when asked again; for any other
     /// request, which is not asked again, no other answer came.
@@ -156,6 +156,24 @@ class DuplicateHabit {
         guessed_ = std::max(guessed_, first - repeated);
         sooner_ = 0;
     }
+    /// A second answer came so long after the first, and differs.
+    void on_surplus(TimePoint now, Duration delay) {
+        if (delay > timing::kLatestSurplus) return;
+        if (now - surplus_at_ > timing::kForgetDuplicates) surplus_ = always_two_ = 0;
+        surplus_delay_ = surplus_++ == 0 ? delay : std::max(surplus_delay_, delay);
+        surplus_at_ = now;
+    }
+    void on_contradicted(TimePoint now) { surplus_at_ = now; }
+    /// Asked again, after a rest, it gave two answers, or one: where all requests have two, both
+    /// are to the same one.
+    void on_asked_again(bool two) { always_two_ = two ? always_two_ + 1 : 0; }
+    /// How long an answer is to be held, because another one may follow that differs.
+    Duration hold(TimePoint now) const {
+        const bool known = surplus_ >= kSurplus && now - surplus_at_ <= timing::kForgetDuplicates;
+        return known && always_two_ < kConfirmations
+                   ? surplus_delay_ * 3 / 2 + timing::kReceiveMargin
+                   : Duration::zero();
+    }
     /// Time for which the station is not asked after a reply.
     Duration settle_time() const { return delay() * 3 / 2; }
     /// ... after this reply, including the doubtful cases.
@@ -182,6 +200,11 @@ class DuplicateHabit {
     int sooner_ = 0;      ///< duplicates in a row that came in less than half of that
     TimePoint learned_at_{};
     TimePoint replied_{};
+    static constexpr int kSurplus = 2;
+    int surplus_ = 0;
+    int always_two_ = 0;  ///< in a row
+    Duration surplus_delay_{};
+    TimePoint surplus_at_{};
 };
 
 /// The reads that a station is known to answer: one of them tells whether it is there. Pure.
@@ -271,8 +294,9 @@ class ReplyHabits {
     /// True if sending proof() is quicker than waiting. False after an unanswered proof, until the
     /// station has answered something.
     bool may_prove(const OutstandingRequests& book) const {
-        return book.any(id_) && !disordered_at_ && book.first_sent(id_) >= book.opened() &&
-               reads_.any() && !proof_unanswered_ && !book.is_ambiguous(id_, proof(book));
+        return book.any(id_) && !book.any_announced(id_) && !disordered_at_ &&
+               book.first_sent(id_) >= book.opened() && reads_.any() && !proof_unanswered_ &&
+               !book.is_ambiguous(id_, proof(book));
     }
     /// The pause that a station known to send duplicates needs after a reply, at most `longest`;
     /// empty: none.
@@ -283,6 +307,8 @@ class ReplyHabits {
 
     // Acceptance
 
+    /// How long an answer is held, because the station sends two that differ; 0: it does not.
+    Duration holds_answers(TimePoint now) const { return duplicates_.hold(now); }
     /// What this frame may be: none that answers the attempt, if there is one.
     Claims claims(const OutstandingRequests& book, TimePoint now, ByteView pdu,
                   const Attempt* attempt = nullptr) const;
@@ -322,10 +348,14 @@ class ReplyHabits {
     void on_wanted(const modbus::Request& request) { reads_.on_wanted(request); }
     /// An attempt that left at `sent` ended without its own reply: one more is outstanding, until
     /// it has come or cannot come any more.
-    void on_unanswered(OutstandingRequests& book, TimePoint now, const Bytes& pdu, TimePoint sent);
+    /// `announced`: by an exception.
+    void on_unanswered(OutstandingRequests& book, TimePoint now, const Bytes& pdu, TimePoint sent,
+                       bool announced = false);
     /// ... but for a reply that may be a duplicate of an earlier one; a duplicate of this
     /// one may follow.
     void on_doubted(OutstandingRequests& book, TimePoint now, const Group& group, TimePoint sent);
+    /// Two answers came that differ; the request is asked again.
+    void on_contradicted(TimePoint now) { duplicates_.on_contradicted(now); }
     /// ... but its reply came damaged. Some panels resend it: until that would be over only the
     /// same request may be sent, and after its answer the same rest applies.
     void on_damaged_reply(OutstandingRequests& book, TimePoint now, const modbus::Request& request,
@@ -381,6 +411,8 @@ class ReplyHabits {
         duplicates_.on_reply(now);
         book.on_reply(id_, now, pdu, reply);
     }
+    /// True if after this exception the reply itself may come.
+    bool announces(ByteView reply) const;
     void settle(OutstandingRequests& book, TimePoint now, const Attempt& attempt);
 
     std::uint8_t id_;
@@ -401,7 +433,11 @@ class ReplyHabits {
     std::optional<TimePoint> disordered_at_;
     TimePoint drained_at_{};  ///< nothing is sent before, behind a disorder: answers are one behind
     bool proof_unanswered_ = false;  ///< since it was last heard
-    bool proved_ = false;            ///< no outstanding request is in transit
+    /// A busy panel usually does nothing: after so many exceptions 06 that no reply followed, none
+    /// is waited for.
+    static constexpr int kUnkept = 3;
+    int unkept_ = 0;
+    bool proved_ = false;  ///< no outstanding request is in transit
 };
 
 }  // namespace panelgate::arbiter

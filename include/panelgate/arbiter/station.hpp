@@ -246,7 +246,8 @@ class Station {
     ProbeBudget failing_{ProbeBudget::kFailing};  ///< of failures while it is failing()
     std::uint8_t lately_ = 0;  ///< the last 8 attempts, latest lowest: 1 was silent
     TimePoint asked_{};
-    RecentTimes times_;  ///< from request to first sign of the reply
+    RecentTimes times_;         ///< from request to first sign of the reply
+    RecentTimes times_before_;  ///< without the last reply
     TimePoint failed_{};
     Drift clock_drift_;
     ReplyHole hole_;

@@ -28,6 +28,10 @@ inline constexpr Duration kReadingSlack = 1ms;
 /// A later frame is no duplicate of a reply, and no answer to another master's request: that master
 /// would have asked again.
 inline constexpr Duration kLatestRepetition = 500ms;
+/// A later answer to the same request is held for another frame.
+inline constexpr Duration kLatestSurplus = 100ms;
+/// For so long the answer to another request may come again: an adapter keeps its last frame.
+inline constexpr Duration kLatestCopy = 60s;
 /// Some panels repeat a damaged reply within this.
 inline constexpr Duration kRepeatsDamaged = 150ms;
 /// A later frame is no answer to a broadcast; the latest that was seen came after a second.

@@ -85,6 +85,10 @@ class ReplyFramer {
     /// True if, besides, they had the header of the reply to our read, and were longer than our own
     /// frame that may begin like it: nothing else is possible.
     bool had_own_header() const { return own_header_; }
+    /// True if these damaged bytes end like the reply, without its first one to three bytes: an
+    /// adapter that opens its receiver too late loses them. What they were is known, and the CRC
+    /// tells.
+    bool ends_beheaded(ByteView damaged) const;
     /// True if all pending bytes are one valid frame of the station that does not match.
     bool ends_with_other_frame() const;
     /// Returns what was skipped so far, in the order received.

@@ -1,0 +1,172 @@
+#include "arbiter_fixture.hpp"
+
+#include <gtest/gtest.h>
+
+#include "panelgate/modbus/rtu_frame.hpp"
+
+/// P1: of which request an answer is, where its own time or another answer speaks against it.
+namespace panelgate::arbiter::arbiter_answers_test {
+namespace {
+
+using modbus::encode_adu;
+
+/// Two panels that need 12 ms, heard often enough.
+class ArbiterAnswersTest : public ArbiterTest {
+  protected:
+    void know(std::uint8_t station = 17) {
+        for (unsigned i = 1; i <= RecentTimes::kEnough; ++i) read(station, i);
+    }
+    void read(std::uint8_t station, unsigned number) {
+        script.run_for(10ms);
+        script.submit(station, read_at(number), 1);
+        answer(script, station, reply_number(number), 12ms);
+    }
+    Ticket ask(unsigned number) {
+        script.run_for(10ms);
+        return script.submit(17, read_at(number), 1);
+    }
+    Bytes value(Ticket ticket) {
+        const bool good = script.answered(ticket) && script.answer(ticket).pdu.has_value();
+        return good ? script.answer(ticket).pdu.value() : Bytes{};
+    }
+
+    BusScript script{settings};
+};
+
+TEST_F(ArbiterAnswersTest, P1AFrameBeforeTheRequestHasLeftIsNoReplyWhereNoneComesSoSoon) {
+    const Ticket first = ask(200);
+    script.hear_reply(17, reply_number(900));
+    ASSERT_TRUE(script.answered(first)) << "nobody can tell yet";
+    know();
+    for (unsigned i = 201; i < 210; ++i) {
+        const Ticket ticket = ask(i);
+        const std::size_t sent = script.sent.size();
+        script.hear_reply(17, reply_number(900));
+        EXPECT_FALSE(script.answered(ticket));
+        script.run_to_end_of_request();
+        script.run_for(12ms);
+        script.hear_reply(17, reply_number(i));
+        EXPECT_EQ(value(ticket), reply_number(i));
+        EXPECT_EQ(script.sent.size(), sent) << "in the same attempt";
+    }
+}
+
+TEST_F(ArbiterAnswersTest, P5APanelThatHasBecomeFasterThanItsRequestIsBelievedWhenAskedAgain) {
+    know();
+    const Ticket ticket = ask(200);
+    script.hear_reply(17, reply_number(200));
+    for (unsigned i = 201; i < 203; ++i) {
+        ASSERT_TRUE(script.next_sent(200ms));
+        script.hear_reply(17, reply_number(i));
+    }
+    EXPECT_EQ(value(ticket), reply_number(202));
+    script.run_for(2s);
+    const Ticket next = ask(203);
+    script.hear_reply(17, reply_number(203));
+    EXPECT_TRUE(script.answered(next));
+}
+
+TEST_F(ArbiterAnswersTest, P1TheAnswerToAnotherReadIsAskedForOnceMoreHoweverOldItIs) {
+    read(17, 1);
+    script.run_for(5s);
+    const Ticket ticket = ask(2);
+    answer(script, 17, reply_number(1), 12ms);
+    EXPECT_FALSE(script.answered(ticket));
+    EXPECT_EQ(script.next_sent(100ms).value().adu, encode_adu(17, read_at(2)));
+    answer(script, 17, reply_number(2), 12ms);
+    EXPECT_EQ(value(ticket), reply_number(2));
+}
+
+TEST_F(ArbiterAnswersTest, P1WhereEachAnswerIsAnOldOneThereIsNone) {
+    for (const unsigned i : {1u, 2u, 3u}) read(17, i);
+    const Ticket ticket = ask(4);
+    for (const unsigned i : {1u, 2u, 3u}) {
+        answer(script, 17, reply_number(i), 12ms);
+        EXPECT_EQ(script.next_sent(200ms).has_value(), i < 3);
+    }
+    EXPECT_EQ(script.answer(ticket).pdu.error(), Fault::timeout);
+}
+
+TEST_F(ArbiterAnswersTest, P1TwoAnswersAtOnceThatDifferAreNone) {
+    read(17, 1);
+    const Ticket ticket = ask(2);
+    script.run_to_end_of_request();
+    script.run_for(12ms);
+    Bytes both = encode_adu(17, reply_number(9));
+    const Bytes second = encode_adu(17, reply_number(8));
+    both.insert(both.end(), second.begin(), second.end());
+    script.hear(both);
+    EXPECT_FALSE(script.answered(ticket));
+    EXPECT_EQ(script.next_sent(100ms).value().adu, encode_adu(17, read_at(2)));
+    answer(script, 17, reply_number(2), 12ms);
+    EXPECT_EQ(value(ticket), reply_number(2));
+}
+
+TEST_F(ArbiterAnswersTest, P1APanelThatSendsASurplusAnswerIsBelievedWhenNoneFollows) {
+    for (const unsigned i : {1u, 20u}) {
+        read(17, i);
+        script.run_for(4ms);
+        script.hear_reply(17, reply_number(500 + i));
+        for (unsigned k = 1; k < 10; ++k) read(17, i + k);
+    }
+    const Ticket ticket = ask(50);
+    answer(script, 17, reply_number(40), 12ms);
+    EXPECT_FALSE(script.answered(ticket));
+    script.run_for(4ms);
+    script.hear_reply(17, reply_number(50));
+    EXPECT_FALSE(script.answered(ticket)) << "one of two";
+    EXPECT_EQ(script.next_sent(100ms).value().adu, encode_adu(17, read_at(50)));
+    answer(script, 17, reply_number(51), 12ms);
+    script.run_for(20ms);
+    EXPECT_EQ(value(ticket), reply_number(51));
+}
+
+TEST_F(ArbiterAnswersTest, P4AReplyWithoutItsFirstByteIsDamagedAndNotSilence) {
+    settings.stations[0].retries = 0;
+    for (const std::size_t lost : {1u, 2u, 3u}) {
+        BusScript line{settings};
+        const Ticket ticket = line.submit(17, kRead, 1);
+        line.run_to_end_of_request();
+        line.run_for(8ms);
+        const Bytes whole = encode_adu(17, kReply);
+        line.hear(ByteView(whole).subspan(lost));
+        line.run_for(60ms);
+        EXPECT_EQ(line.answer(ticket).pdu.error(), Fault::damaged) << lost;
+    }
+}
+
+class ArbiterAnnouncedTest : public ArbiterAnswersTest,
+                             public testing::WithParamInterface<Bytes> {};
+
+TEST_P(ArbiterAnnouncedTest, P1ItAnswersNoOtherReadThatWasAnnouncedToo) {
+    know();
+    const Ticket first = ask(100);
+    answer(script, 17, GetParam(), 12ms);
+    ASSERT_EQ(value(first), GetParam());
+    const Ticket other = script.submit(17, "03 00 00 00 01"_hex, 2);
+    answer_next(script, 17, GetParam(), 12ms);
+    script.run_for(50ms);  // it repeats the one before
+    ASSERT_EQ(value(other), GetParam());
+    const Ticket third = ask(101);
+    script.run_for(100ms);
+    script.hear_reply(17, reply_number(100));
+    EXPECT_FALSE(script.answered(third));
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, ArbiterAnnouncedTest, testing::Values("83 05"_hex, "83 06"_hex));
+
+TEST_F(ArbiterAnswersTest, P5APanelThatIsOftenBusyIsNotWaitedFor) {
+    know();
+    for (unsigned i = 0; i < 4; ++i) {
+        ask(100 + i);
+        answer(script, 17, "83 06"_hex, 12ms);
+        script.run_for(2s);
+    }
+    ask(110);
+    answer(script, 17, "83 06"_hex, 12ms);
+    ask(111);
+    EXPECT_EQ(script.sent.back().adu, encode_adu(17, read_at(111)));
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter::arbiter_answers_test
