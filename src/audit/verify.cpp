@@ -288,7 +288,9 @@ void Verifier::remark(const Sealed& record) {
         record_text(record.number) + " (" + std::string(member_of(record.body, "time")) + "): ";
     const std::string_view gone = member_of(record.body, "gone");
     if (number_of(gone))
-        note(when + "the file before was removed, or changed by others, while it was written, with the records from " +
+        note(when +
+             "the file before was removed, or changed by others, while it was written, with the "
+             "records from " +
              std::string(gone) + " on");
     if (kind == "lost")
         note(when + std::string(member_of(record.body, "count")) +
