@@ -252,6 +252,9 @@ std::string nearest(std::string_view typed, std::span<const std::string_view> ca
     for (const std::string_view candidate : candidates) {
         if (!letters.empty() && plain(candidate) == letters) return std::string(candidate);
     }
+    for (const std::string_view candidate : candidates) {
+        if (!typed.empty() && candidate == std::string(typed) + 's') return std::string(candidate);
+    }
     if (std::string meant = synonym(letters, candidates); !meant.empty()) return meant;
     if (std::string meant = synonym(without_order(letters), candidates); !meant.empty())
         return meant;

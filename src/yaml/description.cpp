@@ -197,7 +197,7 @@ std::string MapReader::unknown(std::size_t entry) const {
     for (const std::string_view word : known) {
         if (lacks_colon(node_->entries[entry], word))
             return message + "; a ':' is missing: write " + std::string(word) + ": " +
-                   key.substr(word.size() + 1);
+                   key.substr(std::min(key.find_first_not_of("=:> ", word.size()), key.size()));
     }
     if (const Entry* parent = shallow_parent(entry))
         return message + "; below " + quote(parent->key) + " (line " +

@@ -136,7 +136,6 @@ std::string_view group(const Match& match, std::size_t number) {
 
 /// Puts the groups into the sentence; in `write 'key: $1'` an empty one takes its blank along.
 std::string told(const Slip& slip, const Match& match) {
-    constexpr std::size_t kLongest = 60;
     std::string text;
     for (std::size_t at = 0; at < slip.says.size(); ++at) {
         const char next = at + 1 < slip.says.size() ? slip.says[at + 1] : ' ';
@@ -151,7 +150,7 @@ std::string told(const Slip& slip, const Match& match) {
         if (next == 'u') {
             text += all[0] == '*' ? "'*'" : name_of(code_point(character_at(all, 0)));
         } else if (!part.empty()) {
-            text += clip(part, kLongest);
+            text += part;
         } else if (text.ends_with(' ')) {
             text.pop_back();
         } else if (text.ends_with('{')) {

@@ -30,7 +30,7 @@ struct Row {
     std::optional<std::size_t> value;  ///< token of the key's value on this line
     bool odd = false;                  ///< nobody knows its column
     bool brackets = false;             ///< its text is in brackets: it continues no other
-    std::string_view name;             ///< its key
+    std::string_view name;             ///< its key, or the first in its brackets
 
     std::size_t at() const { return dashes.empty() ? column : dashes.front(); }
     void shift(std::ptrdiff_t by) {
@@ -68,7 +68,8 @@ struct Reader {
         }
         bool begins = true;
         for (const std::size_t dash : row.dashes) {
-            const std::string_view first = row.key ? row.name : " ";  // one text is like another
+            // One text is like another.
+            const std::string_view first = row.key || row.brackets ? row.name : " ";
             if (!enter({dash, true, number, number, first}, begins)) return false;
             begins = false;
         }
@@ -215,6 +216,7 @@ class Columns {
         row.key = text_.follows(i + 1, Kind::colon);
         row.name = text_.text(i);
         row.brackets = kind(i) == Kind::open;
+        if (row.brackets) row.name = i + 1 < text_.tokens.size() ? text_.text(i + 1) : "";
         if (!row.key) return row;
         i += 2;
         while (text_.follows(i) && (kind(i) == Kind::anchor || kind(i) == Kind::tag)) ++i;
