@@ -114,12 +114,13 @@ class BrokenHouse : public testing::TestWithParam<Broken> {
 
 TEST_P(BrokenHouse, IsCaught) {
     std::string found;
-    for (std::uint64_t seed = 1; seed <= 20 && found.empty(); ++seed) {
+    for (std::uint64_t seed = 1; seed <= 20 && !found.starts_with(GetParam().violation); ++seed) {
         House house(draw_house(GetParam().kind, seed), GetParam().flaw);
         house.run();
-        found = house.violation();
+        // Where the last request of a master meets the flaw, its port is found busy at the end.
+        if (!house.violation().empty()) found = house.violation();
     }
-    EXPECT_EQ(found.substr(0, std::string(GetParam().violation).size()), GetParam().violation);
+    EXPECT_TRUE(found.starts_with(GetParam().violation)) << found;
 }
 
 using Flaw = HouseSeam::Flaw;
