@@ -260,9 +260,10 @@ void find_wrong_reply(Case& c, std::uint8_t station, const Symptoms& s) {
           {{"wrong", s.wrong}, {"requests", s.attempts()}, {"right", s.answered}});
 }
 
-/// Late replies, duplicates and another master's replies are excluded.
+/// Late replies, duplicates, another master's replies and those of a second panel are excluded.
 void find_unasked_frames(Case& c, std::uint8_t station, const Symptoms& s) {
-    if (station == 0 || s.attempts() == 0 || c.has(Cause::other_master) || c.has(Cause::echo))
+    if (station == 0 || s.attempts() == 0 || c.has(Cause::other_master) || c.has(Cause::echo) ||
+        c.has(Cause::duplicate_address, station))
         return;
     const Bar bar{c, Cause::unasked_frames, station};
     const std::uint64_t frames = s.unasked - std::min(s.unasked, s.wrong);
