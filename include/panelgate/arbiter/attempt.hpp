@@ -240,10 +240,9 @@ class Attempt {
         return timing_.echoes && !echo_.complete() && (echo_.mismatch() || own_.fragment);
     }
     /// True if the reply to a write equals the echo of its request: only timing distinguishes them.
-    bool may_be_its_echo() const {
-        return !group_.request.is_read() && !echo_.complete() && !own_.seen &&
-               echo_.is_own(*reply_);
-    }
+    bool equals_its_request() const { return !group_.request.is_read() && echo_.is_own(*reply_); }
+    /// True if our own frame has come in front of it: one more may be an echo that comes twice.
+    bool comes_behind_echo() const { return echo_.complete() || own_.seen; }
     /// Rejects a reply that also answers another master's request; the station was not silent.
     void reject_contested() {
         contested_ = true;
