@@ -83,10 +83,9 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
     const bool impossible =
         ReplyHabits::is_impossible(attempt, claims, is_early && attempt.replied_too_early());
     const bool overdue = claims.passed && first_sign > station.usual(stations_.slowest());
+    const bool too_quick = is_early || station.is_far_too_quick(first_sign, stations_.times());
     const bool like_echo =
-        attempt.equals_its_request() && first &&
-        (is_early || (!attempt.comes_behind_echo() && echo_memory_.echoes_writes()) ||
-         station.is_far_too_quick(first_sign, stations_.times()));
+        first && attempt.may_be_its_echo(too_quick, echo_memory_.echoes_writes());
     const bool like_broadcast = first && !refusal && group.doubted.empty() &&
                                 !group.request.is_read() &&
                                 habits.may_answer_broadcast(book.behind_broadcast(now, reply));

@@ -239,10 +239,14 @@ class Attempt {
     bool may_have_collided() const {
         return timing_.echoes && !echo_.complete() && (echo_.mismatch() || own_.fragment);
     }
-    /// True if the reply to a write equals the echo of its request: only timing distinguishes them.
-    bool equals_its_request() const { return !group_.request.is_read() && echo_.is_own(*reply_); }
-    /// True if our own frame has come in front of it: one more may be an echo that comes twice.
-    bool comes_behind_echo() const { return echo_.complete() || own_.seen; }
+    /// True if the reply to a write may be the echo of its request, which it equals: it came too
+    /// quickly, also behind the echo, which may come twice; or writes come back, and this one has
+    /// not yet.
+    bool may_be_its_echo(bool too_quick, bool writes_come_back) const {
+        const bool behind_echo = echo_.complete() || own_.seen;
+        return !group_.request.is_read() && echo_.is_own(*reply_) &&
+               (too_quick || (writes_come_back && !behind_echo));
+    }
     /// Rejects a reply that also answers another master's request; the station was not silent.
     void reject_contested() {
         contested_ = true;

@@ -1,0 +1,121 @@
+// What is taken for the echo of our own frames, and when a line is known to have one (P8).
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+
+#include "arbiter_fixture.hpp"
+#include "panelgate/arbiter/echo.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "support/hex.hpp"
+#include "support/request.hpp"
+
+namespace panelgate::arbiter::echo_memory_test {
+namespace {
+
+using Expect = EchoFilter::Expect;
+using test::request_of;
+
+const Bytes kFrame = "11 06 00 01 00 03 9A 9B"_hex;
+constexpr int kNoMore = 16;  ///< replies without an echo after which a known one is gone
+
+Bytes copy(ByteView bytes) { return {bytes.begin(), bytes.end()}; }
+
+TEST(EchoFilter, TakesTheWholeFrameOutInAnyPieces) {
+    const Bytes all = Writer().raw(kFrame).u8(0xAA).u8(0xBB).take();
+    for (std::size_t piece = 1; piece <= kFrame.size(); ++piece) {
+        EchoFilter filter(kFrame, Expect::certainly);
+        Writer rest;
+        for (std::size_t at = 0; at < all.size(); at += piece)
+            rest.raw(filter.feed(ByteView(all).subspan(at, std::min(piece, all.size() - at))));
+        EXPECT_EQ(rest.take(), "AA BB"_hex);
+        EXPECT_TRUE(filter.complete());
+        EXPECT_FALSE(filter.mismatch());
+    }
+}
+
+TEST(EchoFilter, DetectsADifferenceAndReturnsWhatItBuffered) {
+    for (const Expect expect : {Expect::certainly, Expect::perhaps}) {
+        EchoFilter filter(kFrame, expect);
+        EXPECT_TRUE(filter.feed("11 06 00"_hex).empty());
+        EXPECT_EQ(filter.pending(), expect == Expect::perhaps);
+        EXPECT_EQ(copy(filter.feed("FF 01"_hex)), "11 06 00 FF 01"_hex);
+        EXPECT_EQ(filter.mismatch(), expect == Expect::certainly);
+        EXPECT_FALSE(filter.pending());
+    }
+}
+
+TEST(EchoFilter, GivesBackWhatNeverBecameTheEcho) {
+    EchoFilter filter(kFrame, Expect::perhaps);
+    EXPECT_TRUE(filter.feed("11 06 00"_hex).empty());
+    EXPECT_EQ(filter.release(), "11 06 00"_hex);
+    EXPECT_TRUE(filter.release().empty());
+    EXPECT_EQ(copy(filter.feed("01 00"_hex)), "01 00"_hex);
+}
+
+class EchoMemoryTest : public testing::Test {
+  protected:
+    void reply_without_echo(int times) {
+        for (int i = 0; i < times; ++i) memory.on_reply_without_echo(request_of(kRead), false);
+    }
+    bool must_be_learned() const {
+        return memory.must_be_learned_before(request_of(kWrite), false);
+    }
+    EchoMemory memory{EchoMode::automatic};
+};
+
+TEST_F(EchoMemoryTest, LearnsOnlyFromRequestsWhoseAnswerCannotBeTheirEcho) {
+    EXPECT_FALSE(memory.on_echo(request_of(kWrite)));
+    EXPECT_EQ(memory.state(), EchoState::unknown);
+    EXPECT_FALSE(memory.on_echo(request_of("01 03 00 00 18"_hex)))
+        << "24 coils: its reply has 8 bytes, too";
+    EXPECT_EQ(memory.state(), EchoState::unknown);
+    EXPECT_TRUE(memory.on_echo(request_of(kRead)));
+    EXPECT_FALSE(memory.on_echo(request_of(kRead))) << "no news";
+    EXPECT_EQ(memory.expect(request_of(kWrite)), Expect::certainly);
+    memory.forget();
+    EXPECT_TRUE(must_be_learned());
+}
+
+TEST_F(EchoMemoryTest, P8AnEchoThatMayHaveBeenTheAnswerItselfIsLearnedAgain) {
+    ASSERT_TRUE(memory.on_echo(request_of(kRead)));
+    memory.on_unanswered(request_of(kRead));
+    EXPECT_EQ(memory.state(), EchoState::present) << "no read is answered by itself";
+    memory.on_unanswered(request_of(kWrite));
+    EXPECT_EQ(memory.state(), EchoState::unclear);
+    EXPECT_TRUE(must_be_learned());
+    reply_without_echo(kNoMore - 1);
+    EXPECT_EQ(memory.state(), EchoState::unclear) << "bytes may be lost now and then";
+    reply_without_echo(1);
+    EXPECT_EQ(memory.state(), EchoState::absent);
+}
+
+TEST_F(EchoMemoryTest, P8AFewRepliesWithoutAnEchoDoNotShowThatAKnownEchoIsGone) {
+    EXPECT_TRUE(memory.on_echo(request_of(kRead)));
+    memory.on_mismatch();
+    EXPECT_TRUE(memory.expects_one()) << "it has been heard";
+    reply_without_echo(kNoMore - 1);
+    EXPECT_TRUE(memory.expects_one());
+    EXPECT_TRUE(must_be_learned());
+    reply_without_echo(1);
+    EXPECT_FALSE(memory.expects_one());
+    memory.forget();
+    EXPECT_FALSE(memory.expects_one()) << "another device";
+}
+
+TEST_F(EchoMemoryTest, P5APanelThatRepeatsRequestsMakesNoEchoWhereTheOthersShowNone) {
+    EXPECT_TRUE(memory.on_echo(request_of(kRead), false, 17));
+    for (int i = 0; i < kNoMore; ++i) {
+        memory.on_mismatch();
+        memory.on_reply_without_echo(request_of(kRead), false, 18);
+        if (i + 1 < kNoMore) memory.on_echo(request_of(kRead), false, 17);
+    }
+    EXPECT_FALSE(memory.expects_one());
+    for (int i = 0; i < 5; ++i) EXPECT_FALSE(memory.on_echo(request_of(kRead), false, 17));
+    EXPECT_EQ(memory.state(), EchoState::absent);
+    for (int i = 0; i < 2; ++i) EXPECT_FALSE(memory.on_echo(request_of(kRead), false, 18));
+    EXPECT_TRUE(memory.on_echo(request_of(kRead), false, 17)) << "those of all come back";
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter::echo_memory_test
