@@ -19,6 +19,7 @@
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/web/http/settings.hpp"
+#include "panelgate/yaml/document.hpp"
 
 namespace panelgate::app {
 
@@ -76,6 +77,13 @@ bool is_name(std::string_view name) {
     });
 }
 
+/// One of the four, or what may be a role of one's own.
+bool is_role(std::string_view role) {
+    const bool small = std::ranges::none_of(
+        role, [](char c) { return (c >= 'A' && c <= 'Z') || c == '_' || c == '.'; });
+    return is_name(role) && small && role != "none" && role != "default";
+}
+
 void print_token(const TokenOptions& options, const std::string& token, const std::string& hash,
                  const std::string& expires) {
     const std::string file =
@@ -90,7 +98,7 @@ void print_token(const TokenOptions& options, const std::string& token, const st
         std::cout << "Its hash is in " << file << '\n';
     }
     std::cout << "In the configuration, below http: tokens:, then `panelgate reload`\n\n  - {name: "
-              << options.name << ", role: " << options.role << ", file: " << file;
+              << yaml::written(options.name) << ", role: " << options.role << ", file: " << file;
     if (!expires.empty()) std::cout << ", expires: " << expires;
     std::cout << "}\n";
 }
@@ -101,7 +109,7 @@ ExitCode token_new(const TokenOptions& options) {
     if (!is_name(options.name))
         return wrong_usage("a name has letters, digits, '-', '_' and '.', not '" + options.name +
                            '\'');
-    if (!is_name(options.role))
+    if (!is_role(options.role))
         return wrong_usage("a role is viewer, operator, engineer, admin or one of your own, not '" +
                            options.role + '\'');
     std::string expires;
