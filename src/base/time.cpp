@@ -39,7 +39,7 @@ std::optional<std::chrono::sys_days> take_day(std::string_view& text) {
         if (!number) return std::nullopt;
         date[i] = *number;
     }
-    const std::chrono::year_month_day day(std::chrono::year(date[0]),
+    const std::chrono::year_month_day day(std::chrono::year{date[0]},
                                           std::chrono::month(static_cast<unsigned>(date[1])),
                                           std::chrono::day(static_cast<unsigned>(date[2])));
     if (!day.ok()) return std::nullopt;
