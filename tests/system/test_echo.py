@@ -9,7 +9,7 @@ import unittest
 import config
 import harness
 from harness import read_registers, write_register
-from rtu_bus import RtuBus, echo_address
+from rtu_bus import RtuBus
 
 ECHOES = {
     "none": lambda frame: b"",
@@ -18,6 +18,25 @@ ECHOES = {
     "damaged": lambda frame: frame[:-1] + bytes([frame[-1] ^ 0x10]),
 }
 WRITE_COIL = b"\x05\x00\x07\xff\x00"
+
+
+class Panel:
+    """Every register holds its own address, until something else is written."""
+
+    def __init__(self):
+        self._coils, self._registers = {}, {}
+
+    def __call__(self, frame):
+        function, address, value = struct.unpack(">BHH", frame[1:6])
+        if function == 1:
+            return bytes([1, 1, self._coils.get(address, 0)])
+        if function == 3:
+            return holding(*(self._registers.get(at, at) for at in range(address, address + value)))
+        if function == 5:
+            self._coils[address] = 1 if value else 0
+        if function == 6:
+            self._registers[address] = value
+        return frame[1:6]
 
 
 def holding(*values):
@@ -34,7 +53,7 @@ def configuration(link, mode):
 def line(mode, echo, glued):
     with tempfile.TemporaryDirectory() as folder:
         link = pathlib.Path(folder) / "tty"
-        with RtuBus(link, {1: echo_address}, ECHOES[echo], glued) as bus, \
+        with RtuBus(link, {1: Panel()}, ECHOES[echo], glued) as bus, \
                 harness.configured(configuration(link, mode)) as program:
             program.log.wait_for("line up")
             with program.client() as client:

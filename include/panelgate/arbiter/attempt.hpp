@@ -239,13 +239,12 @@ class Attempt {
     bool may_have_collided() const {
         return timing_.echoes && !echo_.complete() && (echo_.mismatch() || own_.fragment);
     }
-    /// True if the reply to a write may be the echo of its request, which it equals: it came too
-    /// quickly, also behind the echo, which may come twice; or writes come back, and this one has
-    /// not yet.
+    /// True if the reply to a write may be the echo of its request, which it equals: none has come
+    /// in front of it, and it came too quickly, or writes come back on this line.
     bool may_be_its_echo(bool too_quick, bool writes_come_back) const {
         const bool behind_echo = echo_.complete() || own_.seen;
-        return !group_.request.is_read() && echo_.is_own(*reply_) &&
-               (too_quick || (writes_come_back && !behind_echo));
+        return !group_.request.is_read() && echo_.is_own(*reply_) && !behind_echo &&
+               (too_quick || writes_come_back);
     }
     /// Rejects a reply that also answers another master's request; the station was not silent.
     void reject_contested() {

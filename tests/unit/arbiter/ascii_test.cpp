@@ -180,7 +180,6 @@ TEST_F(AsciiLine, TheEchoIsTakenOut) {
     script.run_to_end_of_request();
     script.hear(script.sent.back().adu);
     EXPECT_FALSE(script.answered(write)) << "the echo of 06 confirms nothing";
-    script.run_for(3ms);
     script.hear_reply(17, kWrite);
     EXPECT_TRUE(script.answered(write));
 }

@@ -80,25 +80,6 @@ TEST_F(LearnedEcho, P8TheReplyBehindTheEchoConfirmsAWriteAlsoWhenGluedToIt) {
     EXPECT_EQ(bus.answer(ticket).pdu.value(), kWriteCoil);
 }
 
-/// Two converters in a row, or a repeater, that echo both.
-TEST_F(LearnedEcho, P8AnEchoThatComesTwiceConfirmsNoWrite) {
-    for (unsigned i = 0; i < RecentTimes::kEnough; ++i) read_once(bus, true);
-    const Ticket ticket = bus.submit(17, kWrite);
-    const Bytes adu = bus.sent.back().adu;
-    hear_echo(bus);
-    bus.hear(adu);
-    EXPECT_FALSE(bus.answered(ticket));
-    ASSERT_EQ(bus.next_sent(600ms).value().kind, FrameKind::learn_echo);
-    hear_echo(bus);
-    answer(bus, 17, "03 02 00 04"_hex, 3ms);
-    EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
-    bus.run_for(200ms);
-    const Ticket healthy = bus.submit(17, kWrite);
-    hear_echo(bus);
-    answer(bus, 17, kWrite, 3ms);
-    EXPECT_EQ(bus.answer(healthy).pdu.value(), kWrite);
-}
-
 TEST_F(LearnedEcho, P8AFreshLineIsAskedByAReadBeforeItsFirstWrite) {
     const Ticket ticket = bus.submit(17, kWriteCoil);
     ASSERT_EQ(bus.sent.size(), 1u);
