@@ -46,14 +46,12 @@ struct Named {
     std::string chain{};                   ///< the file that is written; empty: `files` were named
     std::vector<cli::Station> stations{};  ///< of the configuration, if that names the files
 
-    /// The files there are now, oldest first. A rotation while they are read makes others of them.
+    /// The files there are now. A rotation while they are read makes others of them.
     Files now() const {
-        Files all = files;
-        if (!chain.empty()) {
-            all = audit::rotated_files(chain);
-            all.push_back(chain);
-        }
-        return audit::in_order(std::move(all), head_of);
+        if (chain.empty()) return files;
+        Files all = audit::rotated_files(chain);
+        all.push_back(chain);
+        return all;
     }
 };
 
@@ -173,7 +171,7 @@ ExitCode audit_verify(const AuditOptions& options) {
         const Files files = named->now();
         const auto before = identities(files);
         audit::Verifier verifier(*anchors, named->chain);
-        const auto unread = read_into(verifier, files);
+        const auto unread = read_into(verifier, audit::in_order(files, head_of));
         const audit::Report report = verifier.finish();
         // A rotation meanwhile looks as if records were removed, or added.
         const bool has_rotated = before != identities(named->now());
@@ -250,14 +248,13 @@ ExitCode audit_show(const AuditOptions& options) {
     set_station(*filter, options.station, *named, doubt);
     bool any = false;
     const Files files = named->now();
-    for (const std::string& file : files) {
+    for (const std::string& file : audit::in_order(files, head_of)) {
         const std::string why = audit::read_lines(file, [&](std::string_view line, bool) {
             any = print_record(line, *filter, options.json) || any;
             return static_cast<bool>(std::cout);
         });
         // What a rotation drops meanwhile is no longer there to be shown.
-        const bool has_rotated = !named->chain.empty() && named->now() != files;
-        if (!why.empty() && !has_rotated) return cannot_read(file, why);
+        if (!why.empty() && named->now() == files) return cannot_read(file, why);
     }
     if (!any && !doubt.empty())
         std::cerr << "panelgate: audit: " << doubt << ", and no record names it\n";

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -69,20 +70,22 @@ void hide(std::string& text, const std::string& part) {
 }  // namespace
 
 void Problems::conceal_secrets(std::string_view text) {
-    int number = 0;
-    while (!text.empty()) {
+    std::map<int, std::vector<std::string>> secrets;  // parts, by line
+    for (int number = 1; !text.empty(); ++number) {
         const std::size_t end = std::min(text.find('\n'), text.size());
         std::string_view line = text.substr(0, end);
         text.remove_prefix(std::min(end + 1, text.size()));
-        ++number;
         while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back())) != 0)
             line.remove_suffix(1);
         const std::string_view secret = secret_in(line);
-        if (secret.empty()) continue;
-        for (Problem& problem : list_) {
-            // Advice at a neighbouring line may quote it, too.
-            if (problem.file != file_ || std::abs(problem.mark.line - number) > 1) continue;
-            for (const std::string& part : parts_of(secret)) {
+        if (!secret.empty()) secrets.emplace(number, parts_of(secret));
+    }
+    for (Problem& problem : list_) {
+        if (problem.file != file_) continue;
+        // Advice at a neighbouring line may quote it, too.
+        const auto last = secrets.upper_bound(problem.mark.line + 1);
+        for (auto at = secrets.lower_bound(problem.mark.line - 1); at != last; ++at) {
+            for (const std::string& part : at->second) {
                 hide(problem.message, part);
                 hide(problem.excerpt, part);
             }
