@@ -98,12 +98,18 @@ class Waiting(unittest.TestCase):
     """A right that goes while a request waits for its turn."""
 
     def answer_after(self, program, name, act, before, now):
+        def asked(client):
+            clients = program.get("/api/v1/lines/floor1")[1]["clients"]
+            return sum(one["requests"] for one in clients if client in one["name"])
+
         said = []
-        asking = lambda: sum(one["requests"] for one in program.get("/api/v1/lines/floor1")[1]["clients"] if name in one["name"])
-        count = asking()
+        count = asked("modbus_tcp")
+        self.blocker.send(31, read_registers(105))  # between two polls the line would be free
+        until(lambda: asked("modbus_tcp") > count)
+        count = asked(name)
         thread = threading.Thread(target=lambda: said.append(act()))
         thread.start()
-        until(lambda: asking() > count)
+        until(lambda: asked(name) > count)
         text = program.file.read_text()
         self.assertIn(before, text)
         program.file.write_text(text.replace(before, now))
@@ -116,7 +122,8 @@ class Waiting(unittest.TestCase):
     def test_nothing_is_sent_for_who_has_lost_it(self):
         slow = {"timing": "{response_timeout: 8s}", "queue": "{deadline: 30s}"}
         path = "/api/v1/stations/oven/devices/GDT150"
-        with plant("{rules: []}", roles={"lab": "operator"}, line=slow) as program, program.client() as client:
+        with plant("{rules: []}", roles={"lab": "operator"}, line=slow) as program, program.client() as client, \
+                program.client() as self.blocker:
             self.assertEqual(ask(program, "PUT", "/api/v1/simulator/press", None, {"slow_ms": 5000})[0], 200)
             write = lambda: ask(program, "PUT", path, "lab", {"values": [1]})
             read = lambda: ask(program, "GET", path, "lab")
@@ -274,7 +281,23 @@ class OwnRoles(unittest.TestCase):
                 self.assertEqual(done.returncode, code, (question, done.stdout, done.stderr))
 
 
+@contextlib.contextmanager
+def configured_by():
+    """(file for a configuration, file that holds a token)"""
+    with tempfile.TemporaryDirectory() as folder:
+        token = pathlib.Path(folder) / "old"
+        token.write_text("j" * 40)
+        token.chmod(0o600)
+        yield pathlib.Path(folder) / "panelgate.yaml", token
+
+
 class Explain(unittest.TestCase):
+    def explain(self, file, question, code, text=""):
+        done = harness.run("check", "-c", file, "--explain", question)
+        self.assertEqual(done.returncode, code, (question, done.stdout, done.stderr))
+        self.assertIn(text, done.stdout, question)
+        return done
+
     def test_names_the_rule_with_file_and_line(self):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "panelgate.yaml"
@@ -297,20 +320,14 @@ class Explain(unittest.TestCase):
                     ("role=operator raw read press/UW200", 1, "denied: over http this needs the role engineer"),
                     ("write nobody/UW1", 64, ""), ("role=operator press/UW102", 64, ""))
             for question, code, text in rows:
-                done = harness.run("check", "-c", file, "--explain", question)
-                self.assertEqual(done.returncode, code, (question, done.stdout, done.stderr))
-                self.assertIn(text, done.stdout, question)
+                done = self.explain(file, question, code, text)
                 if "rule '" in text:
                     self.assertRegex(done.stdout, r"panelgate\.yaml:\d+:\d+\)")
             text = harness.run("check", "-c", file).stdout
             self.assertIn("who may write, by 2 rule(s) of access and else allowed:", text)
 
     def test_judges_the_door_as_well(self):
-        with tempfile.TemporaryDirectory() as folder:
-            file = pathlib.Path(folder) / "panelgate.yaml"
-            token = pathlib.Path(folder) / "old"
-            token.write_text("j" * 40)
-            token.chmod(0o600)
+        with configured_by() as (file, token):
             file.write_text(DOORS.format(token=token))
             door = "listener=127.0.0.1:18099"
             rows = ((f"from=127.0.0.1 {door} write aaa/400001", 1, "has access: read_only"),
@@ -323,21 +340,14 @@ class Explain(unittest.TestCase):
                     ("raw aaa/400001", 1, "needs the role engineer"),
                     ("role=engineer raw aaa/400011", 1, "rule 'r1'"))
             for question, code, text in rows:
-                done = harness.run("check", "-c", file, "--explain", question)
-                self.assertEqual(done.returncode, code, (question, done.stdout, done.stderr))
-                self.assertIn(text, done.stdout, question)
+                self.explain(file, question, code, text)
             for question in ("listener=9.9.9.9:1 write aaa/400001", "from=10.0.0.777 write aaa/400001",
                              "from=10.0.0.0/8 write aaa/400001", "write aaa/400011 write aaa/400001",
                              "write aaa/400011 aaa/400001", f"face=http {door} read aaa/400001"):
-                done = harness.run("check", "-c", file, "--explain", question)
-                self.assertEqual(done.returncode, 64, (question, done.stdout, done.stderr))
+                self.explain(file, question, 64)
 
     def test_a_broadcast_through_a_listener_goes_to_all_its_lines(self):
-        with tempfile.TemporaryDirectory() as folder:
-            file = pathlib.Path(folder) / "panelgate.yaml"
-            token = pathlib.Path(folder) / "old"
-            token.write_text("j" * 40)
-            token.chmod(0o600)
+        with configured_by() as (file, token):
             file.write_text("""
 lines:
   - {name: l1, device: sim, stations: [{id: 1, name: aaa}]}
@@ -355,18 +365,12 @@ access:
                     ("listener=127.0.0.1:18099 broadcast bbb/400001", 0, "allowed"),
                     ("face=modbus_tcp broadcast bbb/400001", 0, "allowed"),
                     ("token=va role=admin read bbb/400001", 64, ""), ("token=va role=viewer read bbb/400001", 0, "")):
-                done = harness.run("check", "-c", file, "--explain", question)
-                self.assertEqual(done.returncode, code, (question, done.stdout, done.stderr))
-                self.assertIn(text, done.stdout, question)
+                self.explain(file, question, code, text)
 
     def test_check_names_rules_that_can_never_match_and_what_has_ended(self):
-        with tempfile.TemporaryDirectory() as folder:
-            file = pathlib.Path(folder) / "panelgate.yaml"
-            token = pathlib.Path(folder) / "old"
-            token.write_text("j" * 40)
-            token.chmod(0o600)
+        with configured_by() as (file, token):
             text = DOORS.format(token=token).replace("    - {name: r1", VAIN + "    - {name: r1")
-            file.write_text(text + f"audit: {{file: {folder}/no/audit.jsonl}}\n")
+            file.write_text(text + f"audit: {{file: {file.parent}/no/audit.jsonl}}\n")
             said = harness.run("check", "-c", file).stderr
             for name, why in (("n1", "one of its faces"), ("n2", "none of its faces"), ("n3", "one of its roles"),
                               ("n4", "write nothing"), ("n5", "nothing can write to its range"),
@@ -374,7 +378,7 @@ access:
                 self.assertRegex(said, f"rule '{name}'.* never decides anything: .*{why}")
             self.assertEqual(said.count("never decides anything"), 6, said)
             self.assertIn("the token 'old' ended on 2020-01-01", said)
-            self.assertIn(f"audit: there is no folder {folder}/no", said)
+            self.assertIn(f"audit: there is no folder {file.parent}/no", said)
 
     def test_tokens_name_own_roles_and_are_neither_over_nor_a_hash_in_capitals(self):
         for more, code in ((["--role", "setter"], 0), (["--role", "no role"], 64), (["--expires", "2020-01-01"], 64)):
