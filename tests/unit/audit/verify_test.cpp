@@ -259,7 +259,8 @@ TEST(AuditVerify, FilesThatTheChainSaysAreKeptMustBeThere) {
                                     : "right");
         ASSERT_EQ(report.remarks.size(), all ? 1U : 2U);
         EXPECT_EQ(report.remarks[0],
-                  "record 10 (T): the file before was removed, or changed by others, while it was written, with the "
+                  "record 10 (T): the file before was removed, or changed by others, while it was "
+                  "written, with the "
                   "records from 7 on");
     }
 }

@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
-#include "unit/config/memory_files.hpp"
 #include "panelgate/config/config.hpp"
+#include "unit/config/memory_files.hpp"
 
 namespace panelgate::mbusd::conf_test {
 namespace {
