@@ -43,7 +43,7 @@ class Mix:
         devices = [f"tcp://{name}" if tcp else name for name in self.zoo.names]
         self.text = config.gateway(*(
             config.line(f"line{n}", device, config.station_ids(self.units(n)), baud=baud)
-            for n, device in zip(self.lines, devices)))
+            for n, device in zip(self.lines, devices)), modbus=config.MANY)
 
     def units(self, line):
         return range(line * PANELS + 1, line * PANELS + PANELS + 1)
