@@ -18,6 +18,7 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/tls/settings.hpp"
 #include "running_line.hpp"
+#include "unit_map.hpp"
 
 namespace panelgate::app {
 
@@ -308,17 +309,12 @@ struct Destination {
     const config::Station* station = nullptr;  ///< nullptr: a broadcast, or not listed
 };
 
-/// What the clients of a listener, or a serial master, may access.
-struct UnitAccess {
-    const tcp_server::Settings* settings = nullptr;
-    bool passes_unlisted = true;  ///< a serial master is answered for listed stations only
-};
-
-/// Where the units of a listener or serial master lead, as tcp_server::UnitMap has it.
+/// Where the units of a listener or serial master lead, to compare it with another configuration.
 class UnitRoutes {
   public:
-    /// The places outlive it.
-    UnitRoutes(const Places& places, const UnitAccess& access);
+    /// The settings and places outlive it.
+    UnitRoutes(const Places& places, const tcp_server::Settings& settings, tcp_server::UnitMap map)
+        : places_(&places), settings_(&settings), map_(std::move(map)) {}
 
     const Places& places() const { return *places_; }
     /// The units for which the configuration names a station, and 0, which may reach all.
@@ -326,67 +322,44 @@ class UnitRoutes {
     /// Returns nothing for a unit whose requests reach no panel.
     std::optional<Destination> destination(std::uint8_t unit) const;
     /// The lines that a broadcast to unit 0 reaches.
-    const std::vector<std::string>& lines() const { return access_->lines; }
+    const std::vector<std::string>& lines() const { return settings_->lines; }
 
   private:
     std::optional<Destination> route(std::uint8_t unit) const;
-    std::optional<Destination> alias_of(const tcp_server::UnitTarget& target) const;
 
     const Places* places_;
-    const tcp_server::Settings* access_;
-    /// Nothing for a station id on two of the lines.
-    std::map<std::uint8_t, std::optional<Destination>> listed_;
-    const config::Line* passing_ = nullptr;  ///< takes units that are not listed; nullptr: none
+    const tcp_server::Settings* settings_;
+    tcp_server::UnitMap map_;
 };
-
-UnitRoutes::UnitRoutes(const Places& places, const UnitAccess& access)
-    : places_(&places), access_(access.settings) {
-    const bool may_pass = access.passes_unlisted && access_->lines.size() == 1;
-    for (const std::string& name : access_->lines) {
-        const config::Line* line = places.line_named(name);
-        if (line == nullptr) continue;
-        if (may_pass && !line->refuse_unlisted) passing_ = line;
-        for (const config::Station& station : line->stations) {
-            const auto [entry, added] =
-                listed_.try_emplace(station.id, Destination{line, station.id, &station});
-            if (!added) entry->second.reset();
-        }
-    }
-}
 
 std::set<std::uint8_t> UnitRoutes::named() const {
     std::set<std::uint8_t> units{0};
-    for (const auto& [unit, target] : access_->units) units.insert(unit);
-    for (const auto& [unit, station] : listed_) units.insert(unit);
+    for (unsigned unit = 1; unit <= 255; ++unit)
+        if (map_.is_listed(static_cast<std::uint8_t>(unit)))
+            units.insert(static_cast<std::uint8_t>(unit));
     return units;
 }
 
 std::optional<Destination> UnitRoutes::destination(std::uint8_t unit) const {
     std::optional<Destination> found = route(unit);
     if (!found) return found;
-    const bool denied = found->id == 0 && access_->broadcast == tcp_server::BroadcastMode::deny;
+    const bool denied = found->id == 0 && settings_->broadcast == tcp_server::BroadcastMode::deny;
     const bool only_listened_to = found->line != nullptr && found->line->listens;
     if (denied || only_listened_to) found.reset();
     return found;
 }
 
 std::optional<Destination> UnitRoutes::route(std::uint8_t unit) const {
-    const auto alias = access_->units.find(unit);
-    if (alias != access_->units.end()) return alias_of(alias->second);
-    if (access_->diagnostics_unit == unit) return std::nullopt;
-    if (unit == 0) return Destination{};
-    const auto listed = listed_.find(unit);
-    if (listed != listed_.end()) return listed->second;
-    if (passing_ == nullptr || unit > modbus::kMaxStation) return std::nullopt;
-    return Destination{passing_, unit, nullptr};
-}
-
-std::optional<Destination> UnitRoutes::alias_of(const tcp_server::UnitTarget& target) const {
-    const config::Line* line = places_->line_named(target.line);
-    if (line == nullptr) return std::nullopt;
-    const auto station = std::ranges::find(line->stations, target.station, &config::Station::id);
+    if (!map_.is_alias(unit)) {
+        if (settings_->diagnostics_unit == unit) return std::nullopt;
+        if (unit == 0) return Destination{};
+    }
+    const auto place = map_.place(unit);
+    if (!place) return std::nullopt;
+    const config::Line* line = places_->line_named(place->line);
+    const auto station = std::ranges::find(line->stations, place->station, &config::Station::id);
     const bool is_listed = station != line->stations.end();
-    return Destination{line, target.station, is_listed ? &*station : nullptr};
+    return Destination{line, place->station, is_listed ? &*station : nullptr};
 }
 
 /// A line keeps its name or, renamed, its device.
@@ -460,13 +433,16 @@ void add_moved_units(const std::string& listener, const UnitRoutes& before, cons
     }
 }
 
-/// By the names of listeners and serial masters.
-std::map<std::string, UnitAccess> accesses_of(const config::Config& config) {
-    std::map<std::string, UnitAccess> all;
+/// By the names of listeners and serial masters. `config` and `places` outlive it.
+std::map<std::string, UnitRoutes> routes_of(const config::Config& config, const Places& places) {
+    std::map<std::string, UnitRoutes> all;
+    const auto add = [&](const std::string& name, const auto& settings, Unlisted unlisted) {
+        all.try_emplace(name, places, settings, unit_map(settings, config, unlisted));
+    };
     for (const auto& [name, listener] : listeners_of(config))
-        all.emplace(name, UnitAccess{listener, true});
+        add(name, *listener, Unlisted::as_the_line);
     for (const serial_server::Settings& master : config.serial_masters)
-        all.emplace("serial master " + master.name, UnitAccess{&master.access, false});
+        add("serial master " + master.name, master.access, Unlisted::refused);
     return all;
 }
 
@@ -475,15 +451,13 @@ std::map<std::string, UnitAccess> accesses_of(const config::Config& config) {
 std::vector<std::string> moved_units(const config::Config& before, const config::Config& after) {
     const Places places_before(before);
     const Places places_after(after);
-    const auto known = accesses_of(before);
+    const auto routes_before = routes_of(before, places_before);
     std::vector<std::string> all;
-    for (const auto& [name, access] : accesses_of(after)) {
-        const auto was = known.find(name);
-        if (was == known.end()) continue;
-        const UnitRoutes routes_before(places_before, was->second);
-        const UnitRoutes routes_after(places_after, access);
-        add_moved_units(name, routes_before, routes_after, all);
-        add_wider_broadcast(name, routes_before, routes_after, all);
+    for (const auto& [name, is] : routes_of(after, places_after)) {
+        const auto was = routes_before.find(name);
+        if (was == routes_before.end()) continue;
+        add_moved_units(name, was->second, is, all);
+        add_wider_broadcast(name, was->second, is, all);
     }
     return all;
 }

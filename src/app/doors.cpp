@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "panelgate/base/role.hpp"
+#include "panelgate/tcp_server/unit_map.hpp"
 
 namespace panelgate::app {
 
@@ -57,21 +58,15 @@ bool lets_in(const rt::AccessList& allow, const std::string& address) {
     return address.empty() || (!none && allow.allows(peer));
 }
 
-Destinations destinations_of(const tcp_server::Settings& listener, const config::Config& config) {
+Destinations destinations_of(const tcp_server::Settings& listener, const config::Config& config,
+                             Unlisted unlisted) {
+    const tcp_server::UnitMap units = unit_map(listener, config, unlisted);
     Destinations reach;
-    const auto is_own = [&](const config::Line& line) {
-        return listener.lines.empty() ||
-               std::ranges::find(listener.lines, line.name) != listener.lines.end();
-    };
-    const auto own = std::ranges::count_if(config.lines, is_own);
-    for (const config::Line& line : config.lines) {
-        if (!is_own(line)) continue;
-        std::bitset<256>& stations = reach[line.name];
-        if (own == 1 && !line.refuse_unlisted) stations.set();
-        stations.set(0);
-        for (const config::Station& station : line.stations) stations.set(station.id);
+    for (unsigned unit = 0; unit <= 255; ++unit) {
+        const auto place = units.place(static_cast<std::uint8_t>(unit));
+        if (place) reach[place->line].set(place->station);
     }
-    for (const auto& [unit, target] : listener.units) reach[target.line].set(target.station);
+    for (const std::string& line : units.broadcast_names(0)) reach[line].set(0);
     return reach;
 }
 
@@ -95,10 +90,12 @@ void Doors::open(std::shared_ptr<const config::Config> config) {
     }
     for (const tcp_server::Settings& listener : config_->modbus_tcp) {
         add(listener);
-        doors_[listener.name()] = {&listener, destinations_of(listener, *config_)};
+        doors_[listener.name()] = {&listener,
+                                   destinations_of(listener, *config_, Unlisted::as_the_line)};
     }
     for (const serial_server::Settings& master : config_->serial_masters)
-        doors_[master.name] = {&master.access, destinations_of(master.access, *config_)};
+        doors_[master.name] = {&master.access,
+                               destinations_of(master.access, *config_, Unlisted::refused)};
 }
 
 bool Doors::is_allowed(const std::string& listener, const std::string& address) const {

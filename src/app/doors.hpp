@@ -14,6 +14,7 @@
 #include "panelgate/bus/rights.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/rt/acceptor.hpp"
+#include "unit_map.hpp"
 
 namespace panelgate::app {
 
@@ -22,8 +23,9 @@ bool lets_in(const rt::AccessList& allow, const std::string& address);
 
 /// The stations of each line to which a listener leads; 0: its broadcasts go there.
 using Destinations = std::map<std::string, std::bitset<256>, std::less<>>;
-/// `listener`: of Modbus/TCP, or what a serial master may ask. As tcp_server::UnitMap routes.
-Destinations destinations_of(const tcp_server::Settings& listener, const config::Config& config);
+/// `listener`: of Modbus/TCP, or what a serial master may ask.
+Destinations destinations_of(const tcp_server::Settings& listener, const config::Config& config,
+                             Unlisted unlisted);
 bool leads_to(const Destinations& reach, std::string_view line, std::uint8_t station);
 
 /// What the doors of the running configuration say of those who have come in: whose token was taken

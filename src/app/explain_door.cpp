@@ -18,11 +18,11 @@ bool may_come(const std::vector<Network>& allow, const std::string& address) {
 }
 
 std::string refused_by(const config::Config& config, const tcp_server::Settings& listener,
-                       const std::string& name, const AtDoor& request) {
+                       const std::string& name, const AtDoor& request, Unlisted unlisted) {
     if (!may_come(listener.allow, request.who.address))
         return name + " does not let " + request.who.address + " in (allow)";
     const std::uint8_t station = request.act == Act::broadcast ? 0 : request.station.id;
-    if (!leads_to(destinations_of(listener, config), request.line.name, station))
+    if (!leads_to(destinations_of(listener, config, unlisted), request.line.name, station))
         return name + " does not serve line '" + request.line.name + "'";
     if (request.writes && listener.read_only) return name + " has access: read_only";
     if (request.act == Act::broadcast && listener.broadcast == tcp_server::BroadcastMode::deny)
@@ -74,11 +74,13 @@ std::string refused_at_door(const config::Config& config, const AtDoor& request,
         return "mqtt has no write: points";
     for (const tcp_server::Settings& listener : config.modbus_tcp) {
         if (listener.name() != who.listener) continue;
-        return refused_by(config, listener, "the listener " + who.listener, request);
+        return refused_by(config, listener, "the listener " + who.listener, request,
+                          Unlisted::as_the_line);
     }
     for (const serial_server::Settings& master : config.serial_masters) {
         if (master.name != who.listener) continue;
-        return refused_by(config, master.access, "the serial master " + who.listener, request);
+        return refused_by(config, master.access, "the serial master " + who.listener, request,
+                          Unlisted::refused);
     }
     return "";
 }

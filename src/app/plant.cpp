@@ -66,16 +66,11 @@ std::string Plant::name_of(std::string_view line, std::uint8_t id) const {
     return station != nullptr ? station->name : std::to_string(id);
 }
 
-std::vector<tcp_server::LineInfo> Plant::listener_lines() const {
+std::vector<tcp_server::LineInfo> Plant::listener_lines(Unlisted unlisted) const {
     std::vector<tcp_server::LineInfo> infos;
     for (const Line& line : lines_) {
-        tcp_server::LineInfo& info = infos.emplace_back();
-        info.name = line.configured->name;
-        info.bus = line.bus;
-        info.pass_unlisted = !line.configured->refuse_unlisted;
-        for (const config::Station& station : line.configured->stations) {
-            info.stations.push_back(station.id);
-        }
+        infos.push_back(line_info(*line.configured, unlisted));
+        infos.back().bus = line.bus;
     }
     return infos;
 }

@@ -12,7 +12,8 @@
 #include "panelgate/config/config.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
-#include "panelgate/tcp_server/dispatch.hpp"
+#include "panelgate/tcp_server/unit_map.hpp"
+#include "unit_map.hpp"
 
 namespace panelgate::bus {
 class BusClient;
@@ -66,7 +67,8 @@ class Plant {
     std::string name_of(std::string_view line, std::uint8_t id) const;
 
     /// The lines as listeners see them.
-    std::vector<tcp_server::LineInfo> listener_lines() const;
+    std::vector<tcp_server::LineInfo> listener_lines(
+        Unlisted unlisted = Unlisted::as_the_line) const;
 
   private:
     std::deque<Line> lines_;

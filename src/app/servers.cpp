@@ -155,13 +155,6 @@ ListenerHandle handle_of(const web::Settings& settings, web::Server* server) {
             server};
 }
 
-/// Other stations may answer on the master's line: only listed stations are served.
-std::vector<tcp_server::LineInfo> lines_of_master(const Plant& plant) {
-    auto lines = plant.listener_lines();
-    for (tcp_server::LineInfo& line : lines) line.pass_unlisted = false;
-    return lines;
-}
-
 }  // namespace
 
 Servers::Servers(boost::asio::any_io_executor executor, rt::Clock& clock,
@@ -282,7 +275,7 @@ void Servers::leave(Http http, Duration longest) {
 }
 
 void Servers::apply_masters(const config::Config& config, const Plant& plant) {
-    const auto lines = lines_of_master(plant);
+    const auto lines = plant.listener_lines(Unlisted::refused);
     std::vector<Master> before = std::exchange(masters_, {});
     for (const serial_server::Settings& settings : config.serial_masters) {
         const auto same = std::ranges::find_if(

@@ -18,53 +18,9 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/tcp_server/settings.hpp"
+#include "panelgate/tcp_server/unit_map.hpp"
 
 namespace panelgate::tcp_server {
-
-/// What a listener needs to know about a line. The bus outlives every map that refers to it.
-struct LineInfo {
-    std::string name;
-    bus::BusClient* bus = nullptr;
-    std::vector<std::uint8_t> stations;  ///< configured station addresses
-    bool pass_unlisted = true;
-    friend bool operator==(const LineInfo&, const LineInfo&) = default;
-};
-
-/// The station behind a unit id. Station 0 (from an alias) is a broadcast to that line.
-struct Target {
-    bus::BusClient* bus = nullptr;
-    std::uint8_t station = 0;
-};
-
-/// Routes a client's unit id to a line and station, for one listener. Immutable. Pure.
-class UnitMap {
-  public:
-    /// `lines`: at least those named by the settings, in any order. Aliases may refer to any of
-    /// them; the other rules apply only to the listener's own (settings.lines; empty: all given).
-    /// Throws std::invalid_argument if the settings name an unknown line.
-    UnitMap(const Settings& settings, const std::vector<LineInfo>& lines);
-
-    /// Returns the target of an alias, or of a station listed by exactly one line of the listener;
-    /// on a listener with a single line that passes unlisted stations, also of the rest of 1..247.
-    /// Everything else, including unit 0 without an alias and 248..255, is Fault::not_routed.
-    Result<Target> route(std::uint8_t unit) const;
-    /// Returns the lines a request to this unit is broadcast to: all of the listener's for unit 0
-    /// without an alias, one for an alias to station 0, none for any other unit.
-    std::vector<bus::BusClient*> broadcast_lines(std::uint8_t unit) const;
-    /// True for an alias or a configured station.
-    bool is_listed(std::uint8_t unit) const { return is_alias(unit) || listed_[unit]; }
-    bool is_alias(std::uint8_t unit) const { return aliases_.contains(unit); }
-    /// Returns the listener's own lines, in the order of the settings.
-    const std::vector<bus::BusClient*>& lines() const { return lines_; }
-
-  private:
-    void add_stations(const LineInfo& line);
-
-    std::map<std::uint8_t, Target> aliases_;
-    std::array<Target, 256> direct_{};  ///< bus is null for unrouted units
-    std::array<bool, 256> listed_{};
-    std::vector<bus::BusClient*> lines_;
-};
 
 /// One client as seen by the buses: its identity and the buses it has used.
 class Caller {

@@ -23,6 +23,7 @@ config::Config plant() {
     config.lines = {floor1};
     config.lines.push_back(floor1);
     config.lines.back().name = "floor2";
+    config.lines.back().stations[0].id = 8;
     return config;
 }
 
@@ -124,17 +125,28 @@ TEST_F(DoorsTest, AModbusClientMeetsItsListenersNewDoor) {
 TEST_F(DoorsTest, WhereAListenerLeadsIsWhereItsUnitsGo) {
     tcp_server::Settings listener;
     listener.lines = {"floor1"};
-    EXPECT_TRUE(leads_to(destinations_of(listener, before), "floor1", 0));
-    EXPECT_TRUE(leads_to(destinations_of(listener, before), "floor1", 77)) << "a line of its own";
-    EXPECT_FALSE(leads_to(destinations_of(listener, before), "floor2", 7));
+    const auto leads = [&](const char* line, std::uint8_t to,
+                           Unlisted unlisted = Unlisted::as_the_line) {
+        return leads_to(destinations_of(listener, before, unlisted), line, to);
+    };
+    EXPECT_TRUE(leads("floor1", 0));
+    EXPECT_TRUE(leads("floor1", 77)) << "a line of its own";
+    EXPECT_FALSE(leads("floor1", 77, Unlisted::refused)) << "a serial master's";
+    EXPECT_FALSE(leads("floor2", 8));
     before.lines[0].refuse_unlisted = true;
-    EXPECT_TRUE(leads_to(destinations_of(listener, before), "floor1", 7));
-    EXPECT_FALSE(leads_to(destinations_of(listener, before), "floor1", 77));
+    EXPECT_TRUE(leads("floor1", 7));
+    EXPECT_FALSE(leads("floor1", 77));
     listener.units[50] = {"floor2", 9};
-    EXPECT_TRUE(leads_to(destinations_of(listener, before), "floor2", 9));
-    EXPECT_FALSE(leads_to(destinations_of(listener, before), "floor2", 0)) << "an alias is no line";
+    EXPECT_TRUE(leads("floor2", 9));
+    EXPECT_FALSE(leads("floor2", 0)) << "an alias is no line";
     listener.lines.clear();
-    EXPECT_FALSE(leads_to(destinations_of(listener, before), "floor2", 8)) << "which of two lines?";
+    EXPECT_TRUE(leads("floor2", 8));
+    EXPECT_FALSE(leads("floor2", 77)) << "which of two lines?";
+    before.lines[1].stations[0].id = 7;
+    EXPECT_FALSE(leads("floor2", 7)) << "which of two lines?";
+    listener.units[0] = {"floor2", 0};
+    EXPECT_TRUE(leads("floor2", 0));
+    EXPECT_FALSE(leads("floor1", 0)) << "unit 0 is an alias";
 }
 
 TEST_F(DoorsTest, TheGatewayItselfAndNobodyAreNotAsked) {
