@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
 #include <utility>
 
+#include "doors.hpp"
 #include "panelgate/access/line_rules.hpp"
 #include "panelgate/base/who.hpp"
 
@@ -19,7 +21,8 @@ struct Door {
     std::string name;
     WhoRef who;
     bool read_only = false;
-    bool is_open = false;  ///< whoever reaches it comes in
+    bool is_open = false;                 ///< whoever reaches it comes in
+    std::optional<Destinations> leads{};  ///< nothing: to all stations
 };
 
 Door door(std::string name, Who who) {
@@ -63,12 +66,15 @@ std::vector<Door> doors_of(const config::Config& config) {
         doors.push_back(door(name, who));
         doors.back().read_only = listener.read_only;
         doors.back().is_open = !by_role && !tls::wants_certificate(listener.tls);
+        doors.back().leads = destinations_of(listener, config, Unlisted::as_the_line);
+        const std::size_t all = doors.size() - 1;
         for (const Network& network : networks) {
             who.address = network.address;
-            doors.push_back(door(
-                name + " from " + network.address + '/' + std::to_string(network.prefix), who));
-            doors.back().read_only = listener.read_only;
-            doors.back().is_open = false;
+            Door some = doors[all];
+            some.name += " from " + network.address + '/' + std::to_string(network.prefix);
+            some.who = make_who(who);
+            some.is_open = false;
+            doors.push_back(std::move(some));
         }
     }
     for (const serial_server::Settings& master : config.serial_masters) {
@@ -76,6 +82,7 @@ std::vector<Door> doors_of(const config::Config& config) {
             "serial master " + master.name,
             {.face = Face::serial_master, .listener = master.name, .standing = Role::operator_}));
         doors.back().read_only = master.access.read_only;
+        doors.back().leads = destinations_of(master.access, config, Unlisted::refused);
     }
     if (config.http) add_http(*config.http, doors);
     if (config.mqtt) {
@@ -99,7 +106,8 @@ Reach reach_of(const config::Config& config, const Door& door) {
     for (const config::Line& line : config.lines) {
         for (const config::Station& station : line.stations) {
             const access::LineRules& rules = *line.access.rules;
-            const bool never = door.read_only || station.read_only || station.listens;
+            const bool served = !door.leads || leads_to(*door.leads, line.name, station.id);
+            const bool never = !served || door.read_only || station.read_only || station.listens;
             if (never || !rules.may_some(door.who, station.id, Act::write)) {
                 reach.none.push_back(station.name);
             } else if (rules.may_all(door.who, station.id, Act::write)) {

@@ -326,6 +326,12 @@ class Explain(unittest.TestCase):
             text = harness.run("check", "-c", file).stdout
             self.assertIn("who may write, by 2 rule(s) of access and else allowed:", text)
 
+    def test_a_listener_reaches_its_own_lines_only(self):
+        with configured_by() as (file, token):
+            file.write_text(DOORS.format(token=token).replace("access: read_only, allow", "allow"))
+            self.assertIn("modbus_tcp 127.0.0.1:18099: some of aaa; nothing of ro, ccc\n",
+                          harness.run("check", "-c", file).stdout)
+
     def test_judges_the_door_as_well(self):
         with configured_by() as (file, token):
             file.write_text(DOORS.format(token=token))
