@@ -85,8 +85,10 @@ void Doors::open(std::shared_ptr<const config::Config> config) {
     doors_.clear();
     plant_.clear();
     for (const config::Line& line : config_->lines) {
-        plant_[line.name].set(0);
-        for (const config::Station& station : line.stations) plant_[line.name].set(station.id);
+        std::bitset<256>& known = plant_[line.name];
+        if (line.refuse_unlisted) known.set();
+        known.set(0);
+        for (const config::Station& station : line.stations) known.set(station.id);
     }
     for (const tcp_server::Settings& listener : config_->modbus_tcp) {
         add(listener);

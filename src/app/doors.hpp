@@ -58,8 +58,9 @@ class Doors {
         Destinations reach;
     };
     std::map<std::string, Door> doors_;  ///< by listener's or serial master's name
-    Destinations plant_;                 ///< what there is; of unlisted stations nothing is known
-    std::set<std::string> renewed_;      ///< tokens by name
+    /// Of which it is known that they are there, or refused as not listed.
+    Destinations plant_;
+    std::set<std::string> renewed_;  ///< tokens by name
 };
 
 }  // namespace panelgate::app

@@ -122,6 +122,20 @@ TEST_F(DoorsTest, AModbusClientMeetsItsListenersNewDoor) {
     EXPECT_EQ(change([](auto& one) { one.lines = {"floor2"}; }), "access");
 }
 
+TEST_F(DoorsTest, AnUnlistedStationWaitsNoLongerThanItIsPassedOn) {
+    before.modbus_tcp[0].lines = {"floor1"};
+    doors.open(std::make_shared<const config::Config>(before));
+    const WhoRef who = make_who({.face = Face::modbus_tcp,
+                                 .listener = before.modbus_tcp[0].name(),
+                                 .standing = Role::operator_});
+    station = 77;
+    EXPECT_EQ(after(who, [](auto&) {}), "");
+    EXPECT_EQ(after(who, [](config::Config& now) { now.lines[0].refuse_unlisted = true; }),
+              "access");
+    station = 7;
+    EXPECT_EQ(after(who, [](config::Config& now) { now.lines[0].refuse_unlisted = true; }), "");
+}
+
 TEST_F(DoorsTest, WhereAListenerLeadsIsWhereItsUnitsGo) {
     tcp_server::Settings listener;
     listener.lines = {"floor1"};
