@@ -249,7 +249,10 @@ RtuReader::RtuReader(const Settings& settings)
 
 void RtuReader::feed(TimePoint now, ByteView bytes) {
     const bool unread = std::exchange(unread_, false);
-    if (now - heard_ >= silence_ && !was_silent_ && !unread) framer_.on_silence();
+    const Duration silent = now - heard_;
+    if (silent >= silence_ && !was_silent_ && !unread) framer_.on_silence();
+    // The rest of a damaged request, of which a part was taken, will not come either.
+    if (silent >= partial_timeout_ && !unread) framer_.drop_pending();
     heard_ = now;
     was_silent_ = false;
     look_at(bytes);

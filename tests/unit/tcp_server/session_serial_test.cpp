@@ -215,6 +215,18 @@ TEST_F(SessionRtu, HalfARequestIsGivenUpAndTheConnectionLivesOn) {
     EXPECT_EQ(counters().protocol_errors, 1U);
 }
 
+TEST_F(SessionRtu, P3AWriteLongAfterNoiseThatAReadHasOutlivedIsTaken) {
+    Client client = connect();
+    bus1.instant = reply_to_read(7);
+    client.send("F9 6C"_hex + read_adu(7));
+    expect_next_after_silence(client, 1, reply_to_read(7));
+    clock.advance(settings.partial_adu_timeout);
+    const Bytes write = "06 0000 BEEF"_hex;
+    bus1.instant = write;
+    client.send(adu(1, write));
+    expect_next(client, 1, write);
+}
+
 class SessionAscii : public Serial {
   protected:
     SessionAscii() : Serial(Framing::ascii) {}
