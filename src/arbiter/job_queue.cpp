@@ -23,69 +23,66 @@ std::size_t JobQueue::rank_of(const Job& job) {
 
 template <class Visit>
 bool JobQueue::any_lane(const Visit& visit) const {
-    for (const auto& [host, origin] : hosts_) {
-        for (const auto& [client, source] : origin.sources) {
-            for (const auto& [station, lane] : source.lanes)
-                if (visit(Found{{host, client, station}, origin, source, lane})) return true;
-        }
+    for (const auto& [client, source] : clients_) {
+        for (const auto& [station, lane] : source.lanes)
+            if (visit(Found{{client, station}, source, lane})) return true;
     }
     return false;
 }
 
 const JobQueue::Source* JobQueue::find(Client client) const {
-    const auto home = home_.find(client);
-    return home == home_.end() ? nullptr : &hosts_.at(home->second).sources.at(client);
+    const auto found = clients_.find(client);
+    return found == clients_.end() ? nullptr : &found->second;
 }
 
 /// Lanes are in order of tickets, so their first jobs decide; broadcasts are the first lane.
-const Job* JobQueue::Source::first(std::uint8_t station) const {
+const JobQueue::Entry* JobQueue::Source::first(std::uint8_t station) const {
     const auto lane = lanes.find(station);
     if (lane == lanes.end()) return nullptr;
-    const Job* const job = &lane->second.jobs.front().job;
-    const auto is_before = [job](const Lane& other) {
-        return job->ticket <= other.jobs.front().job.ticket;
+    const Entry* const first = &lane->second.jobs.front();
+    const auto is_before = [first](const Lane& other) {
+        return first->job.ticket <= other.jobs.front().job.ticket;
     };
     const auto& [lowest, broadcasts] = *lanes.begin();
-    if (lowest != kBroadcast) return job;
-    if (station != kBroadcast) return is_before(broadcasts) ? job : nullptr;
-    return std::ranges::all_of(lanes | std::views::values, is_before) ? job : nullptr;
+    if (lowest != kBroadcast) return first;
+    if (station != kBroadcast) return is_before(broadcasts) ? first : nullptr;
+    return std::ranges::all_of(lanes | std::views::values, is_before) ? first : nullptr;
 }
 
-/// False if a host with an earlier turn was found in each class that waits.
-bool JobQueue::may_be_next(const Origin& origin, const Choice& choice) const {
-    for (std::size_t rank = 0; rank < kRanks; ++rank) {
-        const Choice::First& first = choice.first_[rank];
-        const bool is_earlier = first.job != nullptr && first.turn[0] < origin.turns[rank];
-        if (firsts_[rank] > 0 && !is_earlier) return true;
+/// Of the first host in its round that has a runnable one.
+std::pair<const Job*, JobQueue::Place> JobQueue::first_of(std::size_t rank,
+                                                          const Test& may_run) const {
+    std::pair<const Job*, Place> first;
+    for (const auto& [host_turn, host] : rounds_[rank]) {
+        std::pair<std::uint64_t, std::uint64_t> earliest;
+        for (const Client client : hosts_.at(host).clients) {
+            const Source& source = clients_.at(client);
+            for (const auto& [station, lane] : source.lanes) {
+                if (rank_of(lane.jobs.front().job) != rank) continue;
+                const std::pair turn(source.turns[rank], lane.turns[rank]);
+                if (first.first != nullptr && earliest < turn) continue;
+                const Entry* const entry = source.first(station);
+                if (entry == nullptr || !may_run(entry->job)) continue;
+                first = {&entry->job, {client, station}};
+                earliest = turn;
+            }
+        }
+        if (first.first != nullptr) break;
     }
-    return false;
+    return first;
 }
 
 /// A lower class never goes ahead twice in a row, so that a write waits for only one.
 JobQueue::Choice JobQueue::choose(const Test& may_run) const {
     Choice choice;
-    const auto look_at = [&](const Found& at) {
-        const std::size_t rank = rank_of(at.lane.jobs.front().job);
-        Choice::First& first = choice.first_[rank];
-        const std::array turn{at.origin.turns[rank], at.source.turns[rank], at.lane.turns[rank]};
-        if (first.job != nullptr && first.turn < turn) return;
-        const Job* const job = at.source.first(at.place.station);
-        if (job != nullptr && may_run(*job)) first = {job, at.place, turn};
-    };
-    for (const auto& [host, origin] : hosts_) {
-        if (!may_be_next(origin, choice)) continue;
-        for (const auto& [client, source] : origin.sources) {
-            for (const auto& [station, lane] : source.lanes)
-                look_at({{host, client, station}, origin, source, lane});
-        }
-    }
+    for (std::size_t rank = 0; rank < kRanks; ++rank) choice.first_[rank] = first_of(rank, may_run);
     std::size_t top = 0;
-    while (top < kRanks && choice.first_[top].job == nullptr) ++top;
+    while (top < kRanks && choice.first_[top].first == nullptr) ++top;
     choice.rank_ = top;
     if (last_was_passed_over_) return choice;  // the higher class goes
-    if (top < kRead && choice.first_[kRead].job != nullptr && passed_[kRead] >= kReadTurn - 1) {
+    if (top < kRead && choice.first_[kRead].first != nullptr && passed_[kRead] >= kReadTurn - 1) {
         choice.rank_ = kRead;
-    } else if (top < kPoll && choice.first_[kPoll].job != nullptr && is_polls_turn(choice, top)) {
+    } else if (top < kPoll && choice.first_[kPoll].first != nullptr && is_polls_turn(choice, top)) {
         choice.rank_ = kPoll;
     }
     choice.passed_over_ = choice.rank_ != top;
@@ -96,7 +93,7 @@ JobQueue::Choice JobQueue::choose(const Test& may_run) const {
 /// itself, or would be in the following turn, which is a write's again), the poll goes up to three
 /// turns earlier; one of these four turns is always free for it.
 bool JobQueue::is_polls_turn(const Choice& choice, std::size_t top) const {
-    const bool read = choice.first_[kRead].job != nullptr;
+    const bool read = choice.first_[kRead].first != nullptr;
     const int reads_wait = passed_[kRead];
     if (read && reads_wait >= kReadTurn - 2) return false;
     const bool in_the_way = top == kWrite && reads_wait + (read ? 1 : 0) >= kReadTurn - 2;
@@ -106,9 +103,9 @@ bool JobQueue::is_polls_turn(const Choice& choice, std::size_t top) const {
 void JobQueue::count_turn(const Choice& choice) {
     last_was_passed_over_ = choice.passed_over_;
     for (const std::size_t rank : {kRead, kPoll}) {
-        if (rank == choice.rank_ || firsts_[rank] == 0) {
+        if (rank == choice.rank_ || rounds_[rank].empty()) {
             passed_[rank] = 0;
-        } else if (choice.first_[rank].job != nullptr) {
+        } else if (choice.first_[rank].first != nullptr) {
             ++passed_[rank];
         }
     }
@@ -117,30 +114,31 @@ void JobQueue::count_turn(const Choice& choice) {
 Job JobQueue::take(const Choice& choice) {
     count_turn(choice);
     const std::size_t rank = choice.rank_;
-    const Place& place = choice.first_[rank].place;
-    Origin& origin = hosts_.at(place.host);
-    Source& source = origin.sources.at(place.client);
+    const Place& place = choice.first_[rank].second;
+    Source& source = clients_.at(place.client);
+    Origin& origin = hosts_.at(source.host);
     Lane& lane = source.lanes.at(place.station);
-    origin.turns[rank] = source.turns[rank] = lane.turns[rank] = ++turns_;
-    return take(place, 0);
+    auto turn = rounds_[rank].extract(origin.turns[rank]);
+    origin.turns[rank] = source.turns[rank] = lane.turns[rank] = turn.key() = ++turns_;
+    rounds_[rank].insert(rounds_[rank].end(), std::move(turn));
+    return take(place);
 }
 
-Jobs JobQueue::take_all(std::uint8_t station, const Test& wanted) {
+Jobs JobQueue::take_reads(std::uint8_t station, const Test& wanted) {
     Jobs taken;
     for (bool again = true; again;) {
         again = false;
-        PoolMap<Ticket, Place> places;
-        any_lane([&](const Found& at) {
-            if (at.place.station == station)
-                places.emplace(at.lane.jobs.front().job.ticket, at.place);
-            return false;
+        PoolMap<Ticket, Place> lanes;
+        reads_.visit(station, [&](Client client) {
+            const Lane& lane = find(client)->lanes.at(station);
+            lanes.emplace(lane.jobs.front().job.ticket, Place{client, station});
         });
-        for (const auto& [ticket, place] : places) {
+        for (const auto& [ticket, place] : lanes) {
             for (const Source* source = find(place.client); source != nullptr;
                  source = find(place.client)) {
-                const Job* const job = source->first(station);
-                if (job == nullptr || !wanted(*job)) break;
-                taken.push_back(take(place, 0));
+                const Entry* const first = source->first(station);
+                if (first == nullptr || !first->span || !wanted(first->job)) break;
+                taken.push_back(take(place));
                 again = true;
             }
         }
@@ -165,8 +163,8 @@ Jobs JobQueue::remove_if(const Test& match) {
 
 bool JobQueue::any_first(const Test& match) const {
     return any_lane([&](const Found& at) {
-        const Job* const job = at.source.first(at.place.station);
-        return job != nullptr && match(*job);
+        const Entry* const first = at.source.first(at.place.station);
+        return first != nullptr && match(first->job);
     });
 }
 
@@ -192,113 +190,84 @@ JobQueue::Entry JobQueue::entry_of(Job job) {
 
 /// A client keeps its host while a job of it waits.
 JobQueue::HostKey JobQueue::host_of(const Job& job) const {
-    const auto home = home_.find(job.client);
-    if (home != home_.end()) return home->second;
+    if (const Source* const known = find(job.client)) return known->host;
     return job.host == 0 ? HostKey{true, job.client} : HostKey{false, job.host};
 }
 
 /// Who is new has the last turn in all classes.
-JobQueue::Lane& JobQueue::open_lane(const Place& place) {
+std::pair<JobQueue::Source&, JobQueue::Lane&> JobQueue::open_lane(const Job& job) {
     const auto open = [this](auto& map, const auto& key) -> auto& {
         const auto [it, added] = map.try_emplace(key);
         if (added) it->second.turns.fill(++turns_);
         return it->second;
     };
-    Origin& origin = open(hosts_, place.host);
-    Source& source = open(origin.sources, place.client);
-    home_.emplace(place.client, place.host);
-    return open(source.lanes, place.station);
+    const HostKey host = host_of(job);
+    open(hosts_, host).clients.insert(job.client);
+    Source& source = open(clients_, job.client);
+    source.host = host;
+    return {source, open(source.lanes, job.station)};
 }
 
 void JobQueue::put_back(Job job) { insert(entry_of(std::move(job))); }
 
 /// Inserts by ticket: at the end if it is new, further ahead if it was taken before.
 void JobQueue::insert(Entry entry) {
-    PoolDeque<Entry>& jobs =
-        open_lane({host_of(entry.job), entry.job.client, entry.job.station}).jobs;
+    const auto [source, lane] = open_lane(entry.job);
+    PoolDeque<Entry>& jobs = lane.jobs;
     expiries_.insert(entry.job.start_by);
-    if (entry.span) {
-        reads_.add(entry.job, *entry.span, [this](Client client, int by) { count(client, by); });
-    } else {
-        count(entry.job.client, 1);
-    }
-    if (!jobs.empty()) --firsts_[rank_of(jobs.front().job)];
+    count(entry, 1);
     auto at = jobs.end();
     while (at != jobs.begin() && std::prev(at)->job.ticket > entry.job.ticket) --at;
+    if (at == jobs.begin()) {
+        count_first(source.host, entry.job, 1);
+        if (!jobs.empty()) count_first(source.host, jobs.front().job, -1);
+    }
     jobs.insert(at, std::move(entry));
-    ++firsts_[rank_of(jobs.front().job)];
+}
+
+/// One lane more or less of this host has such a job first.
+void JobQueue::count_first(const HostKey& host, const Job& job, int by) {
+    const std::size_t rank = rank_of(job);
+    Origin& origin = hosts_.at(host);
+    if (origin.firsts[rank] == 0)
+        rounds_[rank].emplace_hint(rounds_[rank].end(), origin.turns[rank], host);
+    origin.firsts[rank] += static_cast<std::size_t>(by);  // unsigned wrap-around is intended
+    if (origin.firsts[rank] == 0) rounds_[rank].erase(origin.turns[rank]);
 }
 
 Job JobQueue::take(const Place& place, std::size_t index) {
-    Origin& origin = hosts_.at(place.host);
-    Source& source = origin.sources.at(place.client);
+    Source& source = clients_.at(place.client);
     PoolDeque<Entry>& jobs = source.lanes.at(place.station).jobs;
     const auto at = jobs.begin() + static_cast<std::ptrdiff_t>(index);
     expiries_.erase(expiries_.find(at->job.start_by));
-    if (at->span) {
-        reads_.remove(at->job, *at->span, [this](Client client, int by) { count(client, by); });
-    } else {
-        count(place.client, -1);
+    count(*at, -1);
+    if (index == 0) {
+        if (jobs.size() > 1) count_first(source.host, jobs[1].job, 1);
+        count_first(source.host, at->job, -1);
     }
-    --firsts_[rank_of(jobs.front().job)];
     Job job = std::move(at->job);
     jobs.erase(at);
-    if (jobs.empty()) {
-        source.lanes.erase(place.station);
-    } else {
-        ++firsts_[rank_of(jobs.front().job)];
-    }
-    if (source.lanes.empty()) {
-        origin.sources.erase(place.client);
-        home_.erase(place.client);
-    }
-    if (origin.sources.empty()) hosts_.erase(place.host);
+    if (jobs.empty()) source.lanes.erase(place.station);
+    if (!source.lanes.empty()) return job;
+    const auto host = hosts_.find(source.host);
+    host->second.clients.erase(place.client);
+    if (host->second.clients.empty()) hosts_.erase(host);
+    clients_.erase(place.client);
     return job;
 }
 
-void JobQueue::count(Client client, int by) {
-    Origin& origin = hosts_.at(home_.at(client));
-    const auto change = static_cast<std::size_t>(by);  // unsigned wrap-around is intended
-    origin.sources.at(client).counting += change;
-    origin.counting += change;
-    size_ += change;
-}
-
-bool JobQueue::source_consistent(Client client, const HostKey& host, const Source& source) const {
-    std::size_t counting = 0;
-    for (const auto& [station, lane] : source.lanes) {
-        if (lane.jobs.empty()) return false;
-        for (std::size_t i = 0; i < lane.jobs.size(); ++i) {
-            const auto& [job, span] = lane.jobs[i];
-            if (job.client != client || job.station != station) return false;
-            if (i > 0 && lane.jobs[i - 1].job.ticket >= job.ticket) return false;
-            if (!span || reads_.counts(job.ticket, *span)) ++counting;
-        }
-    }
-    return !source.lanes.empty() && counting == source.counting && home_.at(client) == host;
-}
-
-bool JobQueue::consistent() const {
-    std::size_t counting = 0;
-    std::size_t waiting = 0;
-    std::size_t clients = 0;
-    std::array<std::size_t, kRanks> firsts{};
-    for (const auto& [host, origin] : hosts_) {
-        std::size_t of_host = 0;
-        for (const auto& [client, source] : origin.sources) {
-            if (!source_consistent(client, host, source)) return false;
-            of_host += source.counting;
-            ++clients;
-            for (const auto& [station, lane] : source.lanes) {
-                waiting += lane.jobs.size();
-                ++firsts[rank_of(lane.jobs.front().job)];
-            }
-        }
-        if (origin.sources.empty() || of_host != origin.counting) return false;
-        counting += of_host;
-    }
-    return counting == size_ && waiting == expiries_.size() && clients == home_.size() &&
-           firsts == firsts_;
+/// One more or less waits.
+void JobQueue::count(const Entry& entry, int by) {
+    const auto count = [this](Client client, int more) {
+        const auto change = static_cast<std::size_t>(more);  // unsigned wrap-around is intended
+        Source& source = clients_.at(client);
+        source.counting += change;
+        hosts_.at(source.host).counting += change;
+        size_ += change;
+    };
+    if (!entry.span) return count(entry.job.client, by);
+    if (by > 0) return reads_.add(entry.job, *entry.span, count);
+    reads_.remove(entry.job, *entry.span, count);
 }
 
 // Admission to the queue, and dropping jobs for it.
@@ -341,25 +310,26 @@ bool JobQueue::make_room(const Job& newcomer, Jobs& shed) {
 /// request is dropped, so that not always the same client loses.
 std::optional<JobQueue::Victim> JobQueue::find_victim(const Job& newcomer) const {
     const HostKey own = host_of(newcomer);
-    const auto origin = hosts_.find(own);
+    const auto host = hosts_.find(own);
     const Source* const source = find(newcomer.client);
-    const std::size_t of_host = origin == hosts_.end() ? 0 : origin->second.counting;
+    const std::size_t of_host = host == hosts_.end() ? 0 : host->second.counting;
     const std::size_t of_client = source == nullptr ? 0 : source->counting;
     const bool write = newcomer.priority == PriorityClass::write;
     // Writes come first, but not at the expense of the places of reads that every fifth turn needs.
     const bool replaces_reads = write && kReadTurn * reads_.counting() > settings_.limit;
     std::optional<Victim> best;
     any_lane([&](const Found& at) {
-        const bool is_own = at.place.host == own;
-        const std::size_t load = is_own ? at.source.counting : at.origin.counting;
+        const bool is_own = at.source.host == own;
+        const std::size_t of_its_host = hosts_.at(at.source.host).counting;
+        const std::size_t load = is_own ? at.source.counting : of_its_host;
         const std::size_t mine = is_own ? of_client : of_host;
         const bool greedier = load > mine + 1;
         if (!greedier && (load < mine || !replaces_reads)) return false;
         auto victim = victim_in(at);
-        const bool writes_too = greedier && (write || 2 * at.origin.counting > size_);
+        const bool writes_too = greedier && (write || 2 * of_its_host > size_);
         if (!victim || (victim->is_write && !writes_too)) return false;
         const int level = !greedier ? 0 : is_own ? 1 : 2;
-        victim->greed = {level, at.origin.counting, at.source.counting};
+        victim->greed = {level, of_its_host, at.source.counting};
         if (!best || *best < *victim) best = victim;
         return false;
     });

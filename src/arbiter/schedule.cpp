@@ -29,7 +29,7 @@ Group Sharing::gather(Job leader, const Station& station, const OutstandingReque
     group.jobs.push_back(std::move(leader));
     while (group.span) {
         const std::uint32_t before = group.span->count;
-        for (Job& job : queue.take_all(group.station, [&](const Job& other) {
+        for (Job& job : queue.take_reads(group.station, [&](const Job& other) {
                  if (!joins(group, other, station, book)) return false;
                  group.span = join(*group.span, *other.request.span());
                  return true;
@@ -45,9 +45,8 @@ Group Sharing::gather(Job leader, const Station& station, const OutstandingReque
 
 bool Sharing::joins(const Group& group, const Job& job, const Station& station,
                     const OutstandingRequests& book) const {
-    if (job.alone || job.station != group.station) return false;
     const auto& span = job.request.span();
-    if (!span || !group.span->touches(*span)) return false;
+    if (!group.span->touches(*span)) return false;
     if (group.span->contains(*span)) return true;
     const modbus::Span both = join(*group.span, *span);
     if (book.any(job.station) && book.is_ambiguous(job.station, modbus::Request::read(both)))

@@ -62,9 +62,10 @@ class JobQueue {
     Choice choose(const Test& may_run) const;
     /// Takes the job that was chosen and advances the turns. There must be one.
     Job take(const Choice& choice);
-    /// Takes the matching first jobs of all lanes for this station, repeatedly until none matches;
-    /// `wanted` may depend on what it accepted. Turns do not advance. In order of tickets.
-    Jobs take_all(std::uint8_t station, const Test& wanted);
+    /// Takes the matching first jobs of all lanes for this station that are reads to be shared,
+    /// repeatedly until none matches; `wanted` may depend on what it accepted. Turns do not
+    /// advance. In order of tickets.
+    Jobs take_reads(std::uint8_t station, const Test& wanted);
     /// Removes and returns the matching jobs, in order of tickets.
     Jobs remove_if(const Test& match);
     /// Visits each lane's first job that order allows to run, until one matches. False if none
@@ -82,12 +83,10 @@ class JobQueue {
     bool empty() const { return expiries_.empty(); }
     /// The earliest start_by of all.
     std::optional<TimePoint> first_expiry() const;
-    /// Recounts everything. For tests.
-    bool consistent() const;
 
   private:
     static constexpr std::size_t kRanks = 3;  ///< probes are not queued
-    /// Of each class: when the last turn was, or when it came. The least is next.
+    /// Of each class: when the last turn was, or when it came. The least is next; none are equal.
     using Turns = std::array<std::uint64_t, kRanks>;
     using HostKey =
         std::pair<bool, std::uint64_t>;  ///< whether it is a client without a host, and the id
@@ -100,28 +99,30 @@ class JobQueue {
         PoolDeque<Entry> jobs;  ///< in order of tickets
         Turns turns{};
     };
+    /// What one client has waiting.
     struct Source {
+        HostKey host;
         PoolMap<std::uint8_t, Lane> lanes;
         Turns turns{};
         std::size_t counting = 0;
 
-        /// The first job of this lane, if there is one and order allows it to run, else null.
-        const Job* first(std::uint8_t station) const;
+        /// The first of this lane, if there is one and order allows it to run, else null.
+        const Entry* first(std::uint8_t station) const;
     };
+    /// What one host has waiting.
     struct Origin {
-        PoolMap<Client, Source> sources;
+        PoolSet<Client> clients;
         Turns turns{};
         std::size_t counting = 0;
+        std::array<std::size_t, kRanks> firsts{};  ///< lanes whose first job is of the class
     };
     struct Place {
-        HostKey host;
         Client client = 0;
         std::uint8_t station = 0;
     };
     /// A lane, and whose it is.
     struct Found {
         Place place;
-        const Origin& origin;
         const Source& source;
         const Lane& lane;
     };
@@ -147,29 +148,30 @@ class JobQueue {
     template <class Visit>
     bool any_lane(const Visit& visit) const;
     const Source* find(Client client) const;
-    bool may_be_next(const Origin& origin, const Choice& choice) const;
+    std::pair<const Job*, Place> first_of(std::size_t rank, const Test& may_run) const;
     bool is_polls_turn(const Choice& choice, std::size_t top) const;
     void count_turn(const Choice& choice);
 
     static Entry entry_of(Job job);
     HostKey host_of(const Job& job) const;
-    Lane& open_lane(const Place& place);
+    std::pair<Source&, Lane&> open_lane(const Job& job);
     void insert(Entry entry);
-    Job take(const Place& place, std::size_t index);
-    void count(Client client, int by);
+    void count_first(const HostKey& host, const Job& job, int by);
+    Job take(const Place& place, std::size_t index = 0);
+    void count(const Entry& entry, int by);
 
     bool make_room(const Job& newcomer, Jobs& shed);
     std::optional<Victim> find_victim(const Job& newcomer) const;
     std::optional<Victim> victim_in(const Found& found) const;
-    bool source_consistent(Client client, const HostKey& host, const Source& source) const;
 
     QueueSettings settings_;
-    PoolMap<HostKey, Origin> hosts_;  ///< no empty entries
-    PoolMap<Client, HostKey> home_;   ///< of clients with waiting jobs
+    PoolMap<HostKey, Origin> hosts_;   ///< no empty entries
+    PoolMap<Client, Source> clients_;  ///< likewise
     WaitingReads reads_;
     PoolMultiset<TimePoint> expiries_;  ///< of all waiting jobs
     std::size_t size_ = 0;
-    std::array<std::size_t, kRanks> firsts_{};  ///< lanes whose first job is of the class
+    /// Of each class the hosts that have a lane whose first job is of it, by their turns.
+    std::array<PoolMap<std::uint64_t, HostKey>, kRanks> rounds_;
     std::uint64_t turns_ = 0;
     /// Turns of other classes while one of this class was runnable.
     std::array<int, kRanks> passed_{};
@@ -179,16 +181,12 @@ class JobQueue {
 class JobQueue::Choice {
   public:
     /// Null: none is runnable.
-    const Job* job() const { return rank_ < kRanks ? first_[rank_].job : nullptr; }
+    const Job* job() const { return rank_ < kRanks ? first_[rank_].first : nullptr; }
 
   private:
     friend class JobQueue;
-    struct First {
-        const Job* job = nullptr;  ///< the first runnable one of its class
-        Place place;
-        std::array<std::uint64_t, 3> turn{};  ///< of its host, client and lane
-    };
-    std::array<First, kRanks> first_;
+    /// The first runnable one of each class, and where it waits.
+    std::array<std::pair<const Job*, Place>, kRanks> first_;
     std::size_t rank_ = kRanks;
     bool passed_over_ = false;
 };

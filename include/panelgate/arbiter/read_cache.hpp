@@ -83,6 +83,13 @@ class WaitingReads {
     /// True if removing this read lowers the count: it counts, and no carried read would take its
     /// place.
     bool frees(Ticket ticket, const ReadSpan& span) const;
+    /// Visits the clients whose reads of this station wait: one for each of these.
+    template <class Visit>
+    void visit(std::uint8_t station, const Visit& visit) const {
+        auto it = spans_.lower_bound({station, {modbus::kTables.front(), 0, 0x10000}});
+        for (; it != spans_.end() && it->first.station == station; ++it)
+            for (const auto& [ticket, client] : it->second) visit(client);
+    }
     /// Number of reads that count.
     std::size_t counting() const { return widest_.size(); }
 

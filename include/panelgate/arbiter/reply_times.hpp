@@ -149,8 +149,7 @@ class ReplyHole {
     void on_broken(TimePoint now, Duration pause, Duration most) {
         seen_ = std::max(seen_, pause);
         used_ = now;
-        if (++broken_ >= 2)
-            learned_ = std::min(std::max(learned_, seen_ * 5 / 4 + timing::kCandidateMargin), most);
+        if (++broken_ >= 2) learned_ = std::min(seen_ * 5 / 4 + timing::kCandidateMargin, most);
     }
     /// A reply came whole; the longest pause inside it.
     void on_reply(TimePoint now, Duration pause) {

@@ -124,7 +124,7 @@ void arbiter_transaction(benchmark::State& state) {
         line.add(1 + next++ % static_cast<Client>(state.range(0)));
     }
 }
-BENCHMARK(arbiter_transaction)->Args({1, 256})->Args({8, 256})->Args({8, 1});
+BENCHMARK(arbiter_transaction)->Args({1, 256})->Args({8, 256})->Args({250, 256})->Args({8, 1});
 
 void slice_registers(benchmark::State& state) {
     const modbus::Span whole{modbus::Table::holding_registers, 100, 100};

@@ -357,5 +357,22 @@ TEST_F(AttemptPaceTest, AnEchoIsLookedAtWhenItCanHaveComeBack) {
     EXPECT_EQ(attempt_.busy_until(), std::nullopt);
 }
 
+TEST_F(AttemptTest, AFrameOfAnotherFunctionLeavesTheReplyItsUsualTime) {
+    EXPECT_EQ(hear(10ms, encode_adu(kStation, "04 02 00 01"_hex)), Verdict::open);
+    EXPECT_EQ(run_to_verdict(), Verdict::wrong) << "it may be meant for another master";
+    EXPECT_EQ(ended_, 100ms);
+}
+
+TEST(AttemptTimes, WhereBytesComeOneByOneTheEndOfAReplyTellsWhenItBegan) {
+    Attempt::Timing timing = timing_of(100ms);
+    const TimePoint end = timing.sent + 5ms + frame_time(timing.serial, kReplyAdu.size());
+    for (const bool steady : {false, true}) {
+        timing.steady = steady;
+        Attempt attempt(group_of(kStation, kRead), timing, {});
+        ASSERT_EQ(attempt.on_rx(end, kReplyAdu, [](ByteView) { return false; }), Verdict::replied);
+        EXPECT_EQ(attempt.first_byte(), steady ? timing.sent + 5ms : end);
+    }
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter::attempt_test

@@ -199,10 +199,12 @@ class JobQueueModel : public testing::Test {
         model_.popped(popped);
         if (below(4) == 0) taken_.push_back(popped);
     }
-    void take_all() {
+    void take_reads() {
         const auto test = any_test();
         const auto station = static_cast<std::uint8_t>(1 + below(4));
-        const auto here = [&](const Job& job) { return job.station == station && test(job); };
+        const auto here = [&](const Job& job) {
+            return job.station == station && job.request.span() && !job.alone && test(job);
+        };
         std::vector<Ticket> expected;
         for (auto first = model_.firsts(here); !first.empty(); first = model_.firsts(here)) {
             expected.push_back(first.front()->ticket);
@@ -210,7 +212,7 @@ class JobQueueModel : public testing::Test {
         }
         std::ranges::sort(expected);
         std::vector<Ticket> got;
-        for (const Job& job : queue_.take_all(station, test)) got.push_back(job.ticket);
+        for (const Job& job : queue_.take_reads(station, test)) got.push_back(job.ticket);
         ASSERT_EQ(got, expected);
     }
     void remove_some() {
@@ -234,7 +236,7 @@ class JobQueueModel : public testing::Test {
     void step(unsigned what) {
         if (what < 11) return push();
         if (what < 17) return pop();
-        if (what == 17) return take_all();
+        if (what == 17) return take_reads();
         if (what == 18) return remove_some();
         put_back();
     }
@@ -259,7 +261,6 @@ class JobQueueModel : public testing::Test {
             return job.client == client && (job.station == station || job.station == 0);
         };
         ASSERT_EQ(queue_.has(client, station), std::ranges::any_of(model_.jobs, theirs));
-        ASSERT_TRUE(queue_.consistent());
     }
 
     static std::vector<Ticket> tickets(const std::vector<const Job*>& jobs) {

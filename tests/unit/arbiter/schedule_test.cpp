@@ -130,6 +130,15 @@ TEST_F(ScheduleTest, P4ARetryLeavesTheOthersTurnsByWhatItMayCost) {
     }
 }
 
+TEST_F(ScheduleTest, P4ARetriedWriteLeavesOneTurnToTheOthers) {
+    wait(2);
+    wait(3);
+    Group write = failed(1);
+    write.request = job(1, true).request;
+    schedule.retry(now, std::move(write), kDear);
+    EXPECT_EQ(order(), "2 r1 3");
+}
+
 TEST_F(ScheduleTest, P8TheReadThatConfirmsAWriteGoesBeforeTheOthers) {
     wait(2);
     Group read = failed(1);
@@ -301,6 +310,33 @@ TEST_F(ScheduleTest, P1TheWholeLineRestsWhereTheConfigurationSaysSo) {
     probe.probe = true;
     EXPECT_FALSE(schedule.line_rests_until(now, probe, now - 500ms, station))
         << "a probe lets the others go on";
+    for (StationSettings& one : settings.stations) one.late_window = 2s;
+    stations.apply(settings);
+    station.replies().on_unanswered(stations.book(), now, group.request.pdu(), now - 500ms);
+    EXPECT_EQ(schedule.line_rests_until(now, group, now - 500ms, station), now + 2s);
+    for (StationSettings& one : settings.stations) one.adaptive_timeout = true;
+    stations.apply(settings);
+    EXPECT_EQ(schedule.line_rests_until(now, group, now - 500ms, station), now + 500ms)
+        << "who shortens the timeout does not want to wait for longer than one";
+}
+
+TEST_F(ScheduleTest, P1TheWholeLineRestsForAStationWhoseRepliesAreOftenLate) {
+    Group group = failed(1);
+    group.first_silence = true;
+    Station& station = stations.of(1);
+    const auto miss = [&] {
+        station.replies().on_unanswered(stations.book(), now, group.request.pdu(), now - 500ms);
+        return schedule.line_rests_until(now, group, now - 500ms, station);
+    };
+    for (int times = 0; times < 2; ++times) {
+        EXPECT_FALSE(miss()) << "once is no habit";
+        now += 80ms;
+        station.on_unsolicited_frame(stations.book(), now, Done::late,
+                                     Bytes{3, 2, 0, static_cast<std::uint8_t>(times)});
+    }
+    EXPECT_EQ(miss(), now + 100ms) << "a quarter longer than the latest was late";
+    group.first_silence = false;
+    EXPECT_FALSE(miss()) << "the others do not wait for it again";
 }
 
 constexpr TimePoint kStart{1h};

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <utility>
@@ -222,6 +223,67 @@ TEST_F(StationTest, P4AProbeWaitsAsLongAsMostRepliesTakeAndNowAndThenAsLongAsAny
     }
     EXPECT_GE(dear, 2);
     EXPECT_LE(dear, 3);
+}
+
+TEST_F(StationTest, P4OneThatWasNeverHeardIsNowAndThenWaitedForLonger) {
+    const Duration line = 10ms;  // what the other stations need
+    Duration longest{};
+    int longer = 0;
+    for (int i = 0; i < 40; ++i) {
+        miss(kRead);
+        station_.on_given_up(now_, Fault::timeout);
+        const Duration wait = station_.patience(group_of(kId, kRead), line, false);
+        longest = std::max(longest, wait);
+        longer += wait > 2 * line + timing::kReceiveMargin ? 1 : 0;
+    }
+    EXPECT_EQ(longest, kTimeout) << "it may need longer than they do";
+    EXPECT_LE(longer, 10);
+}
+
+TEST_F(StationTest, P4AWriteThatItIgnoresDoesNotKeepReadsFromShowingThatItIsBack) {
+    answer(kRead, kReply);
+    while (!station_.health().offline()) {
+        miss(kRead);
+        station_.on_given_up(now_, Fault::timeout);
+    }
+    now_ += 10s;
+    EXPECT_TRUE(station_.take_half_open(now_, false));
+    now_ += 10s;
+    EXPECT_FALSE(station_.take_half_open(now_, false));
+    station_.on_asked(book_, now_, group_of(kId, kRead));
+    EXPECT_TRUE(station_.take_half_open(now_, false));
+}
+
+TEST_F(StationTest, P9AReadGoesBehindAWriteThatItIgnoredOrFourThatItAnswered) {
+    const auto ask = [&](const Bytes& pdu) { station_.on_asked(book_, now_, group_of(kId, pdu)); };
+    const modbus::Request write = test::request_of(kWrite);
+    ask(kWrite);
+    EXPECT_FALSE(station_.has_read_turn());
+    station_.on_failed(now_, Verdict::silent, kTimeout, &write);
+    EXPECT_TRUE(station_.has_read_turn());
+    ask(kRead);
+    for (int i = 0; i < Station::kWritesInARow; ++i) {
+        EXPECT_FALSE(station_.has_read_turn());
+        ask(kWrite);
+    }
+    EXPECT_TRUE(station_.has_read_turn());
+    ask(kRead);
+    answer(kRead, kReply);
+    hear(now_ + 20ms, kReply);
+    EXPECT_FALSE(station_.has_read_turn());
+    ask(kWrite);
+    EXPECT_TRUE(station_.has_read_turn()) << "while it rests others have the turns between";
+}
+
+TEST_F(StationTest, P4AReadDecidesBeforeUnansweredWritesTakeItOffline) {
+    answer(kRead, kReply);
+    for (int i = 0; i < 2; ++i) station_.on_given_up(now_, Fault::timeout, false);
+    EXPECT_FALSE(station_.wants_check());
+    EXPECT_FALSE(station_.on_given_up(now_, Fault::timeout, false));
+    EXPECT_TRUE(station_.wants_check());
+    station_.on_asked(book_, now_, group_of(kId, kRead));
+    EXPECT_FALSE(station_.wants_check());
+    EXPECT_TRUE(station_.on_given_up(now_, Fault::timeout));
 }
 
 TEST_F(StationTest, ClassifiesAnUnsolicitedFrameAndChangesNothingByThat) {

@@ -115,6 +115,14 @@ TEST_F(StationsTest, P4WhatOneLosesShortensTheWaitsBehindItAlsoOnceItHasAnswered
     EXPECT_EQ(wait(1), whole);
 }
 
+TEST_F(StationsTest, P1AProofIsAwaitedNoLongerThanItsStationHasEverNeeded) {
+    answer(1);
+    Group proof = test::group_of(1, kRead);
+    EXPECT_EQ(stations_.patience(now_, proof), stations_.response_timeout(1));
+    proof.distinct_length = true;
+    EXPECT_EQ(stations_.patience(now_, proof), stations_.of(1).usual());
+}
+
 TEST_F(StationsTest, P4UnheardStationsDoNotUseUpTheProbeBudgetOfOthers) {
     constexpr std::uint8_t kStranger = 200;
     answer(1);
