@@ -26,19 +26,27 @@ bool Ruling::allows(std::size_t rule) const {
 }
 
 Ruling::Decision Ruling::decide(Act act, std::uint8_t function, const modbus::Span& items) const {
-    const Pieces& pieces = pieces_of(act, function, items.table);
+    Index& index = index_of(act, function, items.table);
+    if (items.first >= index.first && items.end() <= index.end) return index.decision;
+    const Pieces& pieces = index.pieces;
     const auto behind = std::ranges::upper_bound(pieces, items.first, {}, &Piece::first);
     auto end = behind;  // the piece before it holds the first item
     while (end != pieces.end() && end->first < items.end()) ++end;
-    return decision_of({behind - 1, end});
+    const Decision decision = decision_of({behind - 1, end});
+    if (end == behind) {
+        index.first = (behind - 1)->first;
+        index.end = end == pieces.end() ? modbus::kTableItems : end->first;
+        index.decision = decision;
+    }
+    return decision;
 }
 
 Ruling::Decision Ruling::decide(Act act, std::uint8_t function) const {
-    return decision_of(pieces_of(act, function, std::nullopt));
+    return decision_of(index_of(act, function, std::nullopt).pieces);
 }
 
 bool Ruling::allows_some(Act act, std::uint8_t function, modbus::Table table) const {
-    return std::ranges::any_of(pieces_of(act, function, table), [&](const Piece& piece) {
+    return std::ranges::any_of(index_of(act, function, table).pieces, [&](const Piece& piece) {
         return piece.first < modbus::kTableItems && allows(piece.rule);
     });
 }
@@ -55,16 +63,17 @@ Ruling::Decision Ruling::decision_of(std::span<const Piece> pieces) const {
     return {allowed, rule < rules_.size() ? rules_[rule].rule : nullptr};
 }
 
-const Ruling::Pieces& Ruling::pieces_of(Act act, std::uint8_t function,
-                                        std::optional<modbus::Table> table) const {
+Ruling::Index& Ruling::index_of(Act act, std::uint8_t function,
+                                std::optional<modbus::Table> table) const {
     const std::uint32_t key = static_cast<std::uint32_t>(act) << 16U |
                               static_cast<std::uint32_t>(function) << 8U |
                               (table ? static_cast<std::uint32_t>(*table) : 0xFFU);
-    for (const auto& [known, pieces] : index_)
-        if (known == key) return pieces;
-    Pieces made = table ? make_pieces(act, function, *table)
+    for (Index& known : index_)
+        if (known.key == key) return known;
+    Index made{.key = key};
+    made.pieces = table ? make_pieces(act, function, *table)
                         : Pieces{{0, first_without_items(act, function)}};
-    return index_.emplace_back(key, std::move(made)).second;
+    return index_.emplace_back(std::move(made));
 }
 
 /// A rule about items says nothing of a function without items, unless it names it.

@@ -39,9 +39,17 @@ class Ruling {
         std::size_t rule = 0;
     };
     using Pieces = std::vector<Piece>;
+    /// What decides an act by a function. Most requests are about items of the piece before: what
+    /// is decided for them stands here, so that the pieces stay out of the caches.
+    struct Index {
+        std::uint32_t key = 0;    ///< act, function, table
+        std::uint32_t first = 1;  ///< of the piece that was asked for last; as yet none
+        std::uint32_t end = 0;
+        Decision decision{};
+        Pieces pieces{};
+    };
 
-    const Pieces& pieces_of(Act act, std::uint8_t function,
-                            std::optional<modbus::Table> table) const;
+    Index& index_of(Act act, std::uint8_t function, std::optional<modbus::Table> table) const;
     Pieces make_pieces(Act act, std::uint8_t function, modbus::Table table) const;
     std::size_t first_without_items(Act act, std::uint8_t function) const;
     bool allows(std::size_t rule) const;
@@ -49,7 +57,7 @@ class Ruling {
 
     std::vector<RuleAtStation> rules_;
     bool allow_by_default_;
-    mutable std::vector<std::pair<std::uint32_t, Pieces>> index_;  ///< by act, function, table
+    mutable std::vector<Index> index_;
 };
 
 }  // namespace panelgate::access

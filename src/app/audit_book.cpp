@@ -149,7 +149,10 @@ void tell_of_end(const audit::Trail::End& end, const std::string& file) {
 }  // namespace
 
 AuditBook::AuditBook(boost::asio::any_io_executor executor, rt::Clock& clock)
-    : executor_(std::move(executor)), clock_(clock), alarm_(clock.make_alarm()) {}
+    : executor_(std::move(executor)),
+      clock_(clock),
+      alarm_(clock.make_alarm()),
+      gathered_alarm_(clock.make_alarm()) {}
 
 AuditBook::~AuditBook() { close(); }
 
@@ -173,7 +176,9 @@ void AuditBook::apply(const std::optional<audit::Settings>& settings) {
     }
     on_failure_ = settings->on_failure;
     file_ = settings->file;
-    if (trail_) return trail_->apply(*settings);
+    audit::Settings rest = *settings;
+    rest.flush -= std::min<Duration>(rest.flush, kGatheredFor);  // which it may have waited here
+    if (trail_) return trail_->apply(rest);
     audit::Trail::Hooks hooks;
     hooks.wall = rt::wall_now;
     hooks.start = member("version", PANELGATE_VERSION) + member("commit", build_commit());
@@ -182,7 +187,7 @@ void AuditBook::apply(const std::optional<audit::Settings>& settings) {
             if (!life.expired()) tell(notice);
         });
     };
-    trail_ = std::make_unique<audit::Trail>(*settings, std::move(hooks));
+    trail_ = std::make_unique<audit::Trail>(rest, std::move(hooks));
 }
 
 void AuditBook::tell(const audit::Notice& notice) {
@@ -218,6 +223,7 @@ void AuditBook::close() {
 }
 
 void AuditBook::show(std::shared_ptr<const Snapshot> snapshot) {
+    record_gathered();  // by the names that they were made by
     std::map<std::string, std::map<std::uint8_t, Known>, std::less<>> next;
     for (const Station& station : snapshot->plant.stations()) {
         Known& known = next[station.line][station.id];
@@ -271,30 +277,47 @@ void AuditBook::write(const std::string& line, const bus::WriteEnd& end) {
     const bool is_vain = !end.transmitted && end.outcome != Outcome::ok;
     if (end.outcome == Outcome::refused) refused_ = end.who;
     if (is_vain && is_vain_repeat(line, end, known)) return;
-    add_write(line, end, known);
-    record();
-    if (!end.transmitted) return;
+    if (gathered_.empty())
+        gathered_alarm_->arm(clock_.now() + kGatheredFor, [this] { record_gathered(); });
+    Gathered& write = gathered_.emplace_back(rt::wall_now(), end, line, known);
+    if (known != nullptr && end.items) write.before = before(*known, *end.items);
+    if (end.transmitted) note_effect(line, end.station, known);
+    if (gathered_.size() >= kGathered) record_gathered();
+}
+
+/// What was polled before is no longer what the panel has.
+void AuditBook::note_effect(const std::string& line, std::uint8_t station, Known* known) {
     const TimePoint now = clock_.now();
     if (known != nullptr) known->written = now;
-    if (end.station != 0) return;
+    if (station != 0) return;
     for (auto& [id, each] : known_[line]) each.written = now;
 }
 
-void AuditBook::add_write(const std::string& line, const bus::WriteEnd& end, Known* known) {
-    Composer& record = begin(Kind::write);
+void AuditBook::record_gathered() {
+    for (const Gathered& write : gathered_) {
+        add_write(write);
+        record();
+    }
+    gathered_.clear();
+}
+
+void AuditBook::add_write(const Gathered& write) {
+    const bus::WriteEnd& end = write.end;
+    Composer& record = composer_.begin(write.at, Kind::write);
     add_who(end.who);
-    if (known != nullptr)
-        record.members(known->members);
+    if (write.known != nullptr)
+        record.members(write.known->members);
     else
-        record.text("line", line).number("id", end.station);
+        record.text("line", write.line).number("id", end.station);
     if (end.items) {
-        add_place(known, end.pdu[0], *end.items);
+        add_place(write.known, end.pdu[0], *end.items);
         add_values(end.pdu, *end.items);
-        if (known != nullptr) add_before(*known, *end.items);
     } else {
         if (!end.pdu.empty()) record.number("function", end.pdu[0]);
         record.hex("pdu", end.pdu);
     }
+    if (write.before)
+        record.numbers("before", write.before->items).number("before_age_ms", write.before->age_ms);
     add_outcome(record, end);
 }
 
@@ -322,22 +345,24 @@ void AuditBook::add_values(ByteView pdu, const modbus::Span& items) {
 }
 
 /// The value that was polled last, if no write of ours came between.
-void AuditBook::add_before(const Known& known, const modbus::Span& items) {
-    if (!known.station->points) return;
+std::optional<AuditBook::Before> AuditBook::before(const Known& known,
+                                                   const modbus::Span& items) const {
+    if (!known.station->points) return std::nullopt;
     const points::StationPoints& points = *known.station->points;
     const auto holds = [&](const points::Point& point) {
         return modbus::Span{point.table, point.address, point.count()}.contains(items);
     };
     const auto found = std::ranges::find_if(points.points(), holds);
-    if (found == points.points().end()) return;
+    if (found == points.points().end()) return std::nullopt;
     const std::vector<std::uint16_t>& polled = points.items(*found);
     const TimePoint now = clock_.now();
     const auto age = points.read(*found, now).age;
     const std::size_t from = items.first - found->address;
-    if (!age || polled.size() < from + items.count) return;
-    if (known.written && now - *age <= *known.written) return;
-    composer_.numbers("before", std::span(polled).subspan(from, items.count));
-    composer_.number("before_age_ms", static_cast<std::uint64_t>(to_milliseconds(*age)));
+    if (!age || polled.size() < from + items.count) return std::nullopt;
+    if (known.written && now - *age <= *known.written) return std::nullopt;
+    const auto begin = polled.begin() + static_cast<std::ptrdiff_t>(from);
+    return Before{{begin, begin + static_cast<std::ptrdiff_t>(items.count)},
+                  static_cast<std::uint64_t>(to_milliseconds(*age))};
 }
 
 bool AuditBook::is_vain_repeat(const std::string& line, const bus::WriteEnd& end, Known* known) {

@@ -41,6 +41,8 @@ class AuditBook {
     static constexpr std::size_t kClients = 1024;  ///< whose members are kept
     static constexpr std::size_t kChanges = 200;   ///< of a reload, told
     static constexpr unsigned kNotSent = 3;  ///< writes to one place that were not sent, in full
+    static constexpr std::size_t kGathered = 64;     ///< writes that are composed together
+    static constexpr Duration kGatheredFor = 200ms;  ///< and how long the first of them waits
 
     /// The clock outlives it.
     AuditBook(boost::asio::any_io_executor executor, rt::Clock& clock);
@@ -96,11 +98,32 @@ class AuditBook {
         std::string why{};
     };
 
-    Composer& begin(audit::Kind kind) { return composer_.begin(rt::wall_now(), kind); }
+    /// What was polled of a place before it was written.
+    struct Before {
+        std::vector<std::uint16_t> items;
+        std::uint64_t age_ms = 0;
+    };
+    /// A write that is composed with others: what runs once in a while runs with cold caches, and
+    /// costs many times what it costs with others.
+    struct Gathered {
+        WallTime at{};
+        bus::WriteEnd end;
+        std::string line;
+        Known* known = nullptr;
+        std::optional<Before> before{};
+    };
+
+    /// Records are in the order of what they tell.
+    Composer& begin(audit::Kind kind) {
+        record_gathered();
+        return composer_.begin(rt::wall_now(), kind);
+    }
+    void note_effect(const std::string& line, std::uint8_t station, Known* known);
+    void record_gathered();
     void add_who(const WhoRef& who);
-    void add_write(const std::string& line, const bus::WriteEnd& end, Known* known);
+    void add_write(const Gathered& write);
     void add_values(ByteView pdu, const modbus::Span& items);
-    void add_before(const Known& known, const modbus::Span& items);
+    std::optional<Before> before(const Known& known, const modbus::Span& items) const;
     /// True if it was counted. `more`: members that tell what is repeated, besides the client;
     /// `shares`: where the client repeats many things, it is counted with the others.
     bool is_repeat(const WhoRef& who, std::string_view what, unsigned in_full,
@@ -119,6 +142,7 @@ class AuditBook {
     boost::asio::any_io_executor executor_;
     rt::Clock& clock_;
     std::unique_ptr<rt::Alarm> alarm_;
+    std::unique_ptr<rt::Alarm> gathered_alarm_;
     std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
     audit::OnFailure on_failure_ = audit::OnFailure::keep_on;
     std::string file_;
@@ -141,6 +165,7 @@ class AuditBook {
     std::shared_ptr<const Snapshot> snapshot_;
     std::map<std::string, std::map<std::uint8_t, Known>, std::less<>> known_;
     std::unordered_map<WhoRef, std::string> clients_;  ///< what records tell of them
+    std::vector<Gathered> gathered_;
     std::vector<std::uint16_t> values_;
     WhoRef refused_;  ///< the client of the write that a bus has just refused
     std::string key_;

@@ -403,16 +403,17 @@ class Refusing(Case):
     def test_reload_tells_who_changed_what_and_goes_on_in_another_file(self):
         self.write_config(anonymous="admin")
         self.folder.mkdir()
-        with self.gateway() as program:
+        with self.gateway() as program, program.client() as client:
             program.http_port()
+            client.ask(STATION, write_register(4, 5))  # just before: it is told first
             text = self.file.read_text().replace("audit.jsonl", "other.jsonl")
             self.file.write_text(text.replace("access: read_only", "access: read_write"))
             status, body = program.rest("POST", "/api/v1/reload", {})
             self.assertEqual((status, body["outcome"]), (200, "applied"))
         first = records(self.folder)
-        self.assertEqual([one["kind"] for one in first], ["file", "start", "reload", "end"])
-        self.assertEqual(first[2]["cause"], "http 127.0.0.1")
-        self.assertTrue(any("read_only -> read_write" in one for one in first[2]["changes"]))
+        self.assertEqual([one["kind"] for one in first], ["file", "start", "write", "reload", "end"])
+        self.assertEqual(first[3]["cause"], "http 127.0.0.1")
+        self.assertTrue(any("read_only -> read_write" in one for one in first[3]["changes"]))
         other = self.folder / "other.jsonl"
         self.assertEqual(harness.run("audit", "verify", str(other)).returncode, 0)
         shown = harness.run("audit", "show", "-c", str(self.file), "--kind", "end")

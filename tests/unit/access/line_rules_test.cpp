@@ -69,6 +69,23 @@ TEST(LineRules, WhatAnOwnRoleLacksIsRefusedUnderItsName) {
     EXPECT_EQ(refused(settings, writer, 20, "17 0000 0001 0064 0001 02 0001"_hex), "blind");
 }
 
+/// Neighbours share what was decided for the one before only where the same rule decides.
+TEST(LineRules, WhatWasAskedBeforeChangesNothing) {
+    const auto settings = std::make_shared<const Settings>(contract());
+    const LineRules asked_often(settings, "floor1", {5, 20});
+    const auto may = [](const LineRules& rules, const Span& items) {
+        return rules.judge(kScada, 20, Act::write, 0x10, items).allowed;
+    };
+    for (std::uint32_t n = 0; n < 4000; ++n) {
+        const Span items{Table::holding_registers, 90 + n * 37 % 120, 1 + n % 5};
+        const LineRules asked_once(settings, "floor1", {5, 20});
+        EXPECT_EQ(may(asked_often, items), may(asked_once, items)) << items.first << " " << n % 5;
+        EXPECT_EQ(may(asked_often, items), items.first >= 100 && items.end() <= 200);
+    }
+    EXPECT_FALSE(may(asked_often, {Table::holding_registers, 0, 1}));
+    EXPECT_FALSE(may(asked_often, {Table::holding_registers, 65535, 1}));
+}
+
 TEST(LineRules, WithoutRulesEverybodyMayDoEverything) {
     EXPECT_EQ(refused({}, kScada, 20, "06 0064 0001"_hex), "");
     EXPECT_EQ(refused({}, nullptr, 0, "06 0064 0001"_hex, true), "");
