@@ -263,7 +263,7 @@ void Arbiter::hear_piece(TimePoint now, const modbus::AsciiTranscript::Piece& pi
     const bool good = piece.end == End::frame;
     if (active_ && !active_->is_broadcast())
         conclude(now, active_->on_frame_end(good, ends_attempt(now)));
-    if (unsolicited_.pending()) note(now, unsolicited_.take_delimited(quiet_.station(), good));
+    if (unsolicited_.pending()) note_idle(now, unsolicited_.take_delimited(quiet_.station(), good));
 }
 
 void Arbiter::on_end(TimePoint now, Duration left) {
@@ -323,7 +323,21 @@ void Arbiter::hear_idle(TimePoint now, ByteView bytes) {
 
 void Arbiter::judge_idle(TimePoint now) {
     if (ascii_) ascii_->cut();
-    note(now, unsolicited_.take(quiet_.station()));
+    note_idle(now, unsolicited_.take(quiet_.station()));
+}
+
+/// Our own frame may be among what came while nothing was asked.
+void Arbiter::note_idle(TimePoint now, const std::vector<modbus::Unused>& parts) {
+    for (const modbus::Unused& part : parts) {
+        if (unsolicited_.is_own_behind_reply(std::min(now, quiet_.since()), part.bytes))
+            hear_again(now, part.station, modbus::pdu_of(part.bytes));
+    }
+    note(now, parts);
+}
+
+/// This request came back once more than the line's echo explains.
+void Arbiter::hear_again(TimePoint now, std::uint8_t station, ByteView pdu) {
+    if (echo_memory_.on_again(now, pdu)) outbox_.on_echoed_again(station);
 }
 
 void Arbiter::note(TimePoint now, const std::vector<modbus::Unused>& parts) {

@@ -110,7 +110,8 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
         return Verdict::open;
     }
     drop_what_ended(now, rest.size());
-    if (!heard_ || std::exchange(begins_anew_, false)) first_byte_ = now;
+    const bool anew = std::exchange(begins_anew_, false);
+    if (!heard_ || anew) first_byte_ = now;
     // The bytes buffered as an echo were the beginning, where only we delay the rest.
     if (!heard_ && timing_.steady && echo_since_ && !echo_.complete())
         first_byte_ = std::min(now, std::max(*echo_since_, timing_.sent));
@@ -137,7 +138,9 @@ void Attempt::drop_what_ended(TimePoint now, std::size_t size) {
     if (has_delimiters()) return;
     const TimePoint first = now - wire_time(timing_.serial, size);
     const bool over = first >= last_byte_ + 3 * character_time(timing_.serial) / 2;
-    if (heard_ && over && framer_.has_pending() && !framer_.has_candidate()) framer_.drop_pending();
+    if (!heard_ || !over || !framer_.has_pending() || framer_.has_candidate()) return;
+    framer_.drop_pending();
+    collect();
 }
 
 Verdict Attempt::feed(ByteView bytes, const Ends& ends) {
@@ -218,8 +221,8 @@ std::size_t Attempt::collect() {
     std::vector<Unused> parts = framer_.take_unused();
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const bool foreign = begins_with_request(parts[i].bytes, echo_.frame(), orders_);
-        if (std::ranges::equal(parts[i].bytes, echo_.frame())) on_echo_behind();
         const bool in_front = i + behind < parts.size();
+        if (std::ranges::equal(parts[i].bytes, echo_.frame())) on_own_frame(in_front);
         const bool damaged = parts[i].kind == Unused::Kind::damaged;
         frames_in_front_ = frames_in_front_ || (in_front && (!damaged || foreign));
         if (damaged && !foreign) {
@@ -234,9 +237,11 @@ std::size_t Attempt::collect() {
     return std::min(behind, parts.size());
 }
 
-/// The candidate came before our own request.
-void Attempt::on_echo_behind() {
+/// Our own request came, which the filter did not take out: a candidate came before it.
+void Attempt::on_own_frame(bool in_front) {
     own_.came_back = true;
+    own_.again = own_.again || echo_.complete() || !in_front;
+    begins_anew_ = true;  // the reply, behind it
     if (!timing_.echoes) return;
     own_.behind = true;
     if (candidate_) add_unsolicited(*std::exchange(candidate_, std::nullopt));

@@ -13,9 +13,9 @@ namespace panelgate::arbiter {
 namespace {
 
 /// True if its normal reply can never equal it.
-bool differs_from_reply(const modbus::Request& request) {
-    const auto reply = request.reply_length();
-    return reply && *reply != request.pdu().size() + modbus::kAduOverhead;
+bool differs_from_reply(ByteView pdu) {
+    const auto reply = modbus::reply_length_from_request(pdu);
+    return reply && *reply != pdu.size() + modbus::kAduOverhead;
 }
 
 constexpr std::size_t kSingleWrite = 5;  // bytes: function, address, value
@@ -27,11 +27,11 @@ std::uint16_t word_at(ByteView bytes, std::size_t at) {
 }  // namespace
 
 bool teaches_echo(const modbus::Request& request) {
-    return request.is_read() && differs_from_reply(request);
+    return request.is_read() && differs_from_reply(request.pdu());
 }
 
 bool teaches_echo_of_writes(const modbus::Request& request) {
-    return !request.is_read() && differs_from_reply(request);
+    return !request.is_read() && differs_from_reply(request.pdu());
 }
 
 std::optional<modbus::Request> read_back(ByteView write) {
@@ -116,9 +116,10 @@ void EchoMemory::forget() {
     missed_ = echoes_ = 0;
     had_none_ = mode_ == EchoMode::off;
     writes_echo_.reset();
+    again_at_.reset();
     only_ = habit_ = 0;
     several_ = false;
-    missed_by_others_ = 0;
+    missed_by_it_ = missed_by_others_ = 0;
     begin();
 }
 
@@ -152,17 +153,23 @@ bool EchoMemory::must_be_learned_before(const modbus::Request& request, bool tri
 
 /// A request to this station came back.
 void EchoMemory::on_heard_of(std::uint8_t station) {
+    if (station == only_) missed_by_it_ = 0;
     if (several_ || station == 0 || station == only_) return;
     several_ = only_ != 0;
     only_ = several_ ? std::uint8_t{0} : station;
     habit_ = 0;
-    missed_by_others_ = 0;
+    missed_by_it_ = missed_by_others_ = 0;
 }
 
 /// A reply of this station came without.
 void EchoMemory::on_missed_by(std::uint8_t station) {
-    if (only_ == 0 || station == only_ || mode_ == EchoMode::on) return;
-    if (++missed_by_others_ < kNoMore) return;
+    if (only_ == 0 || mode_ == EchoMode::on) return;
+    int& missed = station == only_ ? missed_by_it_ : missed_by_others_;
+    if (++missed < kNoMore) return;
+    if (station == only_) {
+        only_ = habit_ = 0;
+        return;
+    }
     habit_ = only_;
     state_ = EchoState::absent;
     heard_ = false;
@@ -172,7 +179,7 @@ void EchoMemory::on_missed_by(std::uint8_t station) {
 bool EchoMemory::on_echo(const modbus::Request& request, bool expected, std::uint8_t station) {
     if (!teaches_echo(request)) return false;
     on_heard_of(station);
-    if (habit_ != 0 && !expected) return false;
+    if (habit_ != 0 && (!expected || repeats(station))) return false;
     if (had_none_ && !expected && state_ != EchoState::present && ++echoes_ < kNow) {
         state_ = EchoState::unknown;
         return false;
@@ -197,6 +204,12 @@ void EchoMemory::on_reply_without_echo(const modbus::Request& request, bool frag
     }
     if (fragment || heard_) state_ = EchoState::unclear;
     if (!fragment && (!heard_ || missed_ >= kNoMore)) state_ = EchoState::absent;
+}
+
+bool EchoMemory::on_again(TimePoint now, ByteView pdu) {
+    if (!differs_from_reply(pdu)) return false;
+    again_at_ = now;
+    return true;
 }
 
 void EchoMemory::on_unclear() {

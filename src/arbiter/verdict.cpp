@@ -84,8 +84,7 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
         ReplyHabits::is_impossible(attempt, claims, is_early && attempt.replied_too_early());
     const bool overdue = claims.passed && first_sign > station.usual(stations_.slowest());
     const bool too_quick = is_early || station.is_far_too_quick(first_sign, stations_.times());
-    const bool like_echo =
-        first && attempt.may_be_its_echo(too_quick, echo_memory_.echoes_writes());
+    const bool like_echo = first && attempt.may_be_its_echo(now, too_quick, echo_memory_);
     const bool like_broadcast = first && !refusal && group.doubted.empty() &&
                                 !group.request.is_read() &&
                                 habits.may_answer_broadcast(book.behind_broadcast(now, reply));
@@ -150,14 +149,14 @@ void Arbiter::settle(TimePoint now) {
     if (settings_.may_stall) stations_.on_proved(now, proved);
     if (!settings_.paced && pace_.unbound() && now < attempt.timing().sent)
         quiet_.on_answered_early(now);
-    unsolicited_.on_replied(group.station);
+    unsolicited_.on_replied(now, group.station);
     quiet_.rest_until(station.trail_until());
     outbox_.on_answered(now, attempt, think, replied);
     attempt.teach(echo_memory_);
-    if (attempt.may_be_echo()) echo_memory_.on_suspected();
+    if (attempt.may_be_echo()) echo_memory_.on_suspected(now, group.station);
     const bool refused = modbus::exception_of(reply).has_value();
     outbox_.report(attempt, refused ? TransactionEnd::exception : TransactionEnd::ok);
-    if (!group.confirms.empty()) return confirm(group, reply, attempt.echoed());
+    if (!group.confirms.empty()) return confirm(now, group, reply, attempt.echoed());
     if (refused) {
         give_back(group);
     } else if (group.span && station.settings().max_age > Duration::zero()) {
@@ -170,10 +169,13 @@ void Arbiter::settle(TimePoint now) {
 /// P8: a reply came that may have been the write's echo, or an answer to a broadcast, and a read
 /// has now shown what the station holds. Where that is not what was written, or cannot be read,
 /// only a line on which writes do not come back leaves no doubt: an adapter need not echo reads.
-void Arbiter::confirm(const Group& group, ByteView reply, bool echoed) {
+void Arbiter::confirm(TimePoint now, const Group& group, ByteView reply, bool echoed) {
     const auto broadcast = stations_.book().behind_broadcast(group.doubted_at, group.confirms);
     const bool holds = holds_written(group.written, reply);
-    const bool is_answer = !echoed && (holds || (echo_memory_.echoes_no_writes() && !broadcast));
+    const bool is_answer =
+        echo_memory_.comes_again(now, group.station)
+            ? holds
+            : !echoed && (holds || (echo_memory_.echoes_no_writes() && !broadcast));
     ReplyHabits& habits = stations_.of(group.station).replies();
     if (broadcast && holds) habits.on_broadcast_unanswered();
     if (broadcast && !holds && !modbus::exception_of(reply))
@@ -324,7 +326,8 @@ Attempt Arbiter::take_active(TimePoint now) {
     if (attempt.echoed() &&
         echo_memory_.on_echo(group.request, !group.confirms.empty(), group.station))
         outbox_.event(Kind::echo, attempt.group().station);
-    if (attempt.heard_itself()) echo_memory_.on_write_echo(group.request);
+    if (attempt.heard_itself()) echo_memory_.on_write_echo(group.request, group.station);
+    if (attempt.heard_itself_again()) hear_again(now, group.station, group.request.pdu());
     // Where a reply may come before the request has left, early bytes prove nothing.
     const bool keeps_pace = settings_.paced || pace_.believed();
     if (const auto noise = attempt.early_noise(); noise && keeps_pace)

@@ -22,7 +22,7 @@ constexpr std::array kCounts = {
     &Symptoms::late,          &Symptoms::unasked,          &Symptoms::echoes,
     &Symptoms::wrong,         &Symptoms::requests,         &Symptoms::crc_swapped,
     &Symptoms::trailed,       &Symptoms::wrong_exceptions, &Symptoms::broadcast_replies,
-    &Symptoms::lower_case,
+    &Symptoms::lower_case,    &Symptoms::echoed_again,
 };
 constexpr std::size_t kOthers = 2;  // mute_in_a_row, worst_lateness
 static_assert(sizeof(Symptoms) ==

@@ -19,6 +19,14 @@ void find_echo(Case& c) {
             std::to_string(c.all.echoes) + " requests came back as they were sent",
             {{"echoes", c.all.echoes}});
     }
+    if (c.all.echoed_again >= bar.enough(3)) {
+        c.add(
+            Cause::echo, {}, "Requests come back more than once, or behind the reply.",
+            "Look for a second converter or a repeater that returns what is sent, and switch that "
+            "off: until then writes are read back before they count as done.",
+            std::to_string(c.all.echoed_again) + " requests came back once more",
+            {{"echoed_again", c.all.echoed_again}});
+    }
     if (c.facts.echo == EchoMode::on && c.all.echoes == 0 &&
         c.all.collided + c.all.silent >= bar.enough(5) && c.all.collided >= bar.enough(3)) {
         c.add(Cause::echo, {}, "No request comes back, although `echo: on` says so.",

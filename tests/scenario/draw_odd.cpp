@@ -79,6 +79,12 @@ constexpr Row kRows[] = {
          all.settings.echo = EchoMode::automatic;
          p.deaf_to_writes = 0.3;
      }},
+    {Oddity::echoed_twice, "echoed_twice",
+     [](Plan& all, PanelPlan& p) {
+         all.line.echo = all.line.echo_twice = true;
+         all.settings.echo = EchoMode::automatic;
+         p.deaf_to_writes = 0.3;
+     }},
     {Oddity::broadcasts_late, "broadcasts_late",
      [](Plan& all, PanelPlan& p) {
          p.answers_broadcasts = true;
@@ -116,7 +122,7 @@ Plan without_oddity(Plan plan) {
     plain.think = plan.panels.back().think;
     plan.panels.back() = plain;
     plan.line.babble = {};
-    plan.line.echo_writes = false;
+    plan.line.echo = plan.line.echo_writes = plan.line.echo_twice = false;
     return plan;
 }
 

@@ -97,6 +97,7 @@ struct LinePlan {
     double own_rate = 1;  ///< our characters take this much longer than computed
     bool echo = false;
     bool echo_writes = false;  ///< of writes alone
+    bool echo_twice = false;   ///< the whole echo comes once more
     double damaged_echo = 0;   ///< by request
     double cut_echo = 0;       ///< the echo lacks its last byte
     double partial_echo = 0;   ///< the first 1 to 7 bytes come back
@@ -160,6 +161,7 @@ enum class Oddity : std::uint8_t {
     unasked,        ///< a frame too many, and its answers may be one behind
     repeats_last,   ///< the same with a reply once more
     writes_echoed,  ///< and it is deaf to some
+    echoed_twice,   ///< the same of an echo of all requests
     broadcasts_late,
     repeats_requests,
     overtakes,
@@ -187,6 +189,7 @@ inline constexpr Oddity kOddities[] = {Oddity::wrong_function,
                                        Oddity::unasked,
                                        Oddity::repeats_last,
                                        Oddity::writes_echoed,
+                                       Oddity::echoed_twice,
                                        Oddity::broadcasts_late,
                                        Oddity::repeats_requests,
                                        Oddity::overtakes,

@@ -83,7 +83,13 @@ void Wire::echo(const FramePtr& frame) {
     if (line.echo || (line.echo_writes && frame->bytes[1] > 4)) {
         const bool damaged = random_.chance(line.damaged_echo);
         const bool cut = random_.chance(line.cut_echo);
-        if (!damaged && !cut) return deliver_in_chunks(frame);
+        if (!damaged && !cut) {
+            deliver_in_chunks(frame);
+            const std::size_t size = frame->bytes.size();
+            if (line.echo_twice)
+                agenda_.at(frame->end, [this, frame, size] { deliver(frame, 0, size); });
+            return;
+        }
         const auto heard = std::make_shared<Frame>(*frame);
         const auto size = static_cast<unsigned>(heard->bytes.size());
         if (damaged) heard->bytes[random_.below(size)] ^= 0x10;

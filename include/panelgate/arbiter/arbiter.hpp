@@ -153,7 +153,7 @@ class Arbiter {
     bool takes_reply(TimePoint now, const Station& station, bool early);
     void settle(TimePoint now);
     void ask_again(TimePoint now);
-    void confirm(const Group& group, ByteView reply, bool echoed);
+    void confirm(TimePoint now, const Group& group, ByteView reply, bool echoed);
     static Group confirming(Group& write, const Station& station);
     void learn_from_failure(TimePoint now, const Attempt& attempt, Verdict verdict);
     void fail(TimePoint now, Verdict verdict);
@@ -170,6 +170,8 @@ class Arbiter {
     void hear_idle(TimePoint now, ByteView bytes);
     void judge_idle(TimePoint now);
     void note(TimePoint now, const std::vector<modbus::Unused>& parts);
+    void note_idle(TimePoint now, const std::vector<modbus::Unused>& parts);
+    void hear_again(TimePoint now, std::uint8_t station, ByteView pdu);
 
     Settings settings_;
     modbus::CrcOrders orders_;

@@ -240,11 +240,13 @@ class Attempt {
         return timing_.echoes && !echo_.complete() && (echo_.mismatch() || own_.fragment);
     }
     /// True if the reply to a write may be the echo of its request, which it equals: none has come
-    /// in front of it, and it came too quickly, or writes come back on this line.
-    bool may_be_its_echo(bool too_quick, bool writes_come_back) const {
+    /// in front of it, and it came too quickly, or writes come back on this line; or they come back
+    /// once more.
+    bool may_be_its_echo(TimePoint now, bool too_quick, const EchoMemory& line) const {
         const bool behind_echo = echo_.complete() || own_.seen;
-        return !group_.request.is_read() && echo_.is_own(*reply_) && !behind_echo &&
-               (too_quick || writes_come_back);
+        return !group_.request.is_read() && echo_.is_own(*reply_) &&
+               (line.comes_again(now, group_.station) ||
+                (!behind_echo && (too_quick || line.echoes_writes())));
     }
     /// Rejects a reply that also answers another master's request; the station was not silent.
     void reject_contested() {
@@ -271,6 +273,8 @@ class Attempt {
     bool echoed() const { return echo_.complete() && !own_.borrowed; }
     /// True if our own frame came back, wherever the filter did not take it out.
     bool heard_itself() const { return own_.came_back; }
+    /// True if it did so once more, behind the echo or the reply.
+    bool heard_itself_again() const { return own_.again; }
     /// Updates what is known of the line's echo from this reply.
     void teach(EchoMemory& memory) const;
     /// True if its own reply came damaged, but with the header intact, or without its beginning.
@@ -331,7 +335,7 @@ class Attempt {
     void judge_unsolicited(std::size_t from, const Ends& ends);
     /// Returns how many of the parts follow the reply.
     std::size_t collect();
-    void on_echo_behind();
+    void on_own_frame(bool in_front);
     bool is_stale(TimePoint now, std::size_t size) const;
     /// True if other bytes were heard: the reply may be lost, so wait only the usual time.
     bool in_doubt() const { return framer_.was_damaged() || echo_.mismatch() || disturbed_; }

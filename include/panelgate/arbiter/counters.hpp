@@ -36,6 +36,7 @@ struct Symptoms {
     std::uint64_t unasked = 0;  ///< unsolicited good frames
     std::uint64_t broadcast_replies = 0;  ///< good frames that answer a broadcast, which is wrong
     std::uint64_t echoes = 0;             ///< requests that came back as sent
+    std::uint64_t echoed_again = 0;       ///< ... once more, behind their echo or their reply
     std::uint64_t requests = 0;           ///< good requests of another master
     std::uint64_t crc_swapped = 0;        ///< replies with swapped CRC bytes, otherwise right
     std::uint64_t lower_case = 0;         ///< damaged frames of ASCII in lower-case digits

@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <optional>
 
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/base/words.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
@@ -73,6 +75,7 @@ struct OwnFrame {
     bool behind = false;     ///< after another frame
     bool came_back = false;  ///< as a frame that is no answer
     bool borrowed = false;   ///< its last byte was lost, and the reply's first taken for it
+    bool again = false;      ///< once more, behind its echo or the reply
 };
 
 /// True if the reply to this request can never equal the request: it shows whether there is an
@@ -123,26 +126,38 @@ class EchoMemory {
     void on_reply_without_echo(const modbus::Request& request, bool fragment,
                                std::uint8_t station = 0);
     /// A write came back that its reply cannot equal, whatever the reads show.
-    void on_write_echo(const modbus::Request& request) {
-        if (teaches_echo_of_writes(request)) writes_echo_ = true;
+    void on_write_echo(const modbus::Request& request, std::uint8_t station) {
+        if (teaches_echo_of_writes(request) && !repeats(station)) writes_echo_ = true;
     }
     /// True if the last such write came back: an adapter may echo long frames only, or writes.
     bool echoes_writes() const { return writes_echo_ == true; }
     /// True if the last such write was answered without it.
     bool echoes_no_writes() const { return writes_echo_ == false; }
+    /// A request came back once more, behind its echo or its reply, which cannot equal it: two
+    /// converters in a row, or one that returns what it sends when the panel has answered. `pdu`:
+    /// of the request. Returns true if that tells.
+    bool on_again(TimePoint now, ByteView pdu);
+    /// True if one has lately, or this station repeats its requests: what equals a write may be its
+    /// echo, whatever came before it.
+    bool comes_again(TimePoint now, std::uint8_t station) const {
+        return repeats(station) || (again_at_ && now <= *again_at_ + timing::kForgetHabit);
+    }
     /// The read that was to detect the echo was inconclusive.
     void on_unclear();
     /// Its echo was heard, but no answer: where both are equal, it may have been the answer, and
     /// the line has no echo any more.
     void on_unanswered(const modbus::Request& request);
     /// A reply may have been an echo where none was known: learn again, unless configured.
-    void on_suspected() {
-        if (mode_ == EchoMode::automatic && state_ == EchoState::absent) begin();
+    void on_suspected(TimePoint now, std::uint8_t station) {
+        const bool is_known = mode_ != EchoMode::automatic || comes_again(now, station);
+        if (!is_known && state_ == EchoState::absent) begin();
     }
     /// The echo differed: learn again, unless configured.
     void on_mismatch();
 
   private:
+    /// True if this station repeats its requests, on a line without an echo.
+    bool repeats(std::uint8_t station) const { return habit_ != 0 && station == habit_; }
     void begin();
     void on_heard_of(std::uint8_t station);
     void on_missed_by(std::uint8_t station);
@@ -164,9 +179,11 @@ class EchoMemory {
     // a habit.
     std::uint8_t only_ = 0;     ///< the only station whose requests came back; 0: none or several
     bool several_ = false;      ///< those of several did
+    int missed_by_it_ = 0;      ///< replies in a row
     int missed_by_others_ = 0;  ///< replies, since it is only_
     std::uint8_t habit_ = 0;    ///< this station repeats requests, the line has no echo
     std::optional<bool> writes_echo_;  ///< empty: no write has shown it since the device was opened
+    std::optional<TimePoint> again_at_;  ///< when a request came back once more
 };
 
 }  // namespace panelgate::arbiter

@@ -61,6 +61,7 @@ class Outbox {
     void on_failed(const Attempt& attempt, Verdict verdict);
     /// Emits an event at most every 10 seconds: each would be a log line.
     void on_echo_mismatch(TimePoint now, std::uint8_t station);
+    void on_echoed_again(std::uint8_t station) { ++symptoms_of(station).echoed_again; }
 
     /// Traces and counts a frame, or damaged bytes, that answers no open request; `asked`: the
     /// station asked last. Damage inside an attempt is counted there.

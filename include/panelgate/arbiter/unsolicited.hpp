@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -8,8 +9,10 @@
 #include "panelgate/arbiter/outbox.hpp"
 #include "panelgate/arbiter/quiet.hpp"
 #include "panelgate/arbiter/stations.hpp"
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/modbus/rtu_framer.hpp"
 
@@ -28,7 +31,15 @@ class UnsolicitedFrames {
         replied_before_ = std::exchange(replied_, std::uint8_t{0});
     }
     /// Bytes after this answer are its station's trail.
-    void on_replied(std::uint8_t station) { replied_ = station; }
+    void on_replied(TimePoint now, std::uint8_t station) {
+        replied_ = station;
+        replied_at_ = now;
+    }
+    /// True if this is the frame sent last, heard right behind its reply.
+    bool is_own_behind_reply(TimePoint heard_at, ByteView adu) const {
+        return replied_ != 0 && heard_at <= replied_at_ + timing::kLongestTrail &&
+               std::ranges::equal(adu, last_frame_);
+    }
     /// The station that answered the frame before the one on the wire; 0: none.
     std::uint8_t replied_before() const { return replied_before_; }
     void forget() { idle_.clear(); }
@@ -66,6 +77,7 @@ class UnsolicitedFrames {
     Bytes last_frame_;
     std::uint8_t replied_ = 0;  ///< to the last frame; 0: none, or not yet
     std::uint8_t replied_before_ = 0;
+    TimePoint replied_at_{};
 };
 
 }  // namespace panelgate::arbiter

@@ -13,11 +13,13 @@ function who({cause, name}) {
 
 /** The keys of its sentences, the best first: the same cause may ask for another advice. */
 function adviceKeys({cause, figures}) {
+    if ('echoed_again' in figures) return ['echo.again'];
     if (cause !== 'timeout-too-short' || !('deadline_ms' in figures)) return [cause];
     return [`${cause}.${'advised_ms' in figures ? 'deadline' : 'slow'}`];
 }
 
 function evidenceKeys({cause, figures}) {
+    if ('echoed_again' in figures) return ['echo.again'];
     return [cause === 'echo' && 'collided' in figures ? 'echo.none' : cause, 'damaged' in figures ? 'damage' : cause];
 }
 
@@ -30,7 +32,8 @@ function sentence(kind, keys, finding, own) {
 }
 
 /** What is wrong: {lang, text}. */
-export const findingText = (finding) => sentence('finding', [finding.cause], finding, finding.text);
+export const findingText = (finding) => sentence('finding',
+    ['echoed_again' in (finding.figures ?? {}) ? 'echo.again' : finding.cause], finding, finding.text);
 
 /** What is wrong, what to do, and why that is thought. */
 export function findingNote(finding) {

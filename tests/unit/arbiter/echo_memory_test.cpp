@@ -103,6 +103,18 @@ TEST_F(EchoMemoryTest, P8AFewRepliesWithoutAnEchoDoNotShowThatAKnownEchoIsGone) 
     EXPECT_FALSE(memory.expects_one()) << "another device";
 }
 
+TEST_F(EchoMemoryTest, P8ARequestThatComesBackOnceMoreIsRememberedForTenMinutes) {
+    const TimePoint now{1h};
+    EXPECT_FALSE(memory.on_again(now, kWrite)) << "it may have been the answer";
+    EXPECT_FALSE(memory.comes_again(now, 17));
+    EXPECT_TRUE(memory.on_again(now, kRead));
+    EXPECT_TRUE(memory.comes_again(now + 10min, 17));
+    EXPECT_FALSE(memory.comes_again(now + 11min, 17));
+    EXPECT_TRUE(memory.on_again(now, "10 00 01 00 01 02 00 03"_hex));
+    memory.forget();
+    EXPECT_FALSE(memory.comes_again(now, 17)) << "another device";
+}
+
 TEST_F(EchoMemoryTest, P5APanelThatRepeatsRequestsMakesNoEchoWhereTheOthersShowNone) {
     EXPECT_TRUE(memory.on_echo(request_of(kRead), false, 17));
     for (int i = 0; i < kNoMore; ++i) {
@@ -112,9 +124,25 @@ TEST_F(EchoMemoryTest, P5APanelThatRepeatsRequestsMakesNoEchoWhereTheOthersShowN
     }
     EXPECT_FALSE(memory.expects_one());
     for (int i = 0; i < 5; ++i) EXPECT_FALSE(memory.on_echo(request_of(kRead), false, 17));
+    EXPECT_FALSE(memory.on_echo(request_of(kRead), true, 17)) << "a write's was its habit, too";
     EXPECT_EQ(memory.state(), EchoState::absent);
+    EXPECT_TRUE(memory.comes_again(TimePoint{}, 17)) << "what equals a write may be that";
+    EXPECT_FALSE(memory.comes_again(TimePoint{}, 18));
     for (int i = 0; i < 2; ++i) EXPECT_FALSE(memory.on_echo(request_of(kRead), false, 18));
     EXPECT_TRUE(memory.on_echo(request_of(kRead), false, 17)) << "those of all come back";
+}
+
+TEST_F(EchoMemoryTest, P8APanelThatRepeatsRequestsNoMoreIsForgotten) {
+    EXPECT_TRUE(memory.on_echo(request_of(kRead), false, 17));
+    const auto reply_of = [&](std::uint8_t station) {
+        for (int i = 0; i < kNoMore; ++i)
+            memory.on_reply_without_echo(request_of(kRead), false, station);
+    };
+    memory.on_mismatch();
+    reply_of(18);
+    EXPECT_TRUE(memory.comes_again(TimePoint{}, 17));
+    reply_of(17);
+    EXPECT_FALSE(memory.comes_again(TimePoint{}, 17));
 }
 
 }  // namespace

@@ -298,6 +298,69 @@ TEST_F(Echo, P8TheEchoOfAnUnansweredRequestIsNoSignOfLife) {
     EXPECT_TRUE(bus.arbiter().health(17).offline());
 }
 
+/// Two converters in a row: each request comes back twice. A read has shown it.
+class EchoTwice : public LearnedEcho {
+  protected:
+    EchoTwice() {
+        for (unsigned i = 0; i < RecentTimes::kEnough; ++i) read_once(bus, true);
+        const Ticket read = bus.submit(17, kRead);
+        hear_twice(kReply);
+        EXPECT_EQ(bus.answer(read).pdu.value(), kReply);
+        bus.run_for(10ms);
+        write = bus.submit(17, kWrite);
+        hear_echo(bus);
+        bus.hear(bus.sent.back().adu);
+        EXPECT_FALSE(bus.answered(write));
+    }
+    void hear_twice(ByteView reply) {
+        hear_echo(bus);
+        bus.hear(bus.sent.back().adu);
+        bus.run_for(3ms);
+        bus.hear_paced(encode_adu(17, reply));
+    }
+    /// A read of what was written finds this.
+    void find(ByteView pdu) {
+        ASSERT_EQ(bus.next_sent(600ms).value().adu, encode_adu(17, "03 00 01 00 01"_hex));
+        hear_twice(pdu);
+    }
+    Ticket write = 0;
+};
+
+TEST_F(EchoTwice, P8ConfirmsNoWrite) {
+    find("03 02 00 04"_hex);
+    EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
+}
+
+TEST_F(EchoTwice, P8ConfirmsAWriteWhoseValueIsThere) {
+    find("03 02 00 03"_hex);
+    EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
+}
+
+TEST_F(EchoTwice, P8TheReplyBehindItConfirmsTheWrite) {
+    reply(bus, kWrite);
+    EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
+    EXPECT_EQ(bus.sent.back().adu, encode_adu(17, kWrite)) << "no read is needed";
+    EXPECT_EQ(bus.arbiter().station_counters().at(17).symptoms.echoed_again, 1u);
+}
+
+/// A converter that returns what was sent when the panel has answered, or would have.
+TEST_F(LearnedEcho, P8AnEchoBehindTheReplyOfAReadConfirmsNoWrite) {
+    for (unsigned i = 0; i < RecentTimes::kEnough; ++i) read_once(bus, false);
+    bus.submit(17, kRead);
+    answer(bus, 17, kReply, 3ms);
+    bus.hear(bus.sent.back().adu);
+    bus.run_for(10ms);
+    for (const bool done : {true, false}) {
+        const Ticket write = bus.submit(17, kWrite);
+        answer(bus, 17, kWrite, 3ms);
+        if (done) bus.hear(bus.sent.back().adu);
+        EXPECT_EQ(bus.answered(write), done);
+        bus.run_for(100ms);
+        if (!done) answer(bus, 17, "03 02 00 04"_hex, 3ms);
+        if (!done) EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
+    }
+}
+
 /// An adapter, or a receiver that is stuck, begins to echo while the device stays open: a line
 /// without an echo, whose station has answered; then a write, and its very frame comes back as it
 /// leaves.

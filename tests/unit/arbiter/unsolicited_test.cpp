@@ -147,7 +147,7 @@ TEST_F(UnsolicitedFramesTest, GathersNoMoreThanAnyFrameHas) {
 
 TEST_F(UnsolicitedFramesTest, TheTrailBelongsToTheStationThatAnsweredLast) {
     EXPECT_EQ(unsolicited.replied_before(), 0);
-    unsolicited.on_replied(17);
+    unsolicited.on_replied(now, 17);
     EXPECT_EQ(unsolicited.replied_before(), 0) << "it answered what is on the wire";
     unsolicited.on_sent(encode_adu(18, kRead));
     EXPECT_EQ(unsolicited.replied_before(), 17);
