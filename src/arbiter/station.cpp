@@ -59,6 +59,8 @@ Station::Replied Station::on_reply(OutstandingRequests& book, TimePoint now, con
     if (group.shows_pace()) {
         times_before_ = times_;
         times_.add(waited);
+        if (!group.request.is_read())
+            slowest_write_ = std::max(waited, slowest_write_.value_or(waited));
     }
     turnaround_.add(think);
     result.drift = turnaround_.take_report(settings_.response_timeout);
@@ -132,8 +134,8 @@ Duration Station::response_timeout() const {
     return std::min(whole, wanted * (1 << std::countr_one(lately_)));
 }
 
-Duration Station::usual(std::optional<Duration> line) const {
-    const std::optional<Duration> own = slowest();
+Duration Station::usual(std::optional<Duration> line, bool is_write) const {
+    const std::optional<Duration> own = is_write ? std::max(slowest(), slowest_write_) : slowest();
     const Duration whole = settings_.response_timeout;
     if (!own && !line) return whole;
     return std::min(whole, std::max(timing::kShortestWait,
@@ -172,9 +174,8 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
     }
     if (health_.offline() || missed_last() || speculative() || flaky_beside_others)
         return usual(line);
-    // Not a write: it may need longer, and its outcome is worth waiting for.
-    if (urgent && slowest() && group.request.is_read())
-        return std::min(response_timeout(), usual(line));
+    if (urgent && slowest())
+        return std::min(response_timeout(), usual(line, !group.request.is_read()));
     // A write that is not repeated waits for the configured time: the panel may have become slower,
     // and only the reply shows whether it was executed.
     const bool repeatable = group.request.is_read() || settings_.retry_writes;

@@ -53,8 +53,10 @@ Duration Stations::gap(std::uint8_t id) const {
 
 Duration Stations::patience(TimePoint now, const Group& group) {
     const Station& station = of(group.station);
-    const bool is_over_budget = station.over_budget(now) && others_active(now, station);
-    const bool urgent = (now < urgent_until_ && station.is_slowest_known()) || is_over_budget;
+    const bool over = station.over_budget(now, group.request) && others_active(now, station);
+    // Not a write: it may need longer, and its outcome is worth waiting for.
+    const bool urgent =
+        (now < urgent_until_ && station.is_slowest_known() && group.request.is_read()) || over;
     Duration wait = station.patience(group, slowest(), urgent, flaky_beside_others(now, station));
     const Duration whole = settings(group.station).response_timeout;
     for (const Job& job : group.jobs) wait = std::max(wait, std::min(job.patience, whole));
@@ -63,9 +65,11 @@ Duration Stations::patience(TimePoint now, const Group& group) {
 
 TimePoint Stations::others_active_until(const Station& station) const {
     TimePoint until{};
+    const TimePoint failed =
+        station.health().last_heard() > station.failed() ? TimePoint{} : station.failed();
     for (const auto& [id, other] : stations_) {
         const auto answered = other.health().last_heard();
-        if (&other != &station && answered && *answered > station.failed())
+        if (&other != &station && answered && *answered > failed)
             until = std::max(until, *answered + timing::kOthersActive);
     }
     return until;

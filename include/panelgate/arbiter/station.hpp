@@ -165,8 +165,12 @@ class Station {
         return now >= affordable_at() &&
                (!was_ignored || writes_.allows(now, kCredit * timeout_cost()));
     }
-    /// ... true while its share is exceeded, credit aside.
-    bool over_budget(TimePoint now) const { return !budget_.allows(now); }
+    /// ... true while its share is exceeded: credit aside; of a write, whose need must be known,
+    /// with credit.
+    bool over_budget(TimePoint now, const modbus::Request& request) const {
+        if (request.is_read()) return !budget_.allows(now);
+        return slowest_write_ && !writes_.allows(now, kCredit * timeout_cost());
+    }
     /// The whole line rests for `rest` because of it.
     void on_line_rests(TimePoint now, Duration rest) {
         spend(now, rest);
@@ -183,7 +187,7 @@ class Station {
                       bool flaky_beside_others = false) const;
     /// Its longest recent time plus a margin, at most its response timeout. For a station never
     /// heard that of the `line`, if known.
-    Duration usual(std::optional<Duration> line = {}) const;
+    Duration usual(std::optional<Duration> line = {}, bool is_write = false) const;
     /// ... without that margin, except for receiver buffering.
     Duration needed() const {
         return slowest().value_or(settings_.response_timeout) + timing::kCandidateMargin;
@@ -246,8 +250,9 @@ class Station {
     ProbeBudget failing_{ProbeBudget::kFailing};  ///< of failures while it is failing()
     std::uint8_t lately_ = 0;  ///< the last 8 attempts, latest lowest: 1 was silent
     TimePoint asked_{};
-    RecentTimes times_;         ///< from request to first sign of the reply
-    RecentTimes times_before_;  ///< without the last reply
+    RecentTimes times_;                      ///< from request to first sign of the reply
+    RecentTimes times_before_;               ///< without the last reply
+    std::optional<Duration> slowest_write_;  ///< ever: there may be few
     TimePoint failed_{};
     Drift clock_drift_;
     ReplyHole hole_;

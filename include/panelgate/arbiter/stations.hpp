@@ -127,12 +127,13 @@ class Stations {
     /// When it is probed; empty: never.
     std::optional<TimePoint> probe_at(const Station& station) const;
     bool is_speculative(std::uint8_t id) const;
-    /// True if another station has answered lately, and after this one failed: the line works.
+    /// True if another station has answered lately, and it or this one after this one failed: the
+    /// line works.
     bool others_active(TimePoint now, const Station& station) const {
         return now < others_active_until(station);
     }
-    /// End of the time in which others count as using the line, after answers later than its last
-    /// failure.
+    /// End of the time in which others count as using the line, where something was heard since its
+    /// last failure.
     TimePoint others_active_until(const Station& station) const;
     /// Time in which a failing station's share of the line covers one whole timeout.
     Duration timeout_cost() const {

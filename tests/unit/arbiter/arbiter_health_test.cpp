@@ -211,6 +211,52 @@ TEST_F(ArbiterTest, P4APanelThatAlwaysAnswersLateTakesAtMostAFifthOfTheLine) {
     }
 }
 
+/// One client reads station 18, four others read and write station 17, which does not answer each
+/// `nth` request. Returns the answers of 18 in half a minute.
+int answers_beside_silence(BusScript& bus, int nth) {
+    std::multimap<TimePoint, Bytes> replies;
+    std::map<Client, Ticket> asked;
+    std::size_t seen = 0;
+    unsigned number = 0;
+    int good = 0;
+    const TimePoint end = bus.now() + 30s;
+    const auto ask = [&](Client client) {
+        if (asked.contains(client) && !bus.answered(asked[client])) return;
+        ++number;
+        if (client == 1) good += asked.contains(client) ? 1 : 0;
+        const Bytes write = Writer().u8(6).u16(number % 5000).u16(number).take();
+        asked[client] = client == 1   ? bus.submit(18, kRead, client)
+                        : client == 2 ? bus.submit(17, read_at(number % 100), client)
+                                      : bus.submit(17, write, client);
+    };
+    int requests = 0;
+    while (bus.now() < end) {
+        for (Client client = 1; client <= 5; ++client) ask(client);
+        bus.run_for(1ms);
+        for (; seen < bus.sent.size(); ++seen) {
+            const Bytes& adu = bus.sent[seen].adu;
+            if (adu[0] == 17 && ++requests % nth == 0) continue;
+            const ByteView pdu = modbus::pdu_of(adu);
+            replies.emplace(bus.sent[seen].at + 8ms,
+                            Writer().u8(adu[0]).raw(pdu[0] == 3 ? ByteView(kReply) : pdu).take());
+        }
+        for (; !replies.empty() && replies.begin()->first <= bus.now();
+             replies.erase(replies.begin())) {
+            const Bytes& reply = replies.begin()->second;
+            bus.hear_reply(reply[0], ByteView(reply).subspan(1));
+        }
+    }
+    return good;
+}
+
+TEST_F(ArbiterTest, P4APanelThatMissesEachSecondToFourthRequestLeavesTheOthersTheLine) {
+    settings.stations[0].response_timeout = 300ms;
+    for (const int nth : {2, 3, 4}) {
+        BusScript script{settings};
+        EXPECT_GT(answers_beside_silence(script, nth), 250) << nth;
+    }
+}
+
 /// The panel answers each read that is sent in two halves, until this one is answered.
 void serve_in_halves(BusScript& bus, Ticket asked, Duration pause) {
     for (std::size_t served = bus.sent.size() - 1; !bus.answered(asked); bus.run_for(1ms)) {

@@ -338,13 +338,13 @@ TEST_F(StationTest, P4OneThatKeepsFailingWithoutBeingSilentHasAFifthOfTheBus) {
 }
 
 TEST_F(StationTest, P4AReplyDoesNotPayForTheSilencesBeforeIt) {
-    EXPECT_FALSE(station_.over_budget(now_));
+    EXPECT_FALSE(station_.over_budget(now_, test::request_of(kRead)));
     miss(kRead);
     const TimePoint missed = now_;
     answer(kRead, kReply);
-    EXPECT_TRUE(station_.over_budget(now_));
+    EXPECT_TRUE(station_.over_budget(now_, test::request_of(kRead)));
     EXPECT_TRUE(station_.may_spend(now_)) << "one silence can happen to anybody";
-    EXPECT_FALSE(station_.over_budget(missed + 4 * kTimeout));
+    EXPECT_FALSE(station_.over_budget(missed + 4 * kTimeout, test::request_of(kRead)));
 }
 
 TEST_F(StationTest, P4FailuresBeyondAFifthThrottleItsRequests) {
