@@ -30,7 +30,7 @@ constexpr Shown kShown[] = {
     {Done::request, FrameKind::foreign_request, &Symptoms::requests, true, true},
     {Done::damaged, FrameKind::damaged, &Symptoms::strays, true},
     {Done::duplicate, FrameKind::copy, &Symptoms::doubled},
-    {Done::second, FrameKind::copy, &Symptoms::doubled},
+    {Done::second, FrameKind::foreign, &Symptoms::doubled},  // of none that was heard
     {Done::late, FrameKind::late, &Symptoms::late},
     {Done::disorder, FrameKind::late, &Symptoms::late},
     {Done::broadcast, FrameKind::foreign, &Symptoms::broadcast_replies, false, true},

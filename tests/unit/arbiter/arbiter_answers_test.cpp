@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "panelgate/modbus/rtu_frame.hpp"
 
 /// P1: of which request an answer is, where its own time or another answer speaks against it.
@@ -119,6 +121,7 @@ TEST_F(ArbiterAnswersTest, P1APanelThatSendsASurplusAnswerIsBelievedWhenNoneFoll
     answer(script, 17, reply_number(51), 12ms);
     script.run_for(20ms);
     EXPECT_EQ(value(ticket), reply_number(51));
+    EXPECT_EQ(std::ranges::count(script.notes, FrameKind::copy, &Note::kind), 0) << "of nothing";
 }
 
 TEST_F(ArbiterAnswersTest, P4AReplyWithoutItsFirstByteIsDamagedAndNotSilence) {
