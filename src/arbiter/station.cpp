@@ -51,7 +51,11 @@ Station::Replied Station::on_reply(OutstandingRequests& book, TimePoint now, con
     result.back = health_.on_reply(now);
     probes_ = 0;
     wants_check_ = read_turn_ = false;
-    if (group.request.is_read()) read_missed_ = false;
+    if (group.request.is_read()) {
+        read_missed_ = false;
+    } else {
+        ignored_places_ = 0;
+    }
     failed_in_a_row_ = 0;
     failing_.clear();
     missed_ = false;
@@ -80,6 +84,7 @@ Station::Replied Station::on_reply(OutstandingRequests& book, TimePoint now, con
 void Station::on_failed(TimePoint now, Verdict verdict, Duration cost,
                         const modbus::Request* write) {
     const bool is_read = write == nullptr;
+    if (!is_read && !is_ignored(*write)) ++ignored_places_;
     if (!is_read) ignored_ = write->pdu();
     read_missed_ = read_missed_ || is_read;
     read_turn_ = !is_read;

@@ -161,7 +161,7 @@ class Station {
     }
     /// ... true if so now, also for the cost of a write that it ignored.
     bool may_spend(TimePoint now, const modbus::Request* write = nullptr) const {
-        const bool was_ignored = write != nullptr && is_ignored(*write);
+        const bool was_ignored = write != nullptr && ignores(*write);
         return now >= affordable_at() &&
                (!was_ignored || writes_.allows(now, kCredit * timeout_cost()));
     }
@@ -231,6 +231,10 @@ class Station {
     void spend(TimePoint now, Duration cost, bool is_read = true) {
         (is_read ? budget_ : writes_).spend(now, cost, kBudgetMemory * timeout_cost());
     }
+    /// True if it has not answered a write there, or of any sort: to several places in a row.
+    bool ignores(const modbus::Request& write) const {
+        return is_ignored(write) || ignored_places_ > 1;
+    }
     /// True if its last unanswered write was to the same address.
     bool is_ignored(const modbus::Request& write) const {
         const auto place = [](const Bytes& pdu) {
@@ -257,9 +261,10 @@ class Station {
     Drift clock_drift_;
     ReplyHole hole_;
     int failed_in_a_row_ = 0;
-    int unusual_ = 0;      ///< replies left until answers_as_asked()
-    bool missed_ = false;  ///< the last attempt was silent, and its retry has not ended
-    Bytes ignored_;        ///< the last write that it did not answer
+    int unusual_ = 0;         ///< replies left until answers_as_asked()
+    bool missed_ = false;     ///< the last attempt was silent, and its retry has not ended
+    Bytes ignored_;           ///< the last write that it did not answer
+    int ignored_places_ = 0;  ///< that it did not answer a write to, in a row
     bool read_turn_ = false;
     int writes_in_a_row_ = 0;
     int polls_passed_over_ = 0;  ///< its turns since its last poll

@@ -385,6 +385,21 @@ TEST_F(StationTest, P4ReadsDoNotPayForAWriteThatItIgnores) {
     EXPECT_TRUE(station_.may_spend(now_, &other));
 }
 
+TEST_F(StationTest, P4WritesToSeveralPlacesThatItIgnoresInARowHaveOneShare) {
+    answer(kRead, kReply);
+    const modbus::Request other = test::request_of("06 00 6C 00 01"_hex);
+    for (unsigned i = 0; i < 5; ++i) {
+        EXPECT_TRUE(i > 2 || station_.may_spend(now_, &other)) << "others in a row " << i;
+        now_ += kTimeout;
+        const modbus::Request ignored = test::request_of(Writer().u8(6).u16(i).u16(1).take());
+        station_.on_failed(now_, Verdict::silent, kTimeout, &ignored);
+    }
+    EXPECT_FALSE(station_.may_spend(now_, &other));
+    EXPECT_TRUE(station_.may_spend(now_)) << "reads do not pay for that";
+    answer(kWrite, kWrite);
+    EXPECT_TRUE(station_.may_spend(now_, &other));
+}
+
 TEST_F(StationTest, P4OneThatIsBackIsNoLongerFlaky) {
     for (int i = 0; i < 8; ++i) {
         miss(kRead);
