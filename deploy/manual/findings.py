@@ -42,7 +42,9 @@ def entry(all_words, code, what):
     advice = said(all_words, "advice", code)
     if not title or not advice:
         raise SystemExit(f"{WORDS} has nothing for {code}")
-    signs = said(all_words, "evidence", code) or said(all_words, "evidence", "damage")
+    signs = said(all_words, "evidence", code)
+    if f"evidence.{code}" not in all_words:
+        signs = said(all_words, "evidence", "damage") + signs
     sentence = title[0].removeprefix("STATION: ")
     return [f"### {code}", "", sentence[0].upper() + sentence[1:], "",
             *table(("", ""), [("Cause", what), ("Sign", "; or: ".join(signs)), ("Remedy", " Or: ".join(advice))])]

@@ -33,6 +33,7 @@ Reply reply_of(const bus::Answer& answer) {
         case Fault::offline:
             return answer.transmitted ? Reply::silent : Reply::refused;
         case Fault::damaged:
+        case Fault::wrong:
             return Reply::damaged;
         case Fault::denied:
         case Fault::malformed:

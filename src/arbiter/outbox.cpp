@@ -9,6 +9,7 @@
 #include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::arbiter {
@@ -22,7 +23,7 @@ struct Shown {
     Done done;
     FrameKind kind;
     std::uint64_t Symptoms::* symptom;
-    bool counts_for_asked = false;  ///< not for the station that it names: it may not be its
+    bool counts_for_asked = false;  ///< it names no station, or not its sender
     bool foreign = false;
 };
 constexpr Shown kShown[] = {
@@ -35,8 +36,23 @@ constexpr Shown kShown[] = {
     {Done::disorder, FrameKind::late, &Symptoms::late},
     {Done::broadcast, FrameKind::foreign, &Symptoms::broadcast_replies, false, true},
     {Done::unasked, FrameKind::foreign, &Symptoms::unasked, false, true},
-    {Done::nobodys, FrameKind::foreign, &Symptoms::unasked, true, true},
+    {Done::nobodys, FrameKind::foreign, &Symptoms::unasked, false, true},
 };
+
+/// A good frame that answers no request that is known to be open: a copy, or nobody's.
+constexpr bool is_surplus(Done done) {
+    return done == Done::duplicate || done == Done::second || done == Done::unasked ||
+           done == Done::nobodys;
+}
+
+ByteView pdu_of(const modbus::Unused& frame) { return modbus::pdu_of(frame.bytes); }
+
+/// True if there is one of the asked station.
+bool holds_own(const std::vector<modbus::Unused>& frames) {
+    return std::ranges::any_of(frames, [](const modbus::Unused& frame) {
+        return frame.kind == modbus::Unused::Kind::own;
+    });
+}
 
 FrameKind kind_of(const Group& group) {
     if (group.learns_for != 0 || !group.confirms.empty()) return FrameKind::learn_echo;
@@ -73,6 +89,8 @@ StationCounters& Outbox::of(std::uint8_t station) {
 void Outbox::transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire,
                       const Reason& why) {
     const Group& group = attempt.group();
+    other_frame_.clear();
+    completed_ = false;
     if (group.attempts > 1) ++of(group.station).retries;
     if (group.station == kBroadcast) ++line_.broadcasts;
     actions_.push_back(
@@ -156,12 +174,44 @@ void Outbox::on_unsolicited(TimePoint now, const modbus::Unused& part, Done done
     if (late) symptoms.mute_in_a_row = 0;
     symptoms.worst_lateness = std::max(symptoms.worst_lateness, lateness);
     const bool in_time = late && lateness <= Duration::zero();  // after a shortened wait
-    const bool elsewhere = done == Done::damaged && inside_attempt_;
-    if (!in_time && !elsewhere) ++(symptoms.*shown.symptom);
+    // A copy of a write's reply, which is its request, is no echo.
+    const bool unsure = done == Done::echo && modbus::answers(pdu_of(part), pdu_of(part));
+    const bool elsewhere = unsure || (done == Done::damaged && inside_attempt_);
+    const bool old = is_surplus(done) && before_.is_old_reply(part.station, pdu_of(part));
+    if (!in_time && !elsewhere) ++(symptoms.*(old ? &Symptoms::old_replies : shown.symptom));
+    if (done == Done::damaged) join(part.bytes, asked);
+    if (inside_attempt_ && is_surplus(done) && !old && part.station != asked)
+        other_frame_.assign(pdu_of(part).begin(), pdu_of(part).end());
     actions_.push_back(Note{now, shown.kind, part.bytes, {}});
 }
 
 // Symptoms, for diagnosis only: nothing depends on them.
+
+/// Our own request may cut a frame that comes meanwhile in two: no damage, where both pieces are
+/// one good frame.
+void Outbox::join(ByteView bytes, std::uint8_t asked) {
+    Bytes whole = std::exchange(cut_, {});
+    const bool first = whole.empty();
+    whole.insert(whole.end(), bytes.begin(), bytes.end());
+    if (!first && !frames_in(whole, asked).empty()) {
+        ++symptoms_of(cut_for_).torn;
+        if (!inside_attempt_) ++symptoms_of(asked).torn;
+        completed_ = inside_attempt_;
+    } else if (!inside_attempt_ && whole.size() <= modbus::kMaxRtuAdu) {
+        cut_ = std::move(whole);
+        cut_for_ = asked;
+    }
+}
+
+/// Returns the frames, if there is nothing else: good ones, in whatever pieces they came.
+std::vector<modbus::Unused> Outbox::frames_in(ByteView bytes, std::uint8_t asked) const {
+    std::vector<modbus::Unused> parts = modbus::classify_heard(bytes, asked, orders_);
+    const auto damaged = [](const modbus::Unused& part) {
+        return part.kind == modbus::Unused::Kind::damaged;
+    };
+    if (std::ranges::any_of(parts, damaged)) parts.clear();
+    return parts;
+}
 
 namespace {
 
@@ -202,7 +252,10 @@ void Outbox::on_answered(TimePoint now, const Attempt& attempt, Duration think,
     if (attempt.reply().size() + modbus::kAduOverhead >= Symptoms::kLongReply)
         ++symptoms.long_answered;
     if (is_surely_echoed(attempt)) ++symptoms.echoes;
-    if (!attempt.damaged_bytes().empty()) ++symptoms.strays;
+    count_beside(attempt);
+    if (symptoms.mute_in_a_row > 0) ++symptoms.silences;
+    if (before_.on_answered(station, attempt.group().request.pdu(), attempt.reply()))
+        ++symptoms.repeated;
     if (replied.trailed) ++symptoms.trailed;
     credit_unanswered(attempt.group());
     if (replied.back) event(StationEvent::Kind::online, station);
@@ -211,26 +264,51 @@ void Outbox::on_answered(TimePoint now, const Attempt& attempt, Duration think,
     symptoms.mute_in_a_row = 0;
 }
 
+/// Counts what came beside the reply.
+void Outbox::count_beside(const Attempt& attempt) {
+    const std::uint8_t station = attempt.group().station;
+    const ByteView bytes = attempt.damaged_bytes();
+    if (bytes.empty()) return;
+    if (!completed_) join(bytes, station);
+    if (completed_) return;
+    const std::vector<modbus::Unused> frames = frames_in(bytes, station);
+    if (frames.empty()) ++symptoms_of(station).strays;
+    for (const modbus::Unused& frame : frames) ++symptoms_of(frame.station).unasked;
+}
+
 void Outbox::on_failed(const Attempt& attempt, Verdict verdict) {
     Symptoms& symptoms = symptoms_of(attempt.group().station);
+    const bool damaged = !attempt.damaged_bytes().empty() && !completed_;
+    const std::vector<modbus::Unused> frames =
+        damaged ? frames_in(attempt.damaged_bytes(), attempt.group().station)
+                : std::vector<modbus::Unused>{};
     if (is_surely_echoed(attempt)) ++symptoms.echoes;
     if (verdict == Verdict::damaged) ++of(attempt.group().station).damaged_frames;
     if (verdict != Verdict::silent) symptoms.mute_in_a_row = 0;
     if (attempt.echo().mismatch()) {
         ++symptoms.collided;
         symptoms.mute_in_a_row = 0;
-    } else if (verdict == Verdict::wrong) {
+    } else if (verdict == Verdict::wrong || holds_own(frames)) {
         ++symptoms.wrong;
         if (attempt.refused_other()) ++symptoms.wrong_exceptions;
-    } else if (!attempt.damaged_bytes().empty()) {
+    } else if (damaged && frames.empty()) {
         count_damaged(attempt);
         symptoms.mute_in_a_row = 0;
     } else {
         const bool silent = !attempt.heard() && !attempt.disturbed();
         ++(silent ? symptoms.silent : symptoms.disturbed);
         if (silent) remember_unanswered(attempt, symptoms.mute_in_a_row);
+        if (is_answered_by_other(attempt, frames)) ++symptoms.misaddressed;
         if (!is_search(attempt.group())) ++symptoms.mute_in_a_row;
     }
+}
+
+/// True if a frame with another station's address would have been the answer.
+bool Outbox::is_answered_by_other(const Attempt& attempt,
+                                  const std::vector<modbus::Unused>& frames) const {
+    const ByteView request = attempt.group().request.pdu();
+    const ByteView pdu = frames.empty() ? ByteView(other_frame_) : pdu_of(frames.front());
+    return !pdu.empty() && modbus::answers(request, pdu);
 }
 
 /// An unanswered read that is answered when asked again gives evidence about the pause before it.
@@ -239,6 +317,7 @@ void Outbox::remember_unanswered(const Attempt& attempt, std::uint64_t mute_befo
     const Group& group = attempt.group();
     constexpr std::uint64_t kMost = 2;  // in a row: a retry may follow another frame closely, too
     if (!group.request.is_read()) return;
+    if (!is_search(group)) before_.on_unanswered(group.station, group.request.pdu());
     if (mute_before >= kMost) {
         unanswered_.erase(group.station);
         return;
@@ -277,6 +356,7 @@ void Outbox::count_damaged(const Attempt& attempt) {
     if (modbus::crc_ok(bytes, other(orders_.of(group.station)))) ++symptoms.crc_swapped;
     if (modbus::ends_in_lower_case(bytes)) ++symptoms.lower_case;
     if (head) ++symptoms.damaged_heads;
+    if (attempt.lost_beginning()) ++symptoms.beheaded;
     if (expected.value_or(bytes.size()) >= Symptoms::kLongReply) ++symptoms.long_damaged;
     symptoms.damaged_bytes += bytes.size();
     symptoms.damaged_odd += static_cast<std::uint64_t>(

@@ -107,7 +107,7 @@ bool Station::take_half_open(TimePoint now, bool is_read) {
 bool Station::on_given_up(TimePoint now, Fault fault, bool is_read) {
     ++failed_in_a_row_;
     missed_ = false;
-    if (fault == Fault::damaged && !health_.offline()) {
+    if (was_heard(fault) && !health_.offline()) {
         health_.on_damaged();
         return false;
     }

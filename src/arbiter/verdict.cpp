@@ -23,6 +23,12 @@ TransactionEnd end_of(Verdict verdict) {
     return verdict == Verdict::wrong ? TransactionEnd::wrong : TransactionEnd::damaged;
 }
 
+/// What its jobs are told if nothing better comes.
+Fault fault_of(Verdict verdict) {
+    if (verdict == Verdict::silent) return Fault::timeout;
+    return verdict == Verdict::wrong ? Fault::wrong : Fault::damaged;
+}
+
 /// True if another attempt could still answer one of the jobs in time.
 bool in_time(TimePoint now, const Group& group) {
     return std::ranges::any_of(group.jobs, [&](const Job& job) { return now < job.start_by; });
@@ -277,7 +283,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
         station.on_retry(silent);
         give_back(group);  // health unaffected: the panel may only not answer this length
     } else {
-        give_up(now, group, silent ? Fault::timeout : Fault::damaged);
+        give_up(now, group, fault_of(verdict));
     }
     explain_condition(now, attempt.group().station, before);
 }
@@ -298,8 +304,8 @@ void Arbiter::give_back(Group& group) {
 void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
     for (const Job& job : group.jobs) outbox_.finish(job, fault);
     Backlog& backlog = schedule_.backlog();
-    if (group.learns_for != 0 && fault == Fault::damaged) echo_memory_.on_unclear();
-    if (group.learns_for != 0 && fault != Fault::damaged) {
+    if (group.learns_for != 0 && was_heard(fault)) echo_memory_.on_unclear();
+    if (group.learns_for != 0 && !was_heard(fault)) {
         // P8: the write never left, and its station is silent.
         const auto asked = [&](const Job& job) { return job.ticket == group.learns_for; };
         for (const Job& job : backlog.queue().remove_if(asked)) outbox_.finish(job, fault);

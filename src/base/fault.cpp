@@ -30,6 +30,8 @@ std::string_view label(Fault fault) {
             return "offline";
         case Fault::cancelled:
             return "cancelled";
+        case Fault::wrong:
+            return "wrong";
     }
     std::abort();
 }
@@ -55,6 +57,8 @@ Outcome outcome_of(Fault fault) {
             return Outcome::offline;
         case Fault::cancelled:
             return Outcome::cancelled;
+        case Fault::wrong:
+            return Outcome::wrong;
     }
     std::abort();
 }

@@ -158,6 +158,8 @@ std::string_view label(Outcome outcome) {
             return "cached";
         case Outcome::shared:
             return "shared";
+        case Outcome::wrong:
+            return "wrong";
     }
     std::abort();
 }

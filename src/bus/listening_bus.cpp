@@ -77,6 +77,8 @@ Outcome outcome_of(const tap::Transaction& heard) {
             return Outcome::damaged;
         case tap::End::unasked:
             return Outcome::ok;
+        case tap::End::wrong:
+            return Outcome::wrong;
     }
     std::abort();
 }
@@ -132,13 +134,26 @@ void HeardStations::count_answer(One& one, const tap::Transaction& heard) {
     wire.bus_transaction.observe(heard.ended - heard.asked);
 }
 
+namespace {
+
+/// How a request failed whose station was heard.
+std::uint64_t arbiter::Symptoms::* ending_of(const tap::Transaction& heard) {
+    using arbiter::Symptoms;
+    if (heard.end == tap::End::wrong) return &Symptoms::wrong;
+    const auto expected = modbus::reply_length_from_request(heard.request);
+    if (!expected || heard.damaged > *expected) return &Symptoms::damaged_long;
+    return heard.damaged < *expected ? &Symptoms::damaged_short : &Symptoms::damaged_exact;
+}
+
+}  // namespace
+
 void HeardStations::count_failure(One& one, const tap::Transaction& heard) {
     arbiter::StationCounters& wire = wire_of(heard.station);
     ++one.counts.requests;
     one.failed = true;
-    if (heard.end == tap::End::damaged) {
+    if (heard.end == tap::End::damaged || heard.end == tap::End::wrong) {
         ++one.counts.damaged;
-        ++wire.symptoms.damaged_long;
+        ++(wire.symptoms.*ending_of(heard));
         one.timeouts_in_a_row = 0;
         wire.symptoms.mute_in_a_row = 0;
         return;
@@ -227,6 +242,8 @@ TransactionEnd end_of(const tap::Transaction& made) {
             return TransactionEnd::timeout;
         case tap::End::damaged:
             return TransactionEnd::damaged;
+        case tap::End::wrong:
+            return TransactionEnd::wrong;
     }
     std::abort();
 }

@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <tuple>
 #include <utility>
-
-#include "rules.hpp"
 
 namespace panelgate::doctor {
 
@@ -22,7 +19,9 @@ constexpr std::array kCounts = {
     &Symptoms::late,          &Symptoms::unasked,          &Symptoms::echoes,
     &Symptoms::wrong,         &Symptoms::requests,         &Symptoms::crc_swapped,
     &Symptoms::trailed,       &Symptoms::wrong_exceptions, &Symptoms::broadcast_replies,
-    &Symptoms::lower_case,    &Symptoms::echoed_again,
+    &Symptoms::lower_case,    &Symptoms::echoed_again,     &Symptoms::beheaded,
+    &Symptoms::torn,          &Symptoms::old_replies,      &Symptoms::misaddressed,
+    &Symptoms::repeated,      &Symptoms::silences,
 };
 constexpr std::size_t kOthers = 2;  // mute_in_a_row, worst_lateness
 static_assert(sizeof(Symptoms) ==
@@ -75,35 +74,6 @@ Sample difference(const Sample& later, const Sample& earlier) {
     window.broadcasts = later.broadcasts - earlier.broadcasts;
     if (later.uart) window.uart = minus(*later.uart, earlier.uart.value_or(line::UartErrors{}));
     return window;
-}
-
-std::vector<Finding> diagnose(const LineFacts& facts, const Sample& window,
-                              const std::vector<Finding>& standing) {
-    Case c{facts, window, window.total(), standing, {}};
-    find_echo(c);
-    find_no_answer(c);
-    find_other_master(c);
-    find_collision(c);
-    find_overrun(c);
-    for (const auto& [id, symptoms] : window.stations) find_crc_order(c, id, symptoms);
-    for (const auto& [id, symptoms] : window.stations) find_lower_case(c, id, symptoms);
-    find_all_damaged(c);
-    find_trailing_bytes(c);
-    for (const auto& [id, symptoms] : window.stations) {
-        find_wrong_exception(c, id, symptoms);
-        find_wrong_reply(c, id, symptoms);
-        find_broadcast_replies(c, id, symptoms);
-        find_duplicate_address(c, id, symptoms);
-        find_short_timeout(c, id, symptoms);
-        find_short_gap(c, id, symptoms);
-        find_unasked_frames(c, id, symptoms);
-        find_silent_station(c, id, symptoms);
-    }
-    if (facts.over_tcp) find_tcp_framing(c);
-    find_noise(c);
-    std::ranges::sort(c.findings, {},
-                      [](const Finding& f) { return std::tuple(f.cause, f.station); });
-    return std::move(c.findings);
 }
 
 namespace {

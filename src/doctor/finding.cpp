@@ -12,7 +12,7 @@ namespace panelgate::doctor {
 namespace {
 
 /// In the order of Cause.
-constexpr std::array<std::string_view, 21> kCodes{
+constexpr std::array<std::string_view, 23> kCodes{
     "echo",
     "no-answer-at-all",
     "wrong-baud",
@@ -34,9 +34,11 @@ constexpr std::array<std::string_view, 21> kCodes{
     "gap-too-short",
     "unasked-frames",
     "station-silent",
+    "repeats-requests",
+    "misses-requests",
 };
 constexpr std::size_t place(Cause cause) { return static_cast<std::size_t>(cause); }
-static_assert(place(Cause::station_silent) + 1 == kCodes.size());
+static_assert(place(Cause::misses_requests) + 1 == kCodes.size());
 static_assert(kCodes[place(Cause::wrong_crc_order)] == "wrong-crc-order");
 static_assert(kCodes[place(Cause::duplicate_address)] == "duplicate-address");
 
@@ -73,6 +75,10 @@ std::string damage_text(const Case& c, const arbiter::Symptoms& s) {
                        std::to_string(s.damaged_short) + " shorter, " +
                        std::to_string(s.damaged_long) + " longer; " +
                        share_text(s.damaged_zeros, s.damaged_bytes, "of their bytes are zero");
+    if (s.beheaded > 0)
+        text += "; " + std::to_string(s.beheaded) + " are right but for their first bytes";
+    if (s.crc_swapped > 0)
+        text += "; " + std::to_string(s.crc_swapped) + " but for the order of the CRC's bytes";
     if (c.window.uart) {
         const line::UartErrors& uart = *c.window.uart;
         text += "; the driver counted " + std::to_string(uart.framing) + " framing, " +

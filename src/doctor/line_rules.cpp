@@ -49,15 +49,12 @@ std::string silence_advice(const LineFacts& facts) {
            to_string(facts.serial) + ") and the stations' addresses.";
 }
 
-/// Good frames of stations that this gateway has not asked. After a broadcast they may be wrong
-/// answers to it, which show no other master.
+/// Good frames of stations that are not ours: not listed, and not asked. After a broadcast they may
+/// be wrong answers to it, which show no other master.
 std::uint64_t foreign_frames(const Case& c) {
-    if (c.window.broadcasts > 0) return 0;
-    std::uint64_t frames = 0;
-    for (const auto& [id, symptoms] : c.window.stations) {
-        if (symptoms.attempts() == 0) frames += symptoms.unasked;
-    }
-    return frames;
+    const auto unlisted = c.window.stations.find(0);
+    if (c.window.broadcasts > 0 || unlisted == c.window.stations.end()) return 0;
+    return unlisted->second.attempts() == 0 ? unlisted->second.unasked : 0;
 }
 
 }  // namespace
@@ -110,7 +107,7 @@ void find_other_master(Case& c) {
 
 void find_collision(Case& c) {
     const Bar bar{c, Cause::collision};
-    if (c.all.collided < bar.enough(3) || c.has(Cause::echo)) return;
+    if (c.all.collided < bar.enough(3)) return;
     c.add(Cause::collision, {}, "Another device transmits while the gateway does.",
           "Look for another master, for a panel that answers very late, and for a transceiver that "
           "does not release the line.",
@@ -153,7 +150,6 @@ void add_trailing(Case& c, std::optional<std::uint8_t> station, const std::strin
 }  // namespace
 
 void find_trailing_bytes(Case& c) {
-    if (c.has(Cause::other_master) || c.has(Cause::echo)) return;
     std::vector<std::uint8_t> found;
     std::size_t answering = 0;
     for (const auto& [id, symptoms] : c.window.stations) {
@@ -224,9 +220,24 @@ bool hits_long_replies(const Symptoms& s) {
                3 * share(short_damaged, short_damaged + short_answered);
 }
 
-bool has_better_explanation(const Case& c) {
-    return c.has(Cause::echo) || c.has_of_line(Cause::wrong_baud) || c.has(Cause::other_master) ||
-           c.has(Cause::collision) || c.has_of_line(Cause::wrong_parity);
+/// Good frames that came beside the replies: as many may have met others, and come in pieces.
+std::uint64_t surplus_frames(const Case& c) {
+    return c.all.unasked + c.all.doubled + c.all.old_replies;
+}
+
+/// The bytes around and between frames, as far as they are of none.
+std::uint64_t loose_bytes(const Symptoms& s) { return beyond(s.strays, s.torn); }
+
+/// They come around the replies of one of several stations only: of that panel, not of the line.
+bool are_of_one_station(const Case& c, const Symptoms& s) {
+    constexpr std::uint64_t kFew = 8;  // of which four fifths of all come by chance
+    bool one = false, others = false;
+    for (const auto& [id, symptoms] : c.window.stations) {
+        const bool most = loose_bytes(symptoms) * 5 >= loose_bytes(s) * 4;
+        one = one || most;
+        others = others || (!most && symptoms.answered >= kFew);
+    }
+    return one && others;
 }
 
 }  // namespace
@@ -299,7 +310,7 @@ void find_lower_case(Case& c, std::uint8_t station, const Symptoms& s) {
 
 void find_all_damaged(Case& c) {
     const Symptoms s = unexplained(c);
-    if (!is_all_damaged(c, s) || c.has(Cause::echo)) return;
+    if (!is_all_damaged(c, s)) return;
     const Cause cause = cause_of_damage(c, s);
     const std::string evidence = damage_text(c, s);
     const std::string now = to_string(c.facts.serial);
@@ -331,8 +342,41 @@ void find_all_damaged(Case& c) {
     }
 }
 
+namespace {
+
+struct Noise {
+    bool damage = false;       ///< replies are damaged
+    bool strays = false;       ///< bytes come around or between frames
+    std::uint64_t around = 0;  ///< so many times
+};
+
+std::string noise_advice(const Case& c, const Symptoms& s, const Noise& noise) {
+    std::string advice =
+        "Check the 120 ohm termination at both ends (and nowhere else), the bias, the shield and "
+        "what runs beside the cable.";
+    if (c.facts.over_tcp) advice = "On the line behind the server: " + advice;
+    if (noise.damage && hits_long_replies(s))
+        advice = "Long replies suffer most: look at the termination first. " + advice;
+    if (noise.strays)
+        advice = "Bytes arrive while no device is transmitting: look at the bias first. " + advice;
+    if (noise.damage && loses_beginnings(s)) advice = std::string(kLostBeginnings) + " " + advice;
+    return advice;
+}
+
+std::string noise_evidence(const Case& c, const Symptoms& s, const Noise& noise) {
+    const std::string around =
+        std::to_string(noise.around) + " times bytes around or between frames";
+    if (!noise.damage) return around;
+    std::string evidence = damage_text(c, s);
+    if (hits_long_replies(s))
+        evidence += "; " + share_text(s.long_damaged, s.long_damaged + s.long_answered,
+                                      "replies of 32 bytes and more damaged");
+    return noise.strays ? evidence + "; " + around : evidence;
+}
+
+}  // namespace
+
 void find_noise(Case& c) {
-    if (has_better_explanation(c) || c.has(Cause::tcp_framing)) return;
     const Bar bar{c, Cause::noise};
     const Symptoms s = unexplained(c);
     const bool overrun =
@@ -340,46 +384,38 @@ void find_noise(Case& c) {
     const std::uint64_t late = unheard_late_replies(c);
     // Over TCP replies are cut where the connection stalls, and the rest arrives alone.
     const std::uint64_t damaged = beyond(c.facts.over_tcp ? s.damaged_exact : s.damaged(), late);
-    const bool damage = is_too_often(c, bar, s, damaged);
-    const std::uint64_t around = beyond(s.strays, late);
-    const bool strays = !c.facts.over_tcp && around >= bar.enough(5) && around * 20 >= s.answered;
-    if (overrun || (!damage && !strays)) return;
-    std::string advice =
-        "Check the 120 ohm termination at both ends (and nowhere else), the bias, the shield and "
-        "what runs beside the cable.";
-    if (c.facts.over_tcp) advice = "On the line behind the server: " + advice;
-    std::string evidence = damage_text(c, s);
-    if (hits_long_replies(s)) {
-        advice = "Long replies suffer most: look at the termination first. " + advice;
-        evidence += "; " + share_text(s.long_damaged, s.long_damaged + s.long_answered,
-                                      "replies of 32 bytes and more damaged");
-    }
-    if (strays) {
-        advice = "Bytes arrive while no device is transmitting: look at the bias first. " + advice;
-        evidence += "; " + std::to_string(s.strays) + " times bytes around or between replies";
-    }
-    Figures figures = damage_figures(s);
-    if (strays) figures["strays"] = s.strays;
-    c.add(Cause::noise, {}, "Some received frames are damaged.", std::move(advice),
-          std::move(evidence), std::move(figures));
+    Noise noise;
+    noise.damage = is_too_often(c, bar, s, damaged);
+    noise.around = beyond(loose_bytes(s), late + surplus_frames(c));
+    noise.strays = !c.facts.over_tcp && noise.around >= bar.enough(5) &&
+                   noise.around * 20 >= s.answered && !are_of_one_station(c, s);
+    if (overrun || (!noise.damage && !noise.strays)) return;
+    Figures figures = noise.damage ? damage_figures(s) : Figures{};
+    if (noise.strays) figures["strays"] = noise.around;
+    c.add(
+        Cause::noise, {},
+        noise.damage ? "Some received frames are damaged." : "Bytes come that belong to no frame.",
+        noise_advice(c, s, noise), noise_evidence(c, s, noise), std::move(figures));
 }
 
-/// The connection changes lengths: telnet doubles or removes bytes. A wrong byte in a reply of the
-/// right length comes from the wire behind the server, and a truncated reply from a connection that
-/// stalls, unless all are truncated.
+/// The connection changes lengths: telnet doubles or removes bytes, and a server loses the first
+/// ones. A wrong byte in a reply of the right length comes from the wire behind the server, and a
+/// reply without its end from a connection that stalls, unless all are truncated.
 void find_tcp_framing(Case& c) {
-    if (has_better_explanation(c)) return;
+    if (!c.facts.over_tcp) return;
     const Bar bar{c, Cause::tcp_framing};
     const Symptoms s = unexplained(c);
     const bool never_right = is_all_damaged(c, s) && s.damaged_exact * 2 < s.damaged() &&
                              s.silent + s.disturbed <= s.damaged();
     const std::uint64_t changed =
-        beyond(never_right ? s.damaged() : s.damaged_long, unheard_late_replies(c));
+        beyond(never_right ? s.damaged() : s.damaged_long + s.beheaded, unheard_late_replies(c));
     if (!is_too_often(c, bar, s, changed)) return;
+    const std::string lost = loses_beginnings(s) ? std::string(kLostBeginnings) + " " : "";
     c.add(Cause::tcp_framing, {}, "Bytes are changed on the way from the server.",
-          "Make sure that its port is raw TCP without telnet negotiation (ser2net: no "
-          "`telnet(rfc2217)`), that no other client is connected to it, and that its own baud and "
-          "serial format are the panels'; then look at the line behind it.",
+          lost +
+              "Make sure that its port is raw TCP without telnet negotiation (ser2net: no "
+              "`telnet(rfc2217)`), that no other client is connected to it, and that its own baud "
+              "and serial format are the panels'; then look at the line behind it.",
           damage_text(c, s), damage_figures(s));
 }
 

@@ -63,6 +63,14 @@ inline bool explained_by_frames(const Case& c, std::uint8_t station) {
     return c.has(Cause::wrong_crc_order, station) || c.has(Cause::ascii_lower_case, station);
 }
 
+/// True if most damaged replies have only lost their first bytes.
+inline bool loses_beginnings(const arbiter::Symptoms& s) {
+    return s.beheaded >= 3 && s.beheaded * 2 >= s.damaged();
+}
+inline constexpr const char* kLostBeginnings =
+    "Replies lose their first bytes: see whether the adapter listens again soon enough after it "
+    "has sent.";
+
 /// Returns what of `count` is beyond `explained`.
 inline std::uint64_t beyond(std::uint64_t count, std::uint64_t explained) {
     return count - std::min(count, explained);
@@ -72,10 +80,15 @@ inline std::uint64_t beyond(std::uint64_t count, std::uint64_t explained) {
 /// have damaged another station's reply, or have come as stray bytes.
 std::uint64_t unheard_late_replies(const Case& c, std::optional<std::uint8_t> except = {});
 
+/// Returns how many attempts to stations other than `except` were answered by another address, as
+/// far as that may have been `except`; as many again may have come too late to be noticed as such.
+std::uint64_t misaddressed_elsewhere(const Case& c, std::uint8_t except);
+
 /// Returns the cause of damage in all replies: Cause::wrong_parity, wrong_baud or noise.
 Cause cause_of_damage(const Case& c, const arbiter::Symptoms& symptoms);
 
-// Each adds at most one finding per line or station.
+// Each adds at most one finding per line or station. When it is asked, and beside what it is not
+// named, is the table in diagnose.cpp.
 void find_echo(Case& c);
 void find_no_answer(Case& c);
 void find_other_master(Case& c);
@@ -91,10 +104,13 @@ void find_wrong_exception(Case& c, std::uint8_t station, const arbiter::Symptoms
 void find_broadcast_replies(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_wrong_reply(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_duplicate_address(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
+void find_damage(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_short_timeout(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_short_gap(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_unasked_frames(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_silent_station(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
+void find_repeated_requests(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
+void find_missed_requests(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 
 /// "12 of 345 replies (3.5 %)"
 std::string share_text(std::uint64_t part, std::uint64_t whole, const char* what);

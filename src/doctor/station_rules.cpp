@@ -34,6 +34,15 @@ bool is_damaged_more(const Case& c, const Symptoms& s) {
     return s.damaged() * others >= 2 * others_damaged * (s.answered + s.damaged());
 }
 
+/// True if requests come back at this one of several stations, and at no other.
+bool is_only_repeater(const Case& c, std::uint8_t station, const Symptoms& s) {
+    const Bar bar{c, Cause::repeats_requests, station};
+    const std::uint64_t elsewhere = c.all.echoes - s.echoes;
+    const std::uint64_t others = c.all.answered - s.answered;
+    const bool often = s.echoes * (bar.low ? 40 : 20) >= s.attempts();
+    return s.echoes >= bar.enough(3) && often && others >= 20 && elsewhere * 10 <= s.echoes;
+}
+
 void add_duplicate(Case& c, std::uint8_t station, const Symptoms& s) {
     const std::string address = std::to_string(station);
     const bool twice = s.doubled * 2 >= s.answered && s.doubled > 0;
@@ -52,10 +61,33 @@ void add_duplicate(Case& c, std::uint8_t station, const Symptoms& s) {
           std::move(figures));
 }
 
-/// True if replies are too long but begin rightly: a second sender, not a cable fault.
-bool has_second_sender(const Bar& bar, const Symptoms& s) {
-    return s.damaged_long >= bar.enough(3) && s.damaged_long * 4 >= s.damaged() &&
+/// Returns how many repeated replies have another cause: what comes unasked, instead of the right
+/// reply, to a broadcast, or from a panel with a wrong address, may have the form of the last
+/// reply.
+std::uint64_t explained_copies(const Case& c, std::uint8_t station, const Symptoms& s) {
+    // Frames that came instead of the reply are counted as unasked, too.
+    std::uint64_t explained = misaddressed_elsewhere(c, station) + std::max(s.unasked, s.wrong);
+    if (c.has(Cause::answers_broadcasts, station)) explained += c.window.broadcasts;
+    return explained;
+}
+
+/// True if replies are too long but begin rightly: a second sender, or bytes too many.
+bool may_have_second_sender(const Symptoms& s) {
+    return s.damaged_long >= 3 && s.damaged_long * 4 >= s.damaged() &&
            s.damaged_heads * 4 >= s.damaged();
+}
+
+std::string damage_advice(const Symptoms& s, bool always) {
+    std::string advice =
+        "Look at this panel's terminals, its branch of the cable and its shield; if the damage "
+        "goes with the panel to another place, its transceiver is faulty";
+    advice += always ? ", or its communication settings differ from the others'." : ".";
+    if (may_have_second_sender(s))
+        advice +=
+            " Replies are longer than asked: if its address still answers when it is off the "
+            "line, a second panel has it.";
+    if (loses_beginnings(s)) advice = std::string(kLostBeginnings) + " " + advice;
+    return advice;
 }
 
 /// Adds damage of one panel alone: its cable, transceiver or settings.
@@ -71,33 +103,40 @@ void add_damage(Case& c, std::uint8_t station, const Symptoms& s) {
     if (!c.facts.over_tcp && cause == Cause::wrong_baud)
         return c.add(cause, station, "All that " + name + " sends is not Modbus at this speed.",
                      "Set this panel's baud" + line, evidence, damage_figures(s));
-    c.add(
-        Cause::damaged_replies, station, "Only the replies of " + name + " are damaged.",
-        "Look at this panel's terminals, its branch of the cable and its shield; if the damage "
-        "goes with the panel to another place, its transceiver is faulty" +
-            std::string(always ? ", or its communication settings differ from the others'." : "."),
-        evidence, damage_figures(s));
+    c.add(Cause::damaged_replies, station, "Only the replies of " + name + " are damaged.",
+          damage_advice(s, always), evidence, damage_figures(s));
 }
 
 }  // namespace
 
+std::uint64_t misaddressed_elsewhere(const Case& c, std::uint8_t except) {
+    return 2 * (c.all.misaddressed - c.window.stations.at(except).misaddressed);
+}
+
 void find_duplicate_address(Case& c, std::uint8_t station, const Symptoms& s) {
-    const bool line = c.has_of_line(Cause::wrong_baud) || c.has_of_line(Cause::wrong_parity) ||
-                      c.has(Cause::echo);
     // Another master that reads the same makes replies come twice.
     const bool masters =
         c.has(Cause::other_master) && (s.unasked + c.all.requests) * 2 >= s.doubled;
-    if (station == 0 || line || masters || explained_by_frames(c, station)) return;
+    // A second panel answers each request once, at most: more than that comes by itself.
+    const bool by_itself = s.doubled + beyond(s.unasked, s.wrong) > s.attempts();
+    if (station == 0 || masters || by_itself) return;
     const Bar bar{c, Cause::duplicate_address, station};
+    const std::uint64_t twice = beyond(s.doubled, explained_copies(c, station, s));
     const std::uint64_t left = beyond(s.damaged(), unheard_late_replies(c, station));
-    const bool mixed = s.doubled >= 1 && left >= bar.enough(3) && is_damaged_more(c, s);
+    const bool mixed = twice >= 1 && left >= bar.enough(3) && is_damaged_more(c, s);
     // A reply that comes after its timeout is taken for the retry's, and the retry's own follows.
-    const bool from_retries = s.silent >= s.doubled && s.doubled * 4 < s.answered;
-    if ((s.doubled >= bar.enough(3) && !from_retries) || mixed) return add_duplicate(c, station, s);
-    // A connection that stalls truncates replies without a second panel.
-    if (c.facts.over_tcp && s.damaged_short * 2 > s.damaged()) return;
-    if (!only_this_is_damaged(c, {c, Cause::damaged_replies, station}, s, left)) return;
-    has_second_sender(bar, s) ? add_duplicate(c, station, s) : add_damage(c, station, s);
+    const bool from_retries = s.silent >= twice && twice * 4 < s.answered;
+    if ((twice >= bar.enough(3) && !from_retries) || mixed) add_duplicate(c, station, s);
+}
+
+void find_damage(Case& c, std::uint8_t station, const Symptoms& s) {
+    if (station == 0) return;
+    const std::uint64_t left = beyond(s.damaged(), unheard_late_replies(c, station));
+    // A connection that stalls truncates replies without a fault of the panel.
+    const std::uint64_t cut = beyond(s.damaged_short, s.beheaded);
+    if (c.facts.over_tcp && cut * 2 > s.damaged()) return;
+    if (only_this_is_damaged(c, {c, Cause::damaged_replies, station}, s, left))
+        add_damage(c, station, s);
 }
 
 namespace {
@@ -126,9 +165,11 @@ std::string timeout_advice(const LineFacts& facts, Duration timeout, Duration la
 /// One late reply, or another master's reply that looks like it, says nothing about the timeout.
 void find_short_timeout(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::timeout_too_short, named(station)};
-    if (s.late < bar.enough(3) || c.has(Cause::other_master)) return;
+    const std::uint64_t late = beyond(s.late, s.old_replies);
+    const std::uint64_t owed = s.attempts() - s.answered;
+    if (late < bar.enough(3) || late > 2 * owed) return;  // no more replies than were owed are late
     const std::uint64_t one_in = s.worst_lateness <= kClustered ? 10 : 2;
-    if (s.late * one_in * (bar.low ? 2 : 1) < s.attempts()) return;
+    if (late * one_in * (bar.low ? 2 : 1) < s.attempts()) return;
     const auto found = c.facts.response_timeouts.find(station);
     const Duration timeout =
         found == c.facts.response_timeouts.end() ? c.facts.response_timeout : found->second;
@@ -189,9 +230,7 @@ void find_short_gap(Case& c, std::uint8_t station, const Symptoms& s) {
     for (const std::uint64_t count : s.silent_after) heard_again += count;
     if (heard_again * 2 < s.silent) return;
     // A late reply to the first attempt answers the second one, too.
-    if (c.has(Cause::timeout_too_short, station) ||
-        s.late * 2 >= std::max<std::uint64_t>(1, s.silent))
-        return;
+    if (s.late * 2 >= std::max<std::uint64_t>(1, s.silent)) return;
     const auto split = split_by_pause({c, Cause::gap_too_short, named(station)}, s);
     if (!split) return;
     // Users of slow panels report 10 to 40 ms; if that is not enough, it is doubled.
@@ -247,44 +286,88 @@ void find_broadcast_replies(Case& c, std::uint8_t station, const Symptoms& s) {
 /// Good frames of the asked station that do not answer the request: the wire is fine.
 void find_wrong_reply(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::wrong_reply, named(station)};
-    const bool masters = c.has(Cause::other_master) && s.wrong <= c.all.requests;
-    if (s.wrong < bar.enough(3) || s.wrong * 20 < s.answered || masters) return;
-    if (c.has(Cause::wrong_exception, station)) return;
+    // What comes by itself now and then comes in place of a reply, too.
+    const bool by_itself = beyond(s.unasked + s.old_replies, s.wrong) >= s.wrong;
+    const std::uint64_t wrong = (by_itself ? 0 : s.wrong) + s.misaddressed;
+    const bool masters = c.has(Cause::other_master) && wrong <= c.all.requests;
+    if (wrong < bar.enough(3) || wrong * 20 < s.answered || masters) return;
     const std::string name = station_text(c, station, true);
+    const bool elsewhere = s.misaddressed > s.wrong;
     c.add(Cause::wrong_reply, named(station),
-          name + " answers with frames that do not fit the request.",
-          "Compare the line's trace with the panel's manual: another function, length or address "
-          "than was asked comes back. Another function or a shorter read may be what it can do.",
-          share_text(s.wrong, s.attempts(), "requests") + " were answered so, " +
+          name + (elsewhere ? " answers with the address of another station."
+                            : " answers with frames that do not fit the request."),
+          elsewhere
+              ? "See in the line's trace which address answers when it is asked, and give the "
+                "panel its own."
+              : "Compare the line's trace with the panel's manual: another function, length or "
+                "address than was asked comes back. Another function or a shorter read may be what "
+                "it can do.",
+          share_text(wrong, s.attempts(), "requests") + " were answered so, " +
               std::to_string(s.answered) + " rightly",
-          {{"wrong", s.wrong}, {"requests", s.attempts()}, {"right", s.answered}});
+          {{"wrong", wrong}, {"requests", s.attempts()}, {"right", s.answered}});
 }
 
 /// Late replies, duplicates, another master's replies and those of a second panel are excluded.
 void find_unasked_frames(Case& c, std::uint8_t station, const Symptoms& s) {
-    if (station == 0 || s.attempts() == 0 || c.has(Cause::other_master) || c.has(Cause::echo) ||
-        c.has(Cause::duplicate_address, station))
-        return;
+    if (station == 0) return;
     const Bar bar{c, Cause::unasked_frames, station};
-    const std::uint64_t frames = s.unasked - std::min(s.unasked, s.wrong);
+    const std::uint64_t others = s.wrong + misaddressed_elsewhere(c, station);
+    const std::uint64_t frames = beyond(s.unasked, others) + s.old_replies;
     if (frames < bar.enough(5) || frames * (bar.low ? 40 : 20) < s.attempts()) return;
+    std::string advice = "Look in its settings for what it sends by itself.";
+    if (c.window.broadcasts > 0)
+        advice =
+            "It may answer broadcasts, which no panel should (serial line V1.02, 2.1), or "
+            "send by itself: look for that in its settings.";
+    if (s.attempts() == 0)
+        advice += " Or another master asks it whose requests are not heard here.";
+    if (s.old_replies * 2 >= frames)
+        advice =
+            "They are earlier replies once more: look at what is between it and the gateway "
+            "(a repeater, a radio, a device server), then at its firmware.";
     c.add(Cause::unasked_frames, station,
-          station_text(c, station, true) + " sends unsolicited frames.",
-          c.window.broadcasts > 0
-              ? "It may answer broadcasts, which no panel should (serial line V1.02, 2.1), or send "
-                "by itself: look for that in its settings."
-              : "Look in its settings for what it sends by itself.",
+          station_text(c, station, true) + " sends unsolicited frames.", advice,
           std::to_string(frames) + " good frames that belong to no request, " +
               std::to_string(s.attempts()) + " requests to it and " +
               std::to_string(c.window.broadcasts) + " broadcasts",
           {{"frames", frames}, {"requests", s.attempts()}, {"broadcasts", c.window.broadcasts}});
 }
 
+/// All that comes back comes at one of several stations: no adapter, and no second sender. Others
+/// may have collided meanwhile, where the echo was waited for.
+void find_repeated_requests(Case& c, std::uint8_t station, const Symptoms& s) {
+    if (station == 0 || !is_only_repeater(c, station, s)) return;
+    c.add(Cause::repeats_requests, station,
+          station_text(c, station, true) + " sends the request back before its reply.",
+          "Set `echo: off` if no adapter of this line hears what it sends; then look at the "
+          "panel's converter and its settings.",
+          share_text(s.echoes, s.attempts(), "requests to it") +
+              " came back, and hardly any to the others",
+          {{"echoes", s.echoes}, {"requests", s.attempts()}});
+}
+
+/// It is silent now and then, and seldom twice in a row, also to what it answers at other times.
+void find_missed_requests(Case& c, std::uint8_t station, const Symptoms& s) {
+    const Bar bar{c, Cause::misses_requests, named(station)};
+    const std::uint64_t runs = s.silences;
+    const bool now_and_then = runs >= bar.enough(10) && s.silent <= 3 * runs;
+    const bool often = s.silent * (bar.low ? 10 : 5) >= s.attempts();
+    if (!now_and_then || !often || s.repeated * 10 < runs || s.late * 2 >= s.silent) return;
+    c.add(Cause::misses_requests, named(station),
+          station_text(c, station, true) + " answers only some of the requests to it.",
+          "Ask it less often, or set a longer `timing.frame_gap`; if that changes nothing, look at "
+          "its branch of the cable and what else keeps it busy: a panel does not answer a request "
+          "that arrives damaged.",
+          share_text(s.silent, s.attempts(), "requests") + " were not answered; " +
+              std::to_string(s.repeated) + " of them were when they were asked again",
+          {{"silent", s.silent}, {"requests", s.attempts()}, {"repeated", s.repeated}});
+}
+
 void find_silent_station(Case& c, std::uint8_t station, const Symptoms& s) {
-    if (station == 0 || c.has(Cause::no_answer_at_all) || s.attempts() == 0) return;
+    if (station == 0) return;
     const Bar bar{c, Cause::station_silent, station};
-    if (c.has(Cause::wrong_reply, station) || c.has(Cause::wrong_exception, station)) return;
-    if (c.has(Cause::timeout_too_short, station) || s.mute_in_a_row < bar.enough(5)) return;
+    const bool elsewhere = s.misaddressed * 4 >= s.silent + s.disturbed && s.misaddressed > 0;
+    if (s.mute_in_a_row < bar.enough(5) || elsewhere) return;
     bool other_answers = false;
     for (const auto& [id, other] : c.window.stations) {
         const bool lately = bar.low || other.mute_in_a_row == 0;

@@ -141,6 +141,7 @@ ExceptionCode to_exception(Fault fault) {
         case Fault::line_lost:
         case Fault::timeout:
         case Fault::damaged:
+        case Fault::wrong:
         case Fault::offline:
             return ExceptionCode::gateway_target_failed;
     }

@@ -227,8 +227,7 @@ std::vector<std::size_t> StationPolls::on_answer(TimePoint now, std::size_t read
         const bool about_range = exception && (*exception == 2 || *exception == 3);
         if (about_range && split(now, read)) return {};
         fail(planned, exception);
-        const bool not_sent =
-            !pdu && pdu.error() != Fault::timeout && pdu.error() != Fault::damaged;
+        const bool not_sent = !pdu && pdu.error() != Fault::timeout && !was_heard(pdu.error());
         if (is_outdated(planned))
             schedule_.retry_at(read, now + (not_sent ? kRereadUnsent : kRereadAfterFailure));
     }

@@ -368,7 +368,8 @@ void Matcher::give_up(TimePoint now) {
     Transaction made;
     made.station = asked.pending.station;
     made.request = asked.pending.pdu;
-    made.end = asked.damaged || asked.wrong ? End::damaged : End::silent;
+    made.end = asked.damaged ? End::damaged : asked.wrong ? End::wrong : End::silent;
+    made.damaged = asked.damaged_bytes;
     made.doubtful = asked.doubtful;
     made.asked = asked.begin;
     made.sent = asked.end;

@@ -142,8 +142,8 @@ void Checker::check_fault(TimePoint now, const Open& open, Fault fault) {
         return fail("P5: nothing was sent while a request waited until its end");
     if (polite)
         return fail("P9: a polite client's request was answered: " + std::string(label(fault)));
-    const bool failed = fault == Fault::damaged || fault == Fault::offline ||
-                        (fault == Fault::timeout && !at_deadline);
+    const bool failed =
+        was_heard(fault) || fault == Fault::offline || (fault == Fault::timeout && !at_deadline);
     if (failed) fail("P4: a sound panel's request failed: " + std::string(label(fault)));
 }
 

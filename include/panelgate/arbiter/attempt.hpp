@@ -279,6 +279,8 @@ class Attempt {
     void teach(EchoMemory& memory) const;
     /// True if its own reply came damaged, but with the header intact, or without its beginning.
     bool came_damaged() const { return framer_.had_own_header() || beheaded_; }
+    /// True if its own reply came without its first bytes.
+    bool lost_beginning() const { return beheaded_; }
     /// True if what may have been its own reply broke off before its full length.
     bool was_cut_off() const { return framer_.was_damaged() && !framer_.was_damaged_whole(); }
     /// True if the station sent an exception for another function than was asked.

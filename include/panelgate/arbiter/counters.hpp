@@ -31,7 +31,7 @@ struct Symptoms {
     std::uint64_t long_answered = 0;  ///< replies of kLongReply bytes or more
     std::uint64_t long_damaged = 0;
     std::uint64_t strays = 0;   ///< runs of damaged bytes around good replies or unsolicited
-    std::uint64_t doubled = 0;  ///< repetitions of the last reply, or of its shape
+    std::uint64_t doubled = 0;  ///< repetitions of the last reply, or of its form
     std::uint64_t late = 0;     ///< replies after the response timeout
     std::uint64_t unasked = 0;  ///< unsolicited good frames
     std::uint64_t broadcast_replies = 0;  ///< good frames that answer a broadcast, which is wrong
@@ -41,6 +41,12 @@ struct Symptoms {
     std::uint64_t crc_swapped = 0;        ///< replies with swapped CRC bytes, otherwise right
     std::uint64_t lower_case = 0;         ///< damaged frames of ASCII in lower-case digits
     std::uint64_t trailed = 0;            ///< replies followed by bytes or a duplicate
+    std::uint64_t beheaded = 0;           ///< of all damaged: right but for lost first bytes
+    std::uint64_t torn = 0;          ///< of strays: pieces of a good frame that our request has cut
+    std::uint64_t old_replies = 0;   ///< a reply once more that is not the last one
+    std::uint64_t misaddressed = 0;  ///< of silent and disturbed: answered by another address
+    std::uint64_t repeated = 0;      ///< answered reads that went unanswered a while ago
+    std::uint64_t silences = 0;      ///< runs of unanswered attempts that an answer ended
 
     /// Attempts by the silence before them: below 2 ms, 4 ms, 8 ms … 256 ms, and above.
     /// silent_after counts only reads that were answered when soon asked again: no offline

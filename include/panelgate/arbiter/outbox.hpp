@@ -11,6 +11,7 @@
 #include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/attempt.hpp"
 #include "panelgate/arbiter/counters.hpp"
+#include "panelgate/arbiter/heard_before.hpp"
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/judge.hpp"
 #include "panelgate/arbiter/settings.hpp"
@@ -77,6 +78,11 @@ class Outbox {
     StationCounters& of(std::uint8_t station);
     Symptoms& symptoms_of(std::uint8_t station) { return of(station).symptoms; }
     void count_damaged(const Attempt& attempt);
+    void count_beside(const Attempt& attempt);
+    void join(ByteView bytes, std::uint8_t asked);
+    std::vector<modbus::Unused> frames_in(ByteView bytes, std::uint8_t asked) const;
+    bool is_answered_by_other(const Attempt& attempt,
+                              const std::vector<modbus::Unused>& frames) const;
     void remember_unanswered(const Attempt& attempt, std::uint64_t mute_before);
     void credit_unanswered(const Group& group);
 
@@ -94,6 +100,11 @@ class Outbox {
         std::size_t count = 0;
     };
     std::map<std::uint8_t, Unanswered> unanswered_;  ///< at most one per station
+    HeardBefore before_;
+    Bytes other_frame_;         ///< PDU that came from another station inside this attempt
+    Bytes cut_;                 ///< the last damaged bytes outside an attempt: may go on
+    std::uint8_t cut_for_ = 0;  ///< where they were counted
+    bool completed_ = false;    ///< ... did so inside this attempt
     std::map<std::uint8_t, StationCounters> stations_;
 };
 

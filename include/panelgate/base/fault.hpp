@@ -22,11 +22,16 @@ enum class Fault : std::uint8_t {
     damaged,     ///< transmitted, only damaged bytes received: outcome unknown
     offline,     ///< the station is known to be offline; never transmitted
     cancelled,   ///< the client disconnected, or the gateway is stopping
+    wrong,       ///< transmitted, only good frames that do not answer it: outcome
+                 ///< unknown
 };
 inline constexpr Fault kAllFaults[] = {Fault::denied,    Fault::malformed, Fault::not_routed,
                                        Fault::busy,      Fault::expired,   Fault::line_down,
                                        Fault::line_lost, Fault::timeout,   Fault::damaged,
-                                       Fault::offline,   Fault::cancelled};
+                                       Fault::offline,   Fault::cancelled, Fault::wrong};
+
+/// True if the station was heard, though its answer was not.
+constexpr bool was_heard(Fault fault) { return fault == Fault::damaged || fault == Fault::wrong; }
 
 /// Returns the label for logs and REST: "line_down".
 std::string_view label(Fault fault);

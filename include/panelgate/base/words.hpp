@@ -112,11 +112,12 @@ enum class Outcome : std::uint8_t {
     line_down,
     cached,  ///< answered from the cache
     shared,  ///< answered by another request's transaction
+    wrong,   ///< good frames of the panel came that do not answer it
 };
-inline constexpr std::array kAllOutcomes{Outcome::ok,        Outcome::exception, Outcome::timeout,
-                                         Outcome::damaged,   Outcome::refused,   Outcome::busy,
-                                         Outcome::expired,   Outcome::cancelled, Outcome::offline,
-                                         Outcome::line_down, Outcome::cached,    Outcome::shared};
+inline constexpr std::array kAllOutcomes{
+    Outcome::ok,     Outcome::exception, Outcome::timeout,   Outcome::damaged, Outcome::refused,
+    Outcome::busy,   Outcome::expired,   Outcome::cancelled, Outcome::offline, Outcome::line_down,
+    Outcome::cached, Outcome::shared,    Outcome::wrong};
 
 /// Returns the value of panelgate_requests_total{outcome} and of a transaction's event.
 std::string_view label(Outcome outcome);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <variant>
@@ -25,6 +26,7 @@ enum class End : std::uint8_t {
     silent,
     damaged,  ///< bytes came, but no good reply
     unasked,  ///< no reply is expected: a broadcast, or 08/0004
+    wrong,    ///< good frames of the station came that do not answer it
 };
 
 /// A request and its outcome.
@@ -43,6 +45,7 @@ struct Transaction {
     /// The values are not older than this: the first of the equal requests that the reply may
     /// answer.
     TimePoint sampled;
+    std::size_t damaged = 0;  ///< bytes that came and were no good frame
 };
 
 using Event = std::variant<Frame, Transaction>;

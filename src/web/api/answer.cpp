@@ -42,6 +42,7 @@ unsigned status_of(Fault fault) {
         case Fault::line_down:
         case Fault::line_lost:
         case Fault::damaged:
+        case Fault::wrong:
             return 502;
         case Fault::timeout:
         case Fault::offline:
@@ -74,6 +75,9 @@ const char* detail_of(Fault fault, bool transmitted) {
         case Fault::damaged:
             return transmitted ? "only damaged replies came back"
                                : "nothing was sent: the station's replies come damaged";
+        case Fault::wrong:
+            return transmitted ? "the station sent good frames that do not answer the request"
+                               : "nothing was sent: the station's replies do not fit";
         case Fault::offline:
             return transmitted ? "the station is silent; it is probed from time to time"
                                : "nothing was sent: the station is silent; it is probed from time "

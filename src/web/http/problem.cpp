@@ -40,6 +40,7 @@ constexpr ProblemKind kKinds[] = {
     {"line_down", "The line's device is not there.", 0},
     {"timeout", "The panel did not answer in time.", 0},
     {"damaged", "Only damaged replies came.", 0},
+    {"wrong", "Only good frames came that do not answer the request.", 0},
     {"offline", "The panel is silent and was not asked.", 0},
     {"busy", "The line's queue is full.", 0},
     {"expired", "The line could not take the request before its deadline.", 0},

@@ -11,6 +11,14 @@ function who({cause, name}) {
     return name ?? t(OF_LINES.includes(cause) ? 'finding.line' : 'finding.unlisted');
 }
 
+/** Nothing is damaged: bytes come where none should. */
+const isStrays = ({cause, figures}) => cause === 'noise' && 'strays' in figures && !('damaged' in figures);
+
+function textKeys(finding) {
+    if ('echoed_again' in finding.figures) return ['echo.again'];
+    return isStrays(finding) ? ['noise.strays'] : [finding.cause];
+}
+
 /** The keys of its sentences, the best first: the same cause may ask for another advice. */
 function adviceKeys({cause, figures}) {
     if ('echoed_again' in figures) return ['echo.again'];
@@ -20,6 +28,7 @@ function adviceKeys({cause, figures}) {
 
 function evidenceKeys({cause, figures}) {
     if ('echoed_again' in figures) return ['echo.again'];
+    if (isStrays({cause, figures})) return ['noise.strays'];
     return [cause === 'echo' && 'collided' in figures ? 'echo.none' : cause, 'damaged' in figures ? 'damage' : cause];
 }
 
@@ -32,8 +41,9 @@ function sentence(kind, keys, finding, own) {
 }
 
 /** What is wrong: {lang, text}. */
-export const findingText = (finding) => sentence('finding',
-    ['echoed_again' in (finding.figures ?? {}) ? 'echo.again' : finding.cause], finding, finding.text);
+export function findingText(finding) {
+    return sentence('finding', textKeys({...finding, figures: finding.figures ?? {}}), finding, finding.text);
+}
 
 /** What is wrong, what to do, and why that is thought. */
 export function findingNote(finding) {

@@ -177,6 +177,7 @@ export const words = {
 "ago": ["{what}, {ago} ago", "{what}, vor {ago}", "{what}, {ago} 전", "{what}、{ago} 前"],
 "outcome.timeout": ["no answer", "keine Antwort", "무응답", "無応答"],
 "outcome.damaged": ["damaged", "beschädigt", "손상", "破損"],
+"outcome.wrong": ["wrong answer", "falsche Antwort", "잘못된 응답", "誤った応答"],
 "outcome.exception": ["refused by the panel", "vom Panel abgelehnt", "패널이 거부", "パネルが拒否"],
 "outcome.refused": ["refused here", "hier abgelehnt", "게이트웨이가 거부", "ゲートウェイが拒否"],
 "outcome.busy": ["queue full", "Warteschlange voll", "대기열 가득 참", "待ち行列満杯"],

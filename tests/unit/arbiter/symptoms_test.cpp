@@ -205,5 +205,77 @@ TEST_F(SymptomsTest, WhatComesLongAfterABroadcastDoesNotAnswerIt) {
     EXPECT_EQ(of(18).broadcast_replies, 0u);
 }
 
+TEST_F(SymptomsTest, AGoodFrameThatDoesNotAnswerIsWrongInWhateverPiecesItComes) {
+    const Bytes longer = encode_adu(17, "03 08 00 01 00 02 00 03 12 34"_hex);
+    for (const std::size_t cut : {3u, 6u, 11u}) {
+        bus.submit(17, kRead);
+        bus.run_to_end_of_request();
+        bus.run_for(3ms);
+        bus.hear(ByteView(longer).first(cut));
+        bus.run_for(2ms);
+        bus.hear(ByteView(longer).subspan(cut));
+        bus.run_for(400ms);
+    }
+    EXPECT_EQ(of(17).wrong, 3u);
+    EXPECT_EQ(of(17).damaged(), 0u);
+}
+
+TEST_F(SymptomsTest, AFrameThatOurRequestCutsInTwoIsNoNoise) {
+    ask(17, kRead, encode_adu(17, kReply));
+    const Bytes unasked = encode_adu(18, "03 02 00 07"_hex);
+    bus.hear(ByteView(unasked).first(4));
+    bus.run_for(60ms);
+    bus.submit(17, kRead);
+    bus.run_to_end_of_request();
+    bus.hear(ByteView(unasked).subspan(4));
+    bus.run_for(5ms);
+    bus.hear(encode_adu(17, kReply));
+    bus.run_for(400ms);
+    EXPECT_EQ(of(17).strays, of(17).torn);
+    EXPECT_EQ(of(17).damaged(), 0u);
+    EXPECT_EQ(of(17).answered, 2u);
+}
+
+TEST_F(SymptomsTest, TheAnswerWithAnotherAddressIsCountedForTheAskedStation) {
+    ask(18, kRead, encode_adu(18, kReply));
+    ask(17, kRead, encode_adu(18, reply_number(7)));
+    ask(17, kRead, encode_adu(18, "03 02 00 07"_hex));  // another length answers nothing
+    EXPECT_EQ(of(17).misaddressed, 1u);
+    EXPECT_EQ(of(18).misaddressed, 0u);
+}
+
+TEST_F(SymptomsTest, AnEarlierReplyOnceMoreIsNoDuplicateOfTheLast) {
+    for (unsigned i = 1; i <= 3; ++i) ask(17, read_at(i), encode_adu(17, reply_number(i)));
+    hear(encode_adu(17, reply_number(1)));
+    EXPECT_EQ(of(17).old_replies, 1u);
+    EXPECT_EQ(of(17).doubled, 0u);
+}
+
+TEST_F(SymptomsTest, AReplyWithoutItsFirstByteIsKnownAsSuch) {
+    const Bytes reply = encode_adu(17, kReply);
+    ask(17, kRead, Bytes(reply.begin() + 1, reply.end()));
+    EXPECT_EQ(of(17).damaged_short, 1u);
+    EXPECT_EQ(of(17).beheaded, 1u);
+}
+
+TEST_F(SymptomsTest, AReadThatIsAnsweredWhenAskedAgainWasMissed) {
+    ask(17, read_at(1), {});
+    ask(17, read_at(2), encode_adu(17, reply_number(2)));
+    ask(17, read_at(1), encode_adu(17, reply_number(1)));
+    ask(17, read_at(3), {});
+    ask(17, read_at(2), encode_adu(17, reply_number(4)));
+    EXPECT_EQ(of(17).silences, 2u);
+    EXPECT_EQ(of(17).repeated, 1u) << "the third may be a place that it lacks";
+}
+
+TEST_F(SymptomsTest, AFrameOfNobodyIsCountedForTheStationThatItNames) {
+    ask(17, kRead, encode_adu(17, kReply));
+    hear(encode_adu(18, "03 02 00 07"_hex));
+    hear(encode_adu(99, "03 02 00 07"_hex));
+    EXPECT_EQ(of(17).unasked, 0u);
+    EXPECT_EQ(of(18).unasked, 1u);
+    EXPECT_EQ(of(0).unasked, 1u);
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter::symptoms_test

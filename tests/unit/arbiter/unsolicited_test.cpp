@@ -78,7 +78,8 @@ TEST_F(UnsolicitedFramesTest, AreClassifiedAndCounted) {
     EXPECT_EQ(counters().foreign_frames, 1u);
     EXPECT_EQ(heard(kAnswer), "foreign") << "it was outstanding once only";
     EXPECT_EQ(heard(encode_adu(99, kReply)), "foreign");
-    EXPECT_EQ(counters().symptoms.unasked, 2u);
+    EXPECT_EQ(counters().symptoms.unasked, 1u);
+    EXPECT_EQ(outbox.stations().at(0).symptoms.unasked, 1u) << "of the station that it names";
     EXPECT_EQ(counters().foreign_frames, 3u);
     const auto discarded = counters().discarded_bytes;
     EXPECT_EQ(heard("FF 00 FF"_hex), "damaged");

@@ -39,9 +39,10 @@ TEST_F(Diagnose, ForAPanelThatWritesInLowerCaseTheSettingIsNamed) {
 }
 
 TEST_F(Diagnose, AFewLateRepliesAmongManyAreNoTimeoutTooShort) {
-    const Symptoms seldom = Mix().answered(31).late(3, 300ms);
-    EXPECT_EQ(alone(Mix().answered(100).late(3, 300ms)), "");
-    EXPECT_EQ(alone(Mix().answered(30).late(3, 300ms)), "timeout-too-short 1");
+    const Symptoms seldom = Mix().answered(28).lost(3).late(3, 300ms);
+    EXPECT_EQ(alone(Mix().answered(97).lost(3).late(3, 300ms)), "");
+    EXPECT_EQ(alone(Mix().answered(27).lost(3).late(3, 300ms)), "timeout-too-short 1");
+    EXPECT_EQ(alone(Mix().answered(30).lost(3).late(9, 300ms)), "") << "none was owed";
     EXPECT_EQ(alone(seldom), "");
     EXPECT_EQ(causes({{1, seldom}}, {known(Cause::timeout_too_short, 1)}), "timeout-too-short 1");
     EXPECT_EQ(alone(Mix().answered(2).late(2, 300ms)), "") << "too little to tell";

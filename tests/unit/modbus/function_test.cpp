@@ -41,7 +41,7 @@ TEST(Exception, ReportsTheResultOfItsRequestToTheClient) {
         {Fault::denied, 0x01},    {Fault::malformed, 0x03}, {Fault::busy, 0x06},
         {Fault::expired, 0x06},   {Fault::line_down, 0x0A}, {Fault::not_routed, 0x0A},
         {Fault::cancelled, 0x0A}, {Fault::line_lost, 0x0B}, {Fault::timeout, 0x0B},
-        {Fault::damaged, 0x0B},   {Fault::offline, 0x0B}};
+        {Fault::damaged, 0x0B},   {Fault::offline, 0x0B},   {Fault::wrong, 0x0B}};
     for (const Fault fault : kAllFaults) {
         EXPECT_EQ(static_cast<unsigned>(to_exception(fault)), codes.at(fault)) << label(fault);
     }

@@ -128,7 +128,7 @@ class Line {
         }
     }
     static std::string words(const Transaction& one) {
-        static constexpr const char* kEnds[] = {"", "silent", "damaged", "unasked"};
+        static constexpr const char* kEnds[] = {"", "silent", "damaged", "unasked", "wrong"};
         std::string text = std::to_string(one.station) + ": " + name_of(one.request) + " -> ";
         text += one.end == End::answered ? name_of(one.reply)
                                          : kEnds[static_cast<std::size_t>(one.end)];

@@ -48,6 +48,9 @@ constexpr Row kRows[] = {
     {"10 31:read, 500 5:read, 3 5:value", "31: read -> silent; 5: read -> value"},
     {"10 31:read, 9000 silence", ""},
     {"10 31:read, 11000 silence", "31: read -> silent"},
+    // A good frame of another function, or of another length.
+    {"10 31:read, 3 31:04020005, 10 5:read, 3 5:value", "31: read -> wrong; 5: read -> value"},
+    {"10 31:read, 3 31:030400050006, 10 5:read, 3 5:value", "31: read -> wrong; 5: read -> value"},
     // A damaged reply.
     {"10 31:read, 3 31:value!, 500 31:read, 3 31:value", "31: read -> damaged; 31: read -> value"},
     // Bytes that belong to no frame.

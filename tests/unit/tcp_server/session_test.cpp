@@ -124,6 +124,7 @@ TEST_F(Session, P3TurnsEveryFaultOfTheBusIntoItsException) {
         {Fault::line_down, "83 0a"_hex}, {Fault::not_routed, "83 0a"_hex},
         {Fault::line_lost, "83 0b"_hex}, {Fault::timeout, "83 0b"_hex},
         {Fault::damaged, "83 0b"_hex},   {Fault::offline, "83 0b"_hex},
+        {Fault::wrong, "83 0b"_hex},
     };
     for (const auto& [fault, pdu] : expected)
         EXPECT_EQ(ask_bus(client, 1, read_pdu(0), fault), pdu) << label(fault);

@@ -34,7 +34,7 @@ TEST(Answer, OfAFaultHasItsStatusItsExceptionAndWhetherItLeft) {
         {Fault::expired, false, 503, 6},     {Fault::line_down, false, 502, 10},
         {Fault::line_lost, true, 502, 11},   {Fault::timeout, true, 504, 11},
         {Fault::damaged, true, 502, 11},     {Fault::offline, false, 504, 11},
-        {Fault::cancelled, false, 503, 10},
+        {Fault::cancelled, false, 503, 10},  {Fault::wrong, true, 502, 11},
     };
     for (const Row& row : kRows) {
         SCOPED_TRACE(label(row.fault));
@@ -48,7 +48,7 @@ TEST(Answer, OfAFaultHasItsStatusItsExceptionAndWhetherItLeft) {
         EXPECT_EQ(object.at("modbus_exception"), row.exception);
         EXPECT_EQ(object.at("transmitted"), row.transmitted);
     }
-    for (const Fault fault : {Fault::timeout, Fault::damaged, Fault::offline}) {
+    for (const Fault fault : {Fault::timeout, Fault::damaged, Fault::offline, Fault::wrong}) {
         EXPECT_TRUE(problem_of(fault, false).detail.starts_with("nothing was sent: "));
         EXPECT_FALSE(problem_of(fault, true).detail.starts_with("nothing was sent"));
     }
