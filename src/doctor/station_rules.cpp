@@ -311,7 +311,8 @@ void find_wrong_reply(Case& c, std::uint8_t station, const Symptoms& s) {
 void find_unasked_frames(Case& c, std::uint8_t station, const Symptoms& s) {
     if (station == 0) return;
     const Bar bar{c, Cause::unasked_frames, station};
-    const std::uint64_t others = s.wrong + misaddressed_elsewhere(c, station);
+    std::uint64_t others = s.wrong + misaddressed_elsewhere(c, station);
+    if (c.has(Cause::answers_broadcasts, station)) others += c.window.broadcasts;
     const std::uint64_t frames = beyond(s.unasked, others) + s.old_replies;
     if (frames < bar.enough(5) || frames * (bar.low ? 40 : 20) < s.attempts()) return;
     std::string advice = "Look in its settings for what it sends by itself.";
@@ -337,13 +338,14 @@ void find_unasked_frames(Case& c, std::uint8_t station, const Symptoms& s) {
 /// may have collided meanwhile, where the echo was waited for.
 void find_repeated_requests(Case& c, std::uint8_t station, const Symptoms& s) {
     if (station == 0 || !is_only_repeater(c, station, s)) return;
-    c.add(Cause::repeats_requests, station,
-          station_text(c, station, true) + " sends the request back before its reply.",
-          "Set `echo: off` if no adapter of this line hears what it sends; then look at the "
-          "panel's converter and its settings.",
-          share_text(s.echoes, s.attempts(), "requests to it") +
-              " came back, and hardly any to the others",
-          {{"echoes", s.echoes}, {"requests", s.attempts()}});
+    c.add(
+        Cause::repeats_requests, station,
+        station_text(c, station, true) + " sends requests back, before its reply or in its place.",
+        "Set `echo: off` if no adapter of this line hears what it sends; then look at the "
+        "panel's converter and its settings.",
+        share_text(s.echoes, s.attempts(), "requests to it") +
+            " came back, and hardly any to the others",
+        {{"echoes", s.echoes}, {"requests", s.attempts()}});
 }
 
 /// It is silent now and then, and seldom twice in a row, also to what it answers at other times.

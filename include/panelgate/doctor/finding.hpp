@@ -44,7 +44,7 @@ enum class Cause : std::uint8_t {
     gap_too_short,       ///< a panel misses requests that closely follow another frame
     unasked_frames,      ///< a panel sends without being asked
     station_silent,      ///< one panel is off or has another address: not a fault of the line
-    repeats_requests,    ///< a panel sends the request back before its reply
+    repeats_requests,    ///< a panel sends requests back, before its reply or in its place
     misses_requests,     ///< a panel leaves requests unanswered that it answers at other times
 };
 /// Returns the code, such as "wrong-baud", used in REST and in the log. Stable.

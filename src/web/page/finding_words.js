@@ -25,7 +25,7 @@ export const words = {
 "finding.gap-too-short": ["{who} misses requests right after another frame.", "{who} überhört Anfragen direkt hinter einem anderen Telegramm.", "{who}: 다른 프레임 바로 뒤의 요청을 놓칩니다.", "{who}:他のフレーム直後の要求を取りこぼします。"],
 "finding.unasked-frames": ["{who} sends unsolicited frames.", "{who} sendet unaufgefordert Telegramme.", "{who}: 요청하지 않은 프레임을 보냅니다.", "{who}:要求していないフレームを送ります。"],
 "finding.station-silent": ["{who} does not answer; others do.", "{who} antwortet nicht; andere schon.", "{who}: 응답하지 않습니다. 다른 국은 응답합니다.", "{who}:応答しません。他の局は応答します。"],
-"finding.repeats-requests": ["{who} sends the request back before its reply.", "{who} sendet vor der Antwort die Anfrage zurück.", "{who}: 응답 앞에 요청을 되돌려 보냅니다.", "{who}:応答の前に要求を送り返します。"],
+"finding.repeats-requests": ["{who} sends requests back.", "{who} sendet Anfragen zurück.", "{who}: 요청을 되돌려 보냅니다.", "{who}:要求を送り返します。"],
 "finding.misses-requests": ["{who} answers only some of the requests.", "{who} beantwortet nur einen Teil der Anfragen.", "{who}: 요청 일부에만 응답합니다.", "{who}:要求の一部にしか応答しません。"],
 "finding.unlisted": ["an unlisted station", "eine nicht gelistete Station", "미등록 국", "未登録局"],
 "advice.echo": ["Set `echo: auto`.", "`echo: auto` einstellen.", "`echo: auto`로 설정하십시오.", "`echo: auto` に設定してください。"],

@@ -58,6 +58,9 @@ TEST_F(Innocent, FramesInTheFormOfTheLastReplyAreNoSecondPanelWhereTheyHaveAnoth
     const Symptoms to_all =
         Mix().answered(300).with(&Symptoms::broadcast_replies, 12).with(&Symptoms::doubled, 21);
     EXPECT_EQ(beside_6(to_all), "answers-broadcasts 5");
+    const Symptoms later =
+        Mix().answered(150).with(&Symptoms::broadcast_replies, 12).with(&Symptoms::unasked, 12);
+    EXPECT_EQ(beside_6(later), "answers-broadcasts 5") << "some of its answers come late";
 }
 
 TEST_F(Innocent, APanelThatAnswersUnderItsNeighboursAddressIsNeitherOffNorIsTheNeighbourTwo) {
