@@ -69,7 +69,7 @@ constexpr Row kRows[] = {
     station(wrong_exception, {&S::wrong_exceptions}, {}, find_wrong_exception),
     station(wrong_reply, {&S::wrong, &S::misaddressed}, causes(wrong_exception), find_wrong_reply),
     station(answers_broadcasts, {&S::broadcast_replies}, {}, find_broadcast_replies),
-    station(duplicate_address, {&S::doubled}, causes(echo) | kFormat | kEncoding,
+    station(duplicate_address, {&S::doubled, &S::unasked}, causes(echo) | kFormat | kEncoding,
             find_duplicate_address),
     station(damaged_replies, kDamage, causes(echo, duplicate_address) | kFormat | kEncoding,
             find_damage),

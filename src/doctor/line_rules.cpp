@@ -129,11 +129,11 @@ void find_overrun(Case& c) {
 
 namespace {
 
-/// True if bytes follow most replies. Duplicates are duplicate_address.
+/// True if bytes follow most replies: not frames, as of a second panel.
 bool trails(const Case& c, std::uint8_t station, const Symptoms& s) {
     Bar bar{c, Cause::trailing_bytes, named(station)};
     bar.low = bar.low || c.is_standing(Cause::trailing_bytes);
-    const std::uint64_t followed = s.trailed - std::min(s.trailed, s.doubled);
+    const std::uint64_t followed = beyond(s.trailed, s.doubled + s.unasked);
     return followed >= bar.enough(5) && followed * (bar.low ? 4 : 2) >= s.answered;
 }
 

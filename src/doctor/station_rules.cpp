@@ -49,15 +49,17 @@ void add_duplicate(Case& c, std::uint8_t station, const Symptoms& s) {
     const bool others_are_fine =
         c.all.answered > s.answered && c.all.damaged() == s.damaged() && c.all.doubled == s.doubled;
     Figures figures = damage_figures(s);
-    figures["doubled"] = s.doubled;
+    const std::uint64_t came = s.doubled > 0 ? s.doubled : s.unasked;
+    figures["doubled"] = came;
     c.add(Cause::duplicate_address, station, "Two panels seem to have the address " + address + ".",
           std::string("Take the panel off the line: when the address still answers, find the other "
                       "one and change it. If no panel answers, ") +
               (twice ? "this panel or a repeater sends everything twice: set its "
                        "`timing.frame_gap` so long that the second reply has passed."
                      : "look at this panel's cable and communication settings."),
-          std::to_string(s.doubled) + " replies came twice; " + damage_text(c, s) +
-              (others_are_fine ? "; the other stations are fine" : ""),
+          std::to_string(came) +
+              (s.doubled > 0 ? " replies came twice; " : " frames came beside the replies; ") +
+              damage_text(c, s) + (others_are_fine ? "; the other stations are fine" : ""),
           std::move(figures));
 }
 
@@ -118,15 +120,20 @@ void find_duplicate_address(Case& c, std::uint8_t station, const Symptoms& s) {
     const bool masters =
         c.has(Cause::other_master) && (s.unasked + c.all.requests) * 2 >= s.doubled;
     // A second panel answers each request once, at most: more than that comes by itself.
-    const bool by_itself = s.doubled + beyond(s.unasked, s.wrong) > s.attempts();
-    if (station == 0 || masters || by_itself) return;
+    const std::uint64_t beside = beyond(s.unasked, s.wrong + misaddressed_elsewhere(c, station));
+    const bool by_itself = s.doubled + beside > s.attempts();
+    if (station == 0 || masters) return;
     const Bar bar{c, Cause::duplicate_address, station};
     const std::uint64_t twice = beyond(s.doubled, explained_copies(c, station, s));
     const std::uint64_t left = beyond(s.damaged(), unheard_late_replies(c, station));
     const bool mixed = twice >= 1 && left >= bar.enough(3) && is_damaged_more(c, s);
     // A reply that comes after its timeout is taken for the retry's, and the retry's own follows.
     const bool from_retries = s.silent >= twice && twice * 4 < s.answered;
-    if ((twice >= bar.enough(3) && !from_retries) || mixed) add_duplicate(c, station, s);
+    const bool often = twice >= bar.enough(3) && !from_retries;
+    // Two answers that differ, and others that have run into each other.
+    const bool both = beside >= bar.enough(3) && left >= bar.enough(3) &&
+                      may_have_second_sender(s) && is_damaged_more(c, s);
+    if (both || (!by_itself && (often || mixed))) add_duplicate(c, station, s);
 }
 
 void find_damage(Case& c, std::uint8_t station, const Symptoms& s) {

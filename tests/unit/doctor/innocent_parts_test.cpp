@@ -111,6 +111,16 @@ TEST_F(Innocent, WhatComesUnaskedMayHaveTheFormOfTheLastReply) {
     EXPECT_EQ(beside_6(twins), "duplicate-address 5");
 }
 
+TEST_F(Innocent, TwoAnswersThatDifferAndOthersRunIntoEachOtherAreTwoPanels) {
+    const Symptoms two = Mix()
+                             .answered(20)
+                             .with(&Symptoms::damaged_long, 20)
+                             .with(&Symptoms::damaged_heads, 20)
+                             .with(&Symptoms::unasked, 40);
+    EXPECT_EQ(beside_6(two), "duplicate-address 5");
+    EXPECT_THAT(finding_of_5(two).evidence, HasSubstr("40 frames came beside the replies"));
+}
+
 TEST_F(Innocent, EarlierRepliesOnceMoreAreNoSecondPanel) {
     const Symptoms lag = Mix().answered(300).with(&Symptoms::old_replies, 250);
     EXPECT_EQ(beside_6(lag), "unasked-frames 5");
