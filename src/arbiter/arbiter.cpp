@@ -386,7 +386,7 @@ void Arbiter::start(TimePoint now, Group group) {
         timing.wake_latency = wake_latency_.early();
         timing.drift = station.clock_drift();
         timing.echoes = echo_memory_.expects_one();
-        timing.as_asked = unusual_ == 0 && station.answers_as_asked() && echo_memory_.known();
+        timing.as_asked = station.answers_as_asked() && echo_memory_.known();
     }
     if (!group.request.is_read()) memory_.on_write(now, group.station, group.request);
     outbox_.written(group, false);

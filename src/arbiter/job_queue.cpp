@@ -327,10 +327,10 @@ std::optional<JobQueue::Victim> JobQueue::find_victim(const Job& newcomer) const
         if (!greedier && (load < mine || !replaces_reads)) return false;
         auto victim = victim_in(at);
         const bool writes_too = greedier && (write || 2 * of_its_host > size_);
-        if (!victim || (victim->is_write && !writes_too)) return false;
+        if (!victim || (!victim->is_no_write && !writes_too)) return false;
         const int level = !greedier ? 0 : is_own ? 1 : 2;
         victim->greed = {level, of_its_host, at.source.counting};
-        if (!best || *best < *victim) best = victim;
+        if (!best || best->merit() < victim->merit()) best = victim;
         return false;
     });
     return best;
@@ -348,12 +348,12 @@ std::optional<JobQueue::Victim> JobQueue::victim_in(const Found& at) const {
         const bool frees = !span || reads_.frees(job.ticket, *span);
         if (!frees && (found || !reads_.counts(job.ticket, *span))) continue;
         const std::size_t rank = rank_of(job);
-        found = Victim{at.place, i, frees, rank == kWrite, {}, {frees, rank, job.ticket}};
+        found = Victim{{}, rank != kWrite, frees, rank, job.ticket, at.place, i};
         if (frees) break;
     }
     const auto younger_beyond = [&](const auto& other) {
         const bool beyond = other.first != station && (station == 0 || other.first == 0);
-        return beyond && other.second.jobs.back().job.ticket > jobs[found->index].job.ticket;
+        return beyond && other.second.jobs.back().job.ticket > found->ticket;
     };
     if (found && std::ranges::any_of(at.source.lanes, younger_beyond)) return std::nullopt;
     return found;

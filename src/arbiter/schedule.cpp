@@ -20,6 +20,10 @@ std::uint32_t known_length(const Station& station, const modbus::Span& span) {
                             : std::min(limit, station.replies().reads().longest(span.table));
 }
 
+void append(Jobs& jobs, Jobs more) {
+    jobs.insert(jobs.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
+}
+
 }  // namespace
 
 Group Sharing::gather(Job leader, const Station& station, const OutstandingRequests& book,
@@ -27,19 +31,13 @@ Group Sharing::gather(Job leader, const Station& station, const OutstandingReque
     Group group{.station = leader.station, .request = leader.request};
     if (share_ && !leader.alone) group.span = leader.request.span();
     group.jobs.push_back(std::move(leader));
-    while (group.span) {
-        const std::uint32_t before = group.span->count;
-        for (Job& job : queue.take_reads(group.station, [&](const Job& other) {
-                 if (!joins(group, other, station, book)) return false;
-                 group.span = join(*group.span, *other.request.span());
-                 return true;
-             })) {
-            group.jobs.push_back(std::move(job));
-        }
-        if (group.span->count == before) break;
-    }
-    if (group.span && group.span != group.request.span())
-        group.request = modbus::Request::read(*group.span);
+    if (!group.span) return group;
+    append(group.jobs, queue.take_reads(group.station, [&](const Job& other) {
+        if (!joins(group, other, station, book)) return false;
+        group.span = join(*group.span, *other.request.span());
+        return true;
+    }));
+    if (group.span != group.request.span()) group.request = modbus::Request::read(*group.span);
     return group;
 }
 
@@ -78,14 +76,6 @@ Bytes Sharing::part_for(const Group& group, const Bytes& reply, const Job& job) 
     if (job.request == group.request || modbus::exception_of(reply)) return reply;
     return slice_reply(*group.span, reply, *job.request.span());
 }
-
-namespace {
-
-void append(Jobs& jobs, Jobs more) {
-    jobs.insert(jobs.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
-}
-
-}  // namespace
 
 bool Backlog::has(Client client, std::uint8_t station) const {
     const auto theirs = [&](const Job& job) {

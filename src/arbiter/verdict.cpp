@@ -137,7 +137,6 @@ void Arbiter::settle(TimePoint now) {
     if (!takes_reply(now, station, early)) return;
     pace_.on_reply(early);
     pace_.on_rate(active_->pace().hasty());
-    unusual_ = active_->pace().is_shorter() ? Station::kUnusualReplies : std::max(unusual_ - 1, 0);
     if (const auto& look = active_->pace().end_look()) wake_latency_.on_look(look->whole);
     Attempt attempt = take_active(now);
     Group& group = attempt.group();

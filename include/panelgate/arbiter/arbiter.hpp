@@ -42,20 +42,7 @@ TimePoint latest_start(const SerialFormat& serial, const Job& job);
 ///     alarm at arbiter.next_deadline();
 ///
 /// A line starts down: on_line_up comes first. Acting on an action may call the arbiter again: the
-/// same loop delivers what that adds. The promises (P1…P9) are those of the README.
-///
-// clang-format off
-/// | state    | is when                    | leaves on              | then                        |
-/// |----------|----------------------------|------------------------|-----------------------------|
-/// | down     | no on_line_up yet, or down | on_line_up             | quiet; replies outstanding  |
-/// | quiet    | gap or rest (Quiet)        | its end                | retry, probe or next job    |
-/// | sending  | an attempt, before its end | its last bit           | broadcast: quiet; waiting   |
-/// | waiting  | an attempt, after its end  | reply, damage, timeout | settle or outstanding, then |
-/// |          |                            |                        | retry, split or answer      |
-/// | resting  | a reply is outstanding     | reply, or time is over | its jobs may run again      |
-/// | doubtful | time over; the transport   | Reset, down, up        | as after down               |
-/// |          | may stall, unproved        |                        |                             |
-// clang-format on
+/// same loop delivers what that adds. The states and the promises (P1…P9) are those of the README.
 class Arbiter {
   public:
     explicit Arbiter(Settings settings);
@@ -182,7 +169,6 @@ class Arbiter {
     UnsolicitedFrames unsolicited_;
     Pace pace_;
     WakeLatency wake_latency_;
-    int unusual_ = 0;  ///< replies until exceptions are no longer expected
     ReadCache memory_;
     Ticket last_ticket_ = 0;
     EchoMemory echo_memory_;

@@ -128,19 +128,16 @@ class JobQueue {
     };
     /// A job that may be dropped: the greatest is.
     struct Victim {
-        Place place;
-        std::size_t index = 0;
-        bool makes_room = false;
-        bool is_write = false;
         /// How greedy it is beside the newcomer, what its host has waiting, and its client.
         std::tuple<int, std::size_t, std::size_t> greed;
-        /// Whether it makes room, its class, and its age. A write goes last.
-        std::tuple<bool, std::size_t, Ticket> merit;
+        bool is_no_write = false;  ///< a write goes last
+        bool makes_room = false;
+        std::size_t rank = 0;
+        Ticket ticket = 0;
+        Place place;
+        std::size_t index = 0;
 
-        bool operator<(const Victim& other) const {
-            return std::tuple(greed, !is_write, merit) <
-                   std::tuple(other.greed, !other.is_write, other.merit);
-        }
+        auto merit() const { return std::tie(greed, is_no_write, makes_room, rank, ticket); }
     };
 
     static std::size_t rank_of(const Job& job);

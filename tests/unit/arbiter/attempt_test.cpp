@@ -357,6 +357,11 @@ TEST_F(AttemptPaceTest, AnEchoIsLookedAtWhenItCanHaveComeBack) {
     EXPECT_EQ(attempt_.busy_until(), std::nullopt);
 }
 
+TEST_F(AttemptTest, AFrameThatBrokeOffDoesNotHoldUpTheReplyBehindIt) {
+    EXPECT_EQ(hear(5ms, "12 03 20"_hex), Verdict::open) << "of another station";
+    EXPECT_EQ(hear(60ms, kReplyAdu), Verdict::replied);
+}
+
 TEST_F(AttemptTest, AFrameOfAnotherFunctionLeavesTheReplyItsUsualTime) {
     EXPECT_EQ(hear(10ms, encode_adu(kStation, "04 02 00 01"_hex)), Verdict::open);
     EXPECT_EQ(run_to_verdict(), Verdict::wrong) << "it may be meant for another master";

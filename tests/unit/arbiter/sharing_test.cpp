@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -53,6 +54,8 @@ TEST_F(SharingTest, P6ContainedReadsComeAlongAndTouchingOnesUpToWhatTheProfileVo
     const Row rows[] = {
         // Contained ones, whatever is known of the station.
         {{registers(12, 3), registers(10, 10)}, registers(10, 10), 0, 3, registers(10, 10)},
+        // A wider one, which a client asked for itself.
+        {{registers(10, 10)}, registers(12, 2), 0, 2, registers(10, 10)},
         // Touching ones, also by one that lies between.
         {{registers(14, 2), registers(12, 2)}, registers(10, 2), 125, 3, registers(10, 6)},
         // Nothing is read that no client asked for.
@@ -68,7 +71,9 @@ TEST_F(SharingTest, P6ContainedReadsComeAlongAndTouchingOnesUpToWhatTheProfileVo
         const Group group = gather(row.leader, station_that_takes(row.vouched));
         EXPECT_EQ(group.jobs.size(), row.jobs);
         EXPECT_EQ(group.request.pdu(), row.request);
-        EXPECT_EQ(group.joined(), row.request != row.leader);
+        const bool is_asked =
+            row.request == row.leader || std::ranges::count(row.waiting, row.request) > 0;
+        EXPECT_EQ(group.joined(), !is_asked);
         EXPECT_EQ(queue_.waiting(), row.waiting.size() + 1 - row.jobs);
     }
 }

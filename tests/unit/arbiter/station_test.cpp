@@ -275,6 +275,28 @@ TEST_F(StationTest, P9AReadGoesBehindAWriteThatItIgnoredOrFourThatItAnswered) {
     EXPECT_TRUE(station_.has_read_turn()) << "while it rests others have the turns between";
 }
 
+TEST_F(StationTest, AskingAgainForADoubtfulAnswerCountsAsNoRetry) {
+    Group group = group_of(kId, kRead);
+    group.attempts = 2;
+    EXPECT_FALSE(station_.may_retry(group));
+    group.doubts = 1;
+    EXPECT_TRUE(station_.may_retry(group));
+}
+
+TEST_F(StationTest, AnExceptionOrDamageIsExpectedAgainUntilSixteenRepliesHaveCome) {
+    const auto answer_as_asked = [&](int times) {
+        for (int i = 0; i < times; ++i) answer(kRead, kReply);
+    };
+    EXPECT_TRUE(station_.answers_as_asked());
+    answer(kRead, "83 02"_hex);
+    answer_as_asked(Station::kUnusualReplies - 1);
+    EXPECT_FALSE(station_.answers_as_asked());
+    answer_as_asked(1);
+    EXPECT_TRUE(station_.answers_as_asked());
+    miss(kRead, Verdict::damaged);
+    EXPECT_FALSE(station_.answers_as_asked());
+}
+
 TEST_F(StationTest, P4AReadDecidesBeforeUnansweredWritesTakeItOffline) {
     answer(kRead, kReply);
     for (int i = 0; i < 2; ++i) station_.on_given_up(now_, Fault::timeout, false);

@@ -98,6 +98,21 @@ TEST_F(StationsTest, P4AFlakyStationHasAShortWaitOnlyWhereAnotherHasAnsweredSinc
     EXPECT_FALSE(stations_.flaky_beside_others(now_ + 1min, flaky)) << "nobody else is there";
 }
 
+TEST_F(StationsTest, P4OneThatHasUsedUpItsShareIsNotRetriedWhereOthersAnswer) {
+    answer(1);
+    const auto fail = [&] {
+        now_ += 500ms;
+        stations_.on_failed(now_, test::group_of(1, kRead), Verdict::damaged, 500ms);
+        answer(2);
+        return stations_.affords_retry(now_, stations_.of(1));
+    };
+    EXPECT_TRUE(fail()) << "two whole timeouts are free";
+    for (int times = 0; times < 4; ++times) fail();
+    EXPECT_FALSE(fail());
+    now_ += timing::kOthersActive;
+    EXPECT_TRUE(stations_.affords_retry(now_, stations_.of(1))) << "nobody else is there";
+}
+
 TEST_F(StationsTest, P4WhatOneLosesShortensTheWaitsBehindItAlsoOnceItHasAnswered) {
     for (int i = 0; i < 20; ++i) {
         answer(1);
