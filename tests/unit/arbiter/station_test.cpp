@@ -240,20 +240,6 @@ TEST_F(StationTest, P4OneThatWasNeverHeardIsNowAndThenWaitedForLonger) {
     EXPECT_LE(longer, 10);
 }
 
-TEST_F(StationTest, P4AWriteThatItIgnoresDoesNotKeepReadsFromShowingThatItIsBack) {
-    answer(kRead, kReply);
-    while (!station_.health().offline()) {
-        miss(kRead);
-        station_.on_given_up(now_, Fault::timeout);
-    }
-    now_ += 10s;
-    EXPECT_TRUE(station_.take_half_open(now_, false));
-    now_ += 10s;
-    EXPECT_FALSE(station_.take_half_open(now_, false));
-    station_.on_asked(book_, now_, group_of(kId, kRead));
-    EXPECT_TRUE(station_.take_half_open(now_, false));
-}
-
 TEST_F(StationTest, P9AReadGoesBehindAWriteThatItIgnoredOrFourThatItAnswered) {
     const auto ask = [&](const Bytes& pdu) { station_.on_asked(book_, now_, group_of(kId, pdu)); };
     const modbus::Request write = test::request_of(kWrite);
@@ -273,14 +259,6 @@ TEST_F(StationTest, P9AReadGoesBehindAWriteThatItIgnoredOrFourThatItAnswered) {
     EXPECT_FALSE(station_.has_read_turn());
     ask(kWrite);
     EXPECT_TRUE(station_.has_read_turn()) << "while it rests others have the turns between";
-}
-
-TEST_F(StationTest, AskingAgainForADoubtfulAnswerCountsAsNoRetry) {
-    Group group = group_of(kId, kRead);
-    group.attempts = 2;
-    EXPECT_FALSE(station_.may_retry(group));
-    group.doubts = 1;
-    EXPECT_TRUE(station_.may_retry(group));
 }
 
 TEST_F(StationTest, AnExceptionOrDamageIsExpectedAgainUntilSixteenRepliesHaveCome) {

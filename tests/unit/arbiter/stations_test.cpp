@@ -138,6 +138,27 @@ TEST_F(StationsTest, P1AProofIsAwaitedNoLongerThanItsStationHasEverNeeded) {
     EXPECT_EQ(stations_.patience(now_, proof), stations_.of(1).usual());
 }
 
+TEST_F(StationsTest, P4AWriteThatItIgnoresDoesNotKeepReadsFromShowingThatItIsBack) {
+    answer(1);
+    kill(1, 100ms);
+    Station& station = stations_.of(1);
+    now_ += 10s;
+    EXPECT_TRUE(station.take_half_open(now_, false));
+    now_ += 10s;
+    EXPECT_FALSE(station.take_half_open(now_, false));
+    station.on_asked(stations_.book(), now_, test::group_of(1, kRead));
+    EXPECT_TRUE(station.take_half_open(now_, false));
+}
+
+TEST_F(StationsTest, AskingAgainForADoubtfulAnswerCountsAsNoRetry) {
+    answer(1);
+    Group group = test::group_of(1, kRead);
+    group.attempts = 2;
+    EXPECT_FALSE(stations_.of(1).may_retry(group));
+    group.doubts = 1;
+    EXPECT_TRUE(stations_.of(1).may_retry(group));
+}
+
 TEST_F(StationsTest, P4UnheardStationsDoNotUseUpTheProbeBudgetOfOthers) {
     constexpr std::uint8_t kStranger = 200;
     answer(1);
