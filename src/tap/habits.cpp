@@ -25,9 +25,18 @@ std::optional<Duration> GiveUp::least() const {
     return *std::ranges::min_element(seen_);
 }
 
-void Habits::answered(Duration think) {
+void BroadcastHabit::answered(TimePoint now) {
+    constexpr Duration kLatest = 1200ms;  // the latest answer that was seen came after a second
+    none_ = none_ || (since_ && now - *since_ >= kLatest);
+}
+
+void Habits::answered(Duration think, bool differs) {
     constexpr int kMemory = 64;  // replies, until one slow reply is nearly forgotten
     longest_ = longest_ ? std::max(think, *longest_ - (*longest_ - think) / kMemory) : think;
+    if (differs) {
+        differing_.push_back(think);
+        if (differing_.size() > kThinks) differing_.pop_front();
+    }
     thinks_.push_back(think);
     if (thinks_.size() > kThinks) thinks_.pop_front();
 }
@@ -37,6 +46,16 @@ std::optional<Duration> Habits::usual_think() const {
     std::deque<Duration> sorted = thinks_;
     std::ranges::sort(sorted, std::greater<>());
     return sorted[sorted.size() / kSlower];
+}
+
+bool Habits::is_too_soon(Duration think) const {
+    return differing_.size() >= kSome && think < *std::ranges::min_element(differing_) * 3 / 4;
+}
+
+bool Habits::seems_too_soon(Duration think) {
+    if (hasty_ == kHasty || differing_.size() < kThinks || !is_too_soon(think)) return false;
+    ++hasty_;
+    return true;
 }
 
 void Habits::asks(const Bytes& pdu) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "frames.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
@@ -13,14 +14,6 @@ namespace panelgate::tap {
 
 namespace {
 
-/// Shorter than nearly all masters' timeouts: an adapter's latency timer plus a panel's think time.
-constexpr Duration kQuickest = 30ms;
-
-/// The same, as far as nothing is known of its panel.
-constexpr Duration kAtOnce = 20ms;
-
-ByteView pdu_of(const Piece& piece) { return modbus::pdu_of(piece.bytes); }
-
 Bytes copy_of(ByteView bytes) { return Bytes(bytes.begin(), bytes.end()); }
 
 bool has_form_of_reply(ByteView frame) {
@@ -28,8 +21,6 @@ bool has_form_of_reply(ByteView frame) {
     const modbus::ReplyLength length = modbus::reply_length(frame);
     return length.kind == modbus::ReplyLength::Kind::by_silence || length.length == frame.size();
 }
-
-bool is_read(ByteView pdu) { return pdu[0] <= modbus::kReadInputRegisters; }
 
 /// True if so many damaged bytes are its reply, which is not owed any more. A few may be lost.
 bool is_damaged_reply(ByteView request, std::size_t damaged) {
@@ -76,6 +67,7 @@ void Matcher::on_line_down(TimePoint now) {
     for (auto& [id, habits] : habits_) {
         book_.settle(id);
         habits.owed = 0;
+        habits.broadcasts.missed();
     }
     noise_ = false;
 }
@@ -113,111 +105,19 @@ void Matcher::take(Piece piece) {
     }
 }
 
-/// Decides the candidate by the next piece. True if `piece` is consumed.
-bool Matcher::resolve(Piece& piece) {
-    Piece candidate = *std::exchange(candidate_, std::nullopt);
-    const bool echo = std::ranges::equal(asked_->pending.pdu, pdu_of(candidate));
-    if (echo ? resolve_echo(candidate, piece) : resolve_read(candidate, piece)) return true;
-    // It was cut as an answer to the request that is answered now.
-    if (piece.kind == Piece::Kind::answer)
-        piece.kind = piece.ambiguous ? Piece::Kind::request : Piece::Kind::reply;
-    return false;
-}
-
-/// If the same bytes follow at once, that is the answer, and the candidate was the repeated
-/// request; if the master goes on sooner than it has waited before, the candidate was the answer.
-bool Matcher::resolve_echo(Piece& candidate, Piece& piece) {
-    const Duration waited = candidate.begin - asked_->end;
-    const Duration behind = piece.begin - candidate.end;
-    const bool same = piece.kind != Piece::Kind::damaged && piece.bytes == candidate.bytes;
-    if (same && behind <= quick(of(asked_->pending.station))) {
-        give_up(piece.begin);
-        ask(candidate, false);
-        answer(std::move(piece), true);
-        return true;
-    }
-    // Frames of functions without a length rule may be missed in between, where an adapter joins
-    // them.
-    const bool known = modbus::is_known(asked_->pending.pdu.front());
-    const bool goes_on =
-        known && piece.kind != Piece::Kind::damaged && behind < waited - waited / 4;
-    answer(std::move(candidate), !goes_on);
-    return false;
-}
-
-/// The candidate has the form of a read of the same function. It was one if the same follows, or
-/// what answers it.
-bool Matcher::resolve_read(Piece& candidate, Piece& piece) {
-    const Habits& habits = of(asked_->pending.station);
-    const Duration waited = candidate.begin - asked_->end;
-    const Duration behind = piece.begin - candidate.end;
-    const bool heard = piece.kind != Piece::Kind::damaged;
-    const bool is_asked = habits.has_asked(pdu_of(candidate));
-    const bool same = heard && piece.bytes == candidate.bytes;
-    const bool answers = heard && !same && piece.bytes.front() == candidate.bytes.front() &&
-                         modbus::answers(pdu_of(candidate), pdu_of(piece)) &&
-                         !habits.has_asked(pdu_of(piece));
-    if (!same && !answers) {
-        answer(std::move(candidate), !heard || is_asked || behind >= waited - waited / 4);
-        return false;
-    }
-    give_up(candidate.begin);
-    ask(candidate, false);
-    if (answers) {
-        answer(std::move(piece), !is_asked);
-    } else {
-        on_request(std::move(piece));
-    }
-    return true;
-}
-
 void Matcher::on_answer(Piece piece) {
     if (!piece.ambiguous) return answer(std::move(piece), false);
     switch (read(piece)) {
-        case Reading::answer:
-            return answer(std::move(piece), false);
+        case Reading::answer: {
+            const bool too_soon = comes_too_soon(piece);
+            return answer(std::move(piece), too_soon);
+        }
         case Reading::request:
             return on_request(std::move(piece));
         case Reading::open:
             candidate_ = std::move(piece);
             return;
     }
-}
-
-/// Classifies an answer that may also be a request: at the station's usual time it is the answer,
-/// unless its master is known to ask that; after the master's timeout it is the request; in between
-/// it is open.
-Matcher::Reading Matcher::read(const Piece& piece) const {
-    const Habits& habits = habits_.at(asked_->pending.station);
-    const Duration waited = piece.begin - asked_->end;
-    if (waited >= patience(habits)) return Reading::request;
-    if (habits.has_asked(pdu_of(piece))) return Reading::open;
-    return waited <= usual(habits) ? Reading::answer : Reading::open;
-}
-
-/// The station answers so soon as a rule, and no master repeats a request so soon.
-Duration Matcher::usual(const Habits& habits) const {
-    constexpr Duration kJitter = 2ms;
-    const Duration think = habits.usual_think().value_or(Duration::zero());
-    return std::min(patience(habits), std::max(think + think / 8 + kJitter, kAtOnce));
-}
-
-/// A time that any master waits at least.
-Duration Matcher::quick(const Habits& habits) const {
-    const Duration usual = habits.longest_think().value_or(Duration::zero());
-    return std::min(patience(habits), std::max<Duration>(2 * usual + 10ms, kQuickest));
-}
-
-/// A time after which a master has given up.
-Duration Matcher::patience(const Habits& habits) const {
-    auto least = habits.give_up.least();
-    if (!least && !habits.give_up.is_different()) least = give_up_.least();
-    return least ? *least - *least / 16 : settings_.usual_give_up;
-}
-
-std::optional<TimePoint> Matcher::resolved_at() const {
-    if (!candidate_) return std::nullopt;
-    return candidate_->end + patience(habits_.at(asked_->pending.station));
 }
 
 void Matcher::answer(Piece piece, bool in_doubt) {
@@ -228,14 +128,11 @@ void Matcher::answer(Piece piece, bool in_doubt) {
     const Duration think = std::max<Duration>(piece.begin - asked.end, Duration::zero());
     const std::uint8_t station = asked.pending.station;
     const arbiter::Claims claimed = claims(piece, request);
-    const bool missed_request = asked.damaged_bytes >= modbus::kMinAdu;  // a request, perhaps
+    const bool broadcast = may_answer_broadcast(piece, true);
     const bool overdue = piece.begin - asked.end >= patience(habits);
-    // For a function without a length rule, frames may be missed where an adapter joins them.
-    const bool unknown_length =
-        !modbus::is_known(request[0]) && (think > kQuickest || std::ranges::equal(reply, request));
-    const bool doubted = in_doubt || unknown_length || claimed.other_outstanding ||
-                         is_duplicate(piece, request, claimed) || missed_request;
+    const bool doubted = in_doubt || broadcast || is_doubtful(asked, piece, claimed);
     if (overdue && !doubted) habits.give_up.outwaited(piece.begin - asked.end);
+    habits.replied(asked.damaged && asked.damaged_bytes < modbus::kMinAdu);
     Transaction made;
     made.station = station;
     made.request = request;
@@ -248,12 +145,45 @@ void Matcher::answer(Piece piece, bool in_doubt) {
     made.ended = piece.end;
     made.sampled = book_.first_asked(station, request, piece.end - settings_.late_window)
                        .value_or(asked.begin);
-    if (!made.doubtful) habits.answered(think);
-    remember(made, in_doubt, claimed.outstanding);
+    if (!made.doubtful) {
+        habits.answered(think, !std::ranges::equal(reply, request));
+        habits.broadcasts.answered(piece.end);
+    }
+    remember(made, broadcast || (in_doubt && is_read(request)), claimed.outstanding);
     note(FrameKind::reply, made.station, piece);
     hold(std::move(made));
     noise_ = false;
     last_end_ = piece.end;
+}
+
+/// True if it may belong to another request, by all that was heard before.
+bool Matcher::is_doubtful(const Asked& asked, const Piece& piece,
+                          const arbiter::Claims& claimed) const {
+    const Bytes& request = asked.pending.pdu;
+    const Duration think = piece.begin - asked.end;
+    // For a function without a length rule, frames may be missed where an adapter joins them.
+    const bool unknown_length = !modbus::is_known(request[0]) &&
+                                (think > kQuickest || std::ranges::equal(pdu_of(piece), request));
+    return unknown_length || claimed.other_outstanding || is_duplicate(piece, request, claimed) ||
+           misses_request(asked, think);
+}
+
+/// True if the damaged bytes before the reply may be a request, or what was heard of its end. At
+/// the station's usual time its master has not gone on yet: a few bytes are noise.
+bool Matcher::misses_request(const Asked& asked, Duration think) const {
+    if (asked.damaged_bytes >= modbus::kMinAdu) return true;
+    const Habits& habits = habits_.at(asked.pending.station);
+    return asked.damaged && think > usual(habits) && !habits.is_noisy();
+}
+
+/// True if it may answer a broadcast, and its station was not seen to answer none. `asked`: it may
+/// be something else, too.
+bool Matcher::may_answer_broadcast(const Piece& piece, bool asked) {
+    const ByteView pdu = pdu_of(piece);
+    if (modbus::exception_of(pdu) || !book_.behind_broadcast(piece.begin, pdu)) return false;
+    BroadcastHabit& habit = of(piece.bytes.front()).broadcasts;
+    habit.may_have_answered(asked);
+    return !habit.answers_none();
 }
 
 /// True if it repeats the reply to another request, and its station is known to send copies.
@@ -270,7 +200,7 @@ bool Matcher::is_duplicate(const Piece& piece, const Bytes& request,
 /// had, no earlier one is outstanding. After another, one reply fewer has come than was asked for,
 /// and each of these requests may be the one without, until the window of the unanswered one is
 /// over.
-void Matcher::remember(const Transaction& made, bool in_doubt, bool outstanding) {
+void Matcher::remember(const Transaction& made, bool unanswered, bool outstanding) {
     Habits& habits = of(made.station);
     const TimePoint open = made.ended - settings_.late_window;
     if (outstanding) {
@@ -280,7 +210,6 @@ void Matcher::remember(const Transaction& made, bool in_doubt, bool outstanding)
         book_.settle(made.station);
         habits.owed = 0;
     }
-    const bool unanswered = in_doubt && is_read(made.request);
     if (unanswered || announces_reply(made.reply)) {
         book_.on_unanswered(made.station, made.asked, made.request);
         ++habits.owed;
@@ -316,8 +245,9 @@ void Matcher::on_request(Piece piece) {
         piece.begin - asked_->end < patience(of(asked_->pending.station))) {
         return on_reply(std::move(piece));
     }
-    const bool again = asked_ && asked_->pending.station == piece.bytes.front() &&
-                       std::ranges::equal(asked_->pending.pdu, pdu_of(piece));
+    const bool again = is_repeated(piece);
+    if (again) learn_of_copies(piece);
+    may_answer_broadcast(piece, true);
     const bool noise = asked_ ? asked_->damaged : noise_;
     const bool doubtful =
         (noise && has_form_of_reply(piece.bytes)) || (!again && is_old_reply(piece));
@@ -400,7 +330,17 @@ void Matcher::ask(const Piece& piece, bool doubtful) {
     made.asked = made.sampled = piece.begin;
     made.sent = made.ended = piece.end;
     report(std::move(made));
+    if (station == 0) on_broadcast(piece);
     asked_.reset();
+}
+
+/// No station answers it, or should.
+void Matcher::on_broadcast(const Piece& piece) {
+    if (!modbus::is_broadcastable(pdu_of(piece).front())) return;
+    book_.on_broadcast(piece.end, copy_of(pdu_of(piece)));
+    for (auto& [id, habits] : habits_) {
+        if (habits.longest_think()) habits.broadcasts.heard(piece.end);
+    }
 }
 
 /// Not the answer to the pending request: a late reply, a duplicate, or unknown.
@@ -410,6 +350,7 @@ void Matcher::on_reply(Piece piece) {
     if (asked_) asked_->disturbed = true;
     if (!missed_request && repeats_last(piece)) {
         of(station).repeated = piece.end;
+        may_answer_broadcast(piece, true);
         return note(FrameKind::copy, station, piece);
     }
     if (is_second_answer(piece)) {
@@ -418,6 +359,7 @@ void Matcher::on_reply(Piece piece) {
         book_.on_reply(station, piece.end, held_->request, pdu_of(piece));
     }
     const bool late = claims(piece).outstanding;
+    may_answer_broadcast(piece, late);
     if (late) close(piece);
     if (!late && asked_ && asked_->pending.station == station) asked_->wrong = true;
     note(late ? FrameKind::late : FrameKind::foreign, station, piece);
@@ -444,6 +386,7 @@ void Matcher::on_damaged(Piece piece) {
     } else {
         noise_ = true;
     }
+    for (auto& [id, habits] : habits_) habits.broadcasts.missed();
     note(FrameKind::damaged, asked_ ? asked_->pending.station : piece.bytes.front(), piece);
 }
 

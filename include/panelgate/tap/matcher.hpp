@@ -57,19 +57,27 @@ class Matcher {
     void close(const Piece& piece);
     void on_damaged(Piece piece);
     void answer(Piece piece, bool in_doubt);
-    void remember(const Transaction& made, bool in_doubt, bool outstanding);
+    void remember(const Transaction& made, bool unanswered, bool outstanding);
+    bool is_doubtful(const Asked& asked, const Piece& piece, const arbiter::Claims& claimed) const;
+    bool misses_request(const Asked& asked, Duration think) const;
+    bool may_answer_broadcast(const Piece& piece, bool asked);
     bool is_duplicate(const Piece& piece, const Bytes& request,
                       const arbiter::Claims& claimed) const;
     void hold(Transaction made);
     void tell_held();
     bool is_second_answer(const Piece& piece) const;
     void ask(const Piece& piece, bool doubtful);
+    void on_broadcast(const Piece& piece);
     void give_up(TimePoint now);
     void give_up_for(const Piece& request);
     arbiter::Claims claims(const Piece& piece, ByteView open = {}) const;
     bool repeats_last(const Piece& piece) const;
     bool is_old_reply(const Piece& piece) const;
     Reading read(const Piece& piece) const;
+    bool is_repeated(const Piece& piece) const;
+    bool copies(TimePoint now) const;
+    bool comes_too_soon(const Piece& piece);
+    void learn_of_copies(const Piece& copy);
     Duration quick(const Habits& habits) const;
     Duration usual(const Habits& habits) const;
     Duration patience(const Habits& habits) const;
@@ -89,6 +97,7 @@ class Matcher {
     std::map<std::uint8_t, Habits> habits_;
     arbiter::OutstandingRequests book_;  ///< what the line's master has asked, seen from it
     GiveUp give_up_;                     ///< of the whole line
+    std::optional<TimePoint> copied_;    ///< when a request was last heard twice at once
     bool noise_ = false;                 ///< since the last good frame
     TimePoint last_end_{};               ///< of a good frame
     std::deque<Event> events_;

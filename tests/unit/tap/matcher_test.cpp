@@ -217,6 +217,82 @@ TEST(Matcher, TakesNoRepeatedWriteForItsEcho) {
     expect("10 5:write, 25 5:write, 500 5:read", "5: write -> write ?");
 }
 
+/// A repeater gives each request back: no panel and no master is so quick.
+TEST(Matcher, TakesNoCopyOfARequestForItsReply) {
+    // 24 coils: the request has the form of their values.
+    const std::string coils = "10 5:0103000018, 2 5:0103000018, ";
+    expect(coils + "150 5:read, 6 5:value", "5: 0103000018 -> 0103000018 ?; 5: read -> value");
+    expect(coils + "4 5:0103fffffe, 50 5:read",
+           "5: 0103000018 -> silent; 5: 0103000018 -> 0103fffffe");
+    // A write, where a read was heard twice.
+    const std::string known = "10 5:read, 6 5:value, 10 5:read, 6 5:value, 10 5:read, 6 5:value, ";
+    const std::string copied = known + "10 5:0300640002, 2 5:0300640002, 4 5:030400640065, ";
+    const std::string told =
+        times(3, "5: read -> value") +
+        "; 5: 0300640002 -> silent; 5: 0300640002 -> 030400640065; 5: write -> ";
+    expect(copied + "20 5:write, 2 5:write, 150 5:read", told + "write ?");
+    expect(copied + "20 5:write, 6 5:write, 2 5:read", told + "write ?");
+    expect(copied + "20 5:write, 2 5:write, 4 5:write, 50 5:read",
+           told + "silent; 5: write -> write ?");
+    // No reply fits in between: the line gives requests back, whatever is known of its panels.
+    expect("10 7:read, 2 7:read, 50 5:write, 2 5:write, 150 5:read",
+           "7: read -> silent; 7: read -> silent; 5: write -> write ?");
+    expect("10 7:read, 5 7:read, 50 5:write, 2 5:write, 150 5:read",
+           "7: read -> silent; 7: read -> silent; 5: write -> write");
+    // Or sooner than its panel has ever answered, which it may do with writes as a rule.
+    Line line;
+    for (int i = 0; i < 33; ++i) line.play("20 5:read, 6 5:value");
+    line.settle();
+    line.told();
+    for (int i = 0; i < 5; ++i) line.play("20 5:write, 2 5:write, 150 7:read, 6 7:value");
+    line.settle();
+    EXPECT_EQ(line.told(), times(3, "5: write -> write ?; 7: read -> value") + "; " +
+                               times(2, "5: write -> write; 7: read -> value"));
+}
+
+/// What was not heard may have been asked after the open request.
+TEST(Matcher, BelievesNoReplyBehindTheRestOfARequest) {
+    const std::string known = "10 31:read, 6 31:value, ";
+    const std::string told = "31: read -> value; 31: read -> ";
+    for (const char* const rest : {"~4500c4c2", "~044500", "~4500", "~45"}) {
+        for (const char* const pause : {"20 ", "100 ", "400 "})
+            expect(known + "10 31:read, " + pause + rest + ", 6 31:03020064, 300 silence",
+                   told + "03020064 ?");
+    }
+    // At the panel's usual time its master still waits for it: noise.
+    expect(known + "10 31:read, 3 ~ff, 1 31:03020064", told + "03020064");
+    // A slow panel that begins with noise is believed when it has always done so.
+    Line line;
+    for (int i = 0; i < 12; ++i) line.play("20 31:read, 80 ~ff, 0 31:value");
+    line.settle();
+    EXPECT_EQ(line.told(), times(8, "31: read -> value ?") + "; " + times(4, "31: read -> value"));
+}
+
+TEST(Matcher, TakesNoAnswerToABroadcastForThatToAWrite) {
+    const std::string to_all = "10 0:100064000102000a, ";
+    const std::string ignored = "280 5:100064000102000b, 8 5:1000640001, ";
+    const std::string told = "5: read -> value; 0: 100064000102000a -> unasked; ";
+    const std::string doubt = "5: 100064000102000b -> 1000640001 ?";
+    const std::string known = "10 5:read, 6 5:value, ";
+    expect(known + to_all + ignored + "100 silence", told + doubt);
+    // One had no answer: then none has.
+    const std::string none = known + to_all + "6000 silence, 0 5:read, 6 5:value, ";
+    expect(none + to_all + ignored + "100 silence",
+           told + told + "5: 100064000102000b -> 1000640001");
+    // One that has had an answer may have it again.
+    expect(known + to_all + "300 5:1000640001, 6000 silence, 0 5:read, 6 5:value, " + to_all +
+               ignored + "100 silence",
+           told + told + doubt);
+    expect(none + to_all + "300 5:1000640001, 10 5:read, 6 5:value, " + to_all + ignored +
+               "100 silence",
+           told + told + told + doubt);
+    // Another place, or long after it.
+    expect(known + to_all + "280 5:100066000102000b, 8 5:1000660001, 100 silence",
+           told + "5: 100066000102000b -> 1000660001");
+    expect(known + to_all + "5000 silence, " + ignored + "100 silence",
+           told + "5: 100064000102000b -> 1000640001");
+}
+
 TEST(Matcher, DistinguishesALateReplyAndADuplicateFromOthers) {
     Line line;
     line.play("10 31:read, 200 31:0300c80002, 3 31:value, 3 31:030400050006, 3 31:030400050006");

@@ -131,11 +131,13 @@ TEST(TapWorld, EachPairIsFoundOnAHealthyLine) {
     for (const Duration latency : {0ms, 4ms, 16ms}) {
         const Score score = play({.latency = latency}, 20'000);
         EXPECT_EQ(score.wrong + score.invented, 0u) << score;
-        EXPECT_LE(score.doubtful, 2u) << score;
+        // A write behind a broadcast to the same place, until one has had no answer.
+        const std::size_t unlearned = 40;
+        EXPECT_LE(score.doubtful, unlearned) << score;
         // Frames of no known length, joined: only a silence or what follows can end them.
         const std::size_t least =
             latency == 0ms ? score.answerable - 2 : score.answerable * 97 / 100;
-        EXPECT_GE(score.right, least) << score;
+        EXPECT_GE(score.right + unlearned, least) << score;
     }
 }
 
