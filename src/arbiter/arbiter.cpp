@@ -275,8 +275,7 @@ void Arbiter::on_end(TimePoint now, Duration left) {
 void Arbiter::step(TimePoint now) {
     check_active(now);
     expire(now);
-    if (!active_ && unsolicited_.pending() && now >= quiet_.since() + settings_.end_of_frame)
-        judge_idle(now);
+    if (!active_ && unsolicited_.pending() && now >= idle_ends()) judge_idle(now);
     while (up_ && !suspended_ && !resetting_ && !active_ && start_next(now)) check_active(now);
 }
 
@@ -321,6 +320,12 @@ void Arbiter::hear_idle(TimePoint now, ByteView bytes) {
     if (unsolicited_.full()) judge_idle(now);
 }
 
+/// When what is heard without a request is over.
+TimePoint Arbiter::idle_ends() const {
+    return quiet_.since() +
+           (unsolicited_.has_begun() ? settings_.reply_hole : settings_.end_of_frame);
+}
+
 void Arbiter::judge_idle(TimePoint now) {
     if (ascii_) ascii_->cut();
     note_idle(now, unsolicited_.take(quiet_.station()));
@@ -347,6 +352,7 @@ void Arbiter::note(TimePoint now, const std::vector<modbus::Unused>& parts) {
 
 bool Arbiter::start_next(TimePoint now) {
     if (now < quiet_.free_at(stations_.gap(quiet_.station()))) return false;
+    if (unsolicited_.has_begun() && now < idle_ends()) return false;
     if (unsolicited_.pending()) judge_idle(now);  // it may show that the line is not free
     Schedule::Next next = schedule_.next(now, stations_, quiet_, echo_memory_);
     if (next.reopen) {
@@ -408,8 +414,9 @@ std::optional<TimePoint> Arbiter::next_deadline() const {
         }
         return next;
     }
-    if (unsolicited_.pending()) earlier(quiet_.since() + settings_.end_of_frame);
+    if (unsolicited_.pending()) earlier(idle_ends());
     if (!up_ || suspended_ || resetting_) return next;
+    if (unsolicited_.has_begun()) return next;  // nothing starts before
     if (const auto start = schedule_.next_start(stations_, quiet_)) earlier(*start);
     return next;
 }

@@ -103,6 +103,8 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
         if (echo_.pending() && !echo_since_) echo_since_ = now;
         return Verdict::open;
     }
+    append_up_to(modbus::kReadRequestAdu, first_heard_, rest);
+    heard_size_ += rest.size();
     if (now < timing_.sent && !comes_back(rest)) early_ = now;
     if (is_stale(now, rest.size())) {
         disturbed_ = true;
@@ -158,6 +160,7 @@ Verdict Attempt::accept(std::optional<Bytes> reply) {
     const std::size_t behind = collect();
     if (!reply) return Verdict::open;
     if (own_.may_be_echo(echo_, *reply)) return Verdict::open;
+    if (group_.is_values(*reply)) note_said(*reply);
     contradicted_ = is_contradicted(*reply, behind) || contradicted_;
     // Two equal replies cannot be distinguished.
     if (const auto candidate = std::exchange(candidate_, std::nullopt);
@@ -169,23 +172,66 @@ Verdict Attempt::accept(std::optional<Bytes> reply) {
         first_reply_at_ = candidate_at_;
     }
     reply_ = std::move(reply);
+    if (contradicted_) choose();
     return Verdict::replied;
+}
+
+bool Attempt::differs(const Unused& part, const Bytes& reply) const {
+    if (part.kind == Unused::Kind::damaged) {
+        constexpr std::size_t kHeader = 3;
+        const Bytes whole = adu_of(reply);
+        const std::size_t same =
+            static_cast<std::size_t>(std::ranges::mismatch(whole, part.bytes).in1 - whole.begin());
+        return same >= kHeader && same < std::min(part.bytes.size(), whole.size());
+    }
+    if (part.kind != Unused::Kind::own) return false;
+    const ByteView pdu = modbus::pdu_of(part.bytes);
+    return group_.is_values(pdu) && !std::ranges::equal(pdu, reply) &&
+           modbus::answers(group_.request.pdu(), pdu);
 }
 
 bool Attempt::is_contradicted(const Bytes& reply, std::size_t behind) {
     if (!group_.is_values(reply)) return false;
-    const auto differs = [&](const Unused& part) {
-        if (part.kind != Unused::Kind::own) return false;
-        const ByteView pdu = modbus::pdu_of(part.bytes);
-        return group_.is_values(pdu) && !std::ranges::equal(pdu, reply) &&
-               modbus::answers(group_.request.pdu(), pdu);
-    };
+    const auto other = [&](const Unused& part) { return differs(part, reply); };
     const auto first = unsolicited_.end() - static_cast<std::ptrdiff_t>(behind);
-    const auto found = std::partition(first, unsolicited_.end(), std::not_fn(differs));
-    const bool any = found != unsolicited_.end();
+    const bool any = std::any_of(first, unsolicited_.end(), other);
+    const auto whole = [&](const Unused& part) {
+        return part.kind == Unused::Kind::own && other(part);
+    };
+    const auto found = std::partition(first, unsolicited_.end(), std::not_fn(whole));
+    for (auto part = found; part != unsolicited_.end(); ++part)
+        note_said(modbus::pdu_of(part->bytes));
     std::move(found, unsolicited_.end(), std::back_inserter(set_aside_));
     unsolicited_.erase(found, unsolicited_.end());
     return any;
+}
+
+void Attempt::note_said(ByteView reply) {
+    constexpr std::size_t kMost = 8;
+    const auto is = [&](const Bytes& one) { return std::ranges::equal(one, reply); };
+    if (said_.size() < kMost && std::ranges::none_of(said_, is))
+        said_.emplace_back(reply.begin(), reply.end());
+}
+
+void Attempt::choose() {
+    const auto said = [&](const Unused& part) {
+        return group_.was_said(modbus::pdu_of(part.bytes));
+    };
+    const auto found = std::ranges::find_if(set_aside_, said);
+    if (found == set_aside_.end() || group_.was_said(*reply_)) return;
+    const ByteView chosen = modbus::pdu_of(found->bytes);
+    Bytes reply(chosen.begin(), chosen.end());
+    found->bytes = adu_of(std::exchange(*reply_, std::move(reply)));
+    if (kept_ != Candidate::held) return;
+    first_byte_ = candidate_began_;
+    believed_ = candidate_at_;
+}
+
+Bytes Attempt::release_pending() {
+    Bytes pending = echo_.release();
+    const Bytes begun = framer_.take_pending();
+    pending.insert(pending.end(), begun.begin(), begun.end());
+    return pending;
 }
 
 /// Turns pending bytes into unsolicited parts. Did the station send them instead of the reply?
@@ -225,6 +271,10 @@ std::size_t Attempt::collect() {
         if (std::ranges::equal(parts[i].bytes, echo_.frame())) on_own_frame(in_front);
         const bool damaged = parts[i].kind == Unused::Kind::damaged;
         frames_in_front_ = frames_in_front_ || (in_front && (!damaged || foreign));
+        if (damaged && candidate_ && kept_ == Candidate::held && differs(parts[i], *candidate_)) {
+            kept_ = Candidate::doubted;
+            contradicted_ = true;
+        }
         if (damaged && !foreign) {
             if (in_front) noise_in_front_ += parts[i].bytes.size();
             own_.fragment =
@@ -333,6 +383,14 @@ Duration Attempt::waited(TimePoint now) const {
 TimePoint Attempt::first_byte() const {
     if (!reply_ || !timing_.steady) return first_byte_;
     return std::min(first_byte_, timing_.sent + waited(last_byte_));
+}
+
+bool Attempt::may_answer_first_heard() const {
+    const std::size_t size = modbus::request_adu_length(first_heard_);
+    return begins_with_request(first_heard_, echo_.frame(), orders_) &&
+           first_heard_[0] == group_.station &&
+           heard_size_ >= size + reply_->size() + modbus::kAduOverhead &&
+           modbus::answers(modbus::pdu_of(ByteView(first_heard_).first(size)), *reply_);
 }
 
 bool Attempt::came_damaged_before() const {

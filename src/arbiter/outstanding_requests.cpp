@@ -92,6 +92,7 @@ void add_claim(Claims& claims, const Asked& one, TimePoint now, ByteView reply,
             return;
         case State::foreign:
             claims.other_master = claims.other_master || fits(now - timing::kLatestRepetition);
+            claims.contested = claims.contested || (!one.followed && fits(windows.foreign));
             return;
         case State::maybe_foreign:
             claims.contested = claims.contested || fits(windows.contested);
@@ -289,8 +290,23 @@ void OutstandingRequests::on_foreign(TimePoint now, ByteView bytes, bool maybe) 
     enter(at(adu[0]),
           {.state = maybe ? State::maybe_foreign : State::foreign,
            .sent = now,
-           .pdu = Bytes(pdu.begin(), pdu.end())},
+           .pdu = Bytes(pdu.begin(), pdu.end()),
+           .followed = bytes.size() > adu.size()},
           kForeign);
+}
+
+void OutstandingRequests::on_foreign_answered(std::uint8_t station, ByteView reply) {
+    Asked* oldest = nullptr;
+    for (Asked& one : at(station).asked) {
+        if (one.state != State::foreign || one.followed || !modbus::answers(one.pdu, reply))
+            continue;
+        if (oldest == nullptr || one.sent < oldest->sent) oldest = &one;
+    }
+    if (oldest != nullptr) oldest->followed = true;
+}
+
+void OutstandingRequests::on_foreign_over(std::uint8_t station) {
+    for (Asked& one : at(station).asked) one.followed = one.followed || one.state == State::foreign;
 }
 
 void OutstandingRequests::on_broadcast(TimePoint sent, const Bytes& pdu) {

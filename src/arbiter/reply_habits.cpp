@@ -45,6 +45,7 @@ Claims ReplyHabits::claims(const OutstandingRequests& book, TimePoint now, ByteV
     windows.passed = now - latest_reply();
     if (attempt == nullptr) return book.claims(now, id_, pdu, windows);
     windows.contested = attempt->timing().started;
+    windows.foreign = attempt->timing().started - late_.timeout();
     return book.claims(now, id_, pdu, windows, attempt->group().request.pdu());
 }
 
@@ -204,7 +205,7 @@ ReplyHabits::Heard ReplyHabits::on_unsolicited(OutstandingRequests& book, TimePo
 /// Neither requested nor outstanding.
 void ReplyHabits::on_unasked(OutstandingRequests& book, TimePoint now, Done done, ByteView pdu) {
     if (const TimePoint given = book.given(id_, now, pdu); given != TimePoint{}) {
-        duplicates_.learn(now, now - given);
+        duplicates_.on_copy(now, given, book.last_reply(id_)->replied);
     } else if (done == Done::second && book.on_followed(id_)) {
         duplicates_.learn(now, now - book.last_reply(id_)->replied);
     }
@@ -269,7 +270,7 @@ void ReplyHabits::on_damaged_bytes(const OutstandingRequests& book, TimePoint no
     if (duplicate == nullptr) return;
     const TimePoint given = book.given(id_, now, *duplicate);
     if (book.any(id_)) return duplicates_.on_ambiguous(now, given);
-    duplicates_.learn(now, now - given);
+    duplicates_.on_copy(now, given, book.last_reply(id_)->replied);
 }
 
 void ReplyHabits::on_opened(const OutstandingRequests& book, TimePoint now, Duration usual) {

@@ -77,6 +77,8 @@ void UnsolicitedFrames::note(TimePoint now, const std::vector<modbus::Unused>& p
         if (done == Done::damaged && idle) stations.on_trail(heard_at, replied_);
         if (done == Done::request) stations.book().on_foreign(heard_at, part.bytes, false);
         if (done == Done::request) let_reply_pass(now, part.bytes, stations, quiet);
+        if (done == Done::nobodys)
+            stations.book().on_foreign_answered(part.station, modbus::pdu_of(part.bytes));
         if (done != Done::broadcast) continue;
         const auto delay = stations.book().behind_broadcast(heard_at, modbus::pdu_of(part.bytes));
         stations.on_broadcast_answered(part.station, *delay, is_exception(part.bytes));

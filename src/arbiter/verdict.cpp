@@ -95,20 +95,28 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
                                 !group.request.is_read() &&
                                 habits.may_answer_broadcast(book.behind_broadcast(now, reply));
     const bool too_soon = first && group.attempts <= 1 && station.is_far_too_quick(first_sign);
-    const bool contradicted = attempt.contradicted() && group.doubts == 0;
+    const bool contradicted = attempt.is_undecided(claims.repeats_other) &&
+                              (group.doubts == 0 || !habits.answers_twice());
     const bool misnumbered = refusal && group.may_doubt_refusal() && first &&
                              habits.may_refuse_other(book, now, claims, group.request.function());
     const bool repeats = station.may_be_duplicate(now, attempt, claims, is_early);
     const bool may_ask = group.may_doubt(reply) ||
                          (refusal && group.may_doubt_refusal() && attempt.may_have_collided());
-    return fact::answers | when(claims.contested, fact::other_master) |
+    return fact::answers |
+           when(claims.contested || attempt.may_answer_first_heard(), fact::other_master) |
            when(refuses_other, fact::refuses_other) | when(impossible, fact::impossible) |
            when(overdue, fact::overdue) | when(like_echo, fact::like_echo) |
            when(misnumbered, fact::misnumbered) | when(repeats, fact::repeats) |
            when(like_broadcast, fact::like_broadcast) | when(too_soon, fact::too_soon) |
            when(before_end, fact::before_end) | when(contradicted, fact::contradicted) |
-           when(first && habits.holds_answers(now) > Duration::zero(), fact::may_be_followed) |
+           when(first && holds_answer(now, habits) > Duration::zero(), fact::may_be_followed) |
            when(may_ask, fact::may_ask) | when(first && attempt.precedes_echo(), fact::before_echo);
+}
+
+/// How long the answer is held because another one may follow, or has already begun.
+Duration Arbiter::holds_answer(TimePoint now, const ReplyHabits& habits) const {
+    const bool begun = active_->goes_on() || (ascii_ && ascii_->goes_on());
+    return std::max(habits.holds_answers(now), begun ? active_->timing().hole : Duration::zero());
 }
 
 /// Returns true if it is the answer.
@@ -123,7 +131,7 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     if (done == Done::ask_again) keep(Attempt::Candidate::doubted);
     if (done == Done::suspect_echo) keep(Attempt::Candidate::echo);
     if (done == Done::hold)
-        attempt.keep_candidate(station.replies().holds_answers(now), Attempt::Candidate::held);
+        attempt.keep_candidate(holds_answer(now, station.replies()), Attempt::Candidate::held);
     if (done != Done::accept && (facts & fact::before_end) != 0) attempt.mark_candidate_early();
     attempt.group().odd_pace =
         early && !settings_.paced && !pace_.unbound() && attempt.group().attempts <= 1;
@@ -154,7 +162,8 @@ void Arbiter::settle(TimePoint now) {
     if (settings_.may_stall) stations_.on_proved(now, proved);
     if (!settings_.paced && pace_.unbound() && now < attempt.timing().sent)
         quiet_.on_answered_early(now);
-    unsolicited_.on_replied(now, group.station);
+    unsolicited_.on_replied(now, group.station,
+                            group.is_values(reply) ? ByteView(reply) : ByteView{});
     quiet_.rest_until(station.trail_until());
     outbox_.on_answered(now, attempt, think, replied);
     attempt.teach(echo_memory_);
@@ -199,7 +208,7 @@ void Arbiter::ask_again(TimePoint now) {
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
     station.replies().on_doubted(stations_.book(), now, group, attempt.timing().sent);
-    if (attempt.contradicted()) station.replies().on_contradicted(now);
+    if (attempt.contradicted()) station.replies().on_contradicted(now, group.doubts > 1);
     group.silent_after = group.cut_after = {};
     finish_barred(group);
     if (group.doubts <= Group::kMostDoubts && in_time(now, group) && !group.abandoned()) {
@@ -243,6 +252,7 @@ void Arbiter::learn_from_failure(TimePoint now, const Attempt& attempt, Verdict 
     } else {
         station.replies().on_unanswered(book, now, request.pdu(), attempt.timing().sent);
     }
+    if (attempt.contested()) book.on_foreign_over(attempt.group().station);
     if (settings_.learns_holes && verdict == Verdict::damaged && attempt.was_cut_off())
         station.on_broken_reply(now, std::max(attempt.longest_pause(), attempt.timing().hole));
     if (verdict == Verdict::silent && attempt.echoed()) echo_memory_.on_unanswered(request);
@@ -337,7 +347,7 @@ Attempt Arbiter::take_active(TimePoint now) {
     const bool keeps_pace = settings_.paced || pace_.believed();
     if (const auto noise = attempt.early_noise(); noise && keeps_pace)
         stations_.on_trail(*noise, unsolicited_.replied_before());
-    unsolicited_.hear(attempt.release_echo());
+    unsolicited_.hear(attempt.release_pending());
     return attempt;
 }
 

@@ -1,5 +1,6 @@
 #include "panelgate/modbus/ascii.hpp"
 
+#include <algorithm>
 #include <string_view>
 #include <utility>
 
@@ -255,6 +256,10 @@ void AsciiTranscript::abort_frame(std::uint8_t character, Piece& piece) {
     piece.bytes.push_back(character);
     noise_ = true;
     if (character == kLineFeed) piece.end = Piece::End::damage;
+}
+
+bool AsciiTranscript::goes_on() const {
+    return inside() || std::ranges::find(text_.view(), kBegin) != text_.view().end();
 }
 
 void AsciiTranscript::cut() {

@@ -1,6 +1,7 @@
 #include "panelgate/modbus/rtu_framer.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <utility>
 
@@ -266,13 +267,42 @@ std::optional<Bytes> ReplyFramer::answering(ByteView frame) const {
 std::optional<Bytes> ReplyFramer::accept(std::size_t start, Bytes pdu) {
     classify(ByteView(heard_).first(start));
     const std::size_t before = unused_.size();
-    classify(ByteView(heard_).subspan(start + pdu.size() + kAduOverhead));
+    heard_ = classify_behind(ByteView(heard_).subspan(start + pdu.size() + kAduOverhead));
     behind_ = unused_.size() - before;
-    open_length_ = false;
     inside_ = false;
-    heard_.clear();
     forget_starts();
+    collect_starts();
+    open_length_ = has_start();
     return pdu;
+}
+
+/// True if these bytes may be the beginning of a reply with values.
+bool ReplyFramer::begins_like_reply(ByteView bytes) const {
+    if (!is_read(request_[0]) || !expected_ || bytes.empty() || bytes.size() >= *expected_)
+        return false;
+    const std::array head{station_, request_[0],
+                          static_cast<std::uint8_t>(*expected_ - kReadReplyOverhead)};
+    return std::equal(head.begin(), head.begin() + std::min(head.size(), bytes.size()),
+                      bytes.begin());
+}
+
+/// Returns what may be the beginning of another reply.
+Bytes ReplyFramer::classify_behind(ByteView bytes) {
+    Bytes begun;
+    for (Unused& part : classify_heard(bytes, station_, orders_)) {
+        if (part.kind == Unused::Kind::damaged && begins_like_reply(part.bytes)) {
+            begun = std::move(part.bytes);
+        } else {
+            step_over(std::move(part));
+        }
+    }
+    return begun;
+}
+
+Bytes ReplyFramer::take_pending() {
+    forget_starts();
+    open_length_ = false;
+    return std::exchange(heard_, {});
 }
 
 /// Discards the first `count` received bytes.

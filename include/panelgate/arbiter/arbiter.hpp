@@ -138,6 +138,7 @@ class Arbiter {
     void end_broadcast(TimePoint now);
     Facts facts_of_reply(TimePoint now, const Station& station, bool early) const;
     bool takes_reply(TimePoint now, const Station& station, bool early);
+    Duration holds_answer(TimePoint now, const ReplyHabits& habits) const;
     void settle(TimePoint now);
     void ask_again(TimePoint now);
     void confirm(TimePoint now, const Group& group, ByteView reply, bool echoed);
@@ -155,6 +156,7 @@ class Arbiter {
     void hear(TimePoint now, ByteView bytes);
     void hear_piece(TimePoint now, const modbus::AsciiTranscript::Piece& piece);
     void hear_idle(TimePoint now, ByteView bytes);
+    TimePoint idle_ends() const;
     void judge_idle(TimePoint now);
     void note(TimePoint now, const std::vector<modbus::Unused>& parts);
     void note_idle(TimePoint now, const std::vector<modbus::Unused>& parts);

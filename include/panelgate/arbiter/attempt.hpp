@@ -46,8 +46,9 @@ struct Group {
     bool first_silence = false;  ///< its station was healthy when it was first sent
     /// The queued job for which this read only detects the echo.
     Ticket learns_for = 0;
-    int doubts = 0;         ///< attempts whose answer was doubtful
-    bool odd_pace = false;  ///< its reply began before it had left, where that is unusual
+    std::vector<Bytes> said{};  ///< values that came for the attempts before, where they differed
+    int doubts = 0;             ///< attempts whose answer was doubtful
+    bool odd_pace = false;      ///< its reply began before it had left, where that is unusual
 
     static constexpr int kMostDoubts = 2;  ///< after which there is no sure answer
 
@@ -77,6 +78,11 @@ struct Group {
     /// True if the reply holds values: the request is a read, and it was not refused.
     bool is_values(ByteView reply) const {
         return request.is_read() && reply[0] == request.function();
+    }
+    /// True if an earlier attempt had these values, too, among others.
+    bool was_said(ByteView reply) const {
+        return std::ranges::any_of(
+            said, [&](const Bytes& one) { return std::ranges::equal(one, reply); });
     }
     /// True if its reply shows the station's pace: the reply to a retry may answer the attempt
     /// before.
@@ -227,6 +233,15 @@ class Attempt {
     std::vector<modbus::Unused> take_set_aside() { return std::exchange(set_aside_, {}); }
     /// True if two answers came that differ, before one was given.
     bool contradicted() const { return contradicted_; }
+    /// ... unless just one of these came for an earlier attempt, too: the reply. `is_copy`: it has
+    /// answered another request.
+    bool is_undecided(bool is_copy) const {
+        const auto said = [&](const Bytes& one) { return group_.was_said(one); };
+        return contradicted_ &&
+               (is_copy || !said(*reply_) || std::ranges::count_if(said_, said) > 1);
+    }
+    /// True if behind the reply another one may have begun: its rest is still to come.
+    bool goes_on() const { return framer_.has_pending(); }
     bool had_candidate() const { return kept_ != Candidate::none; }
     /// True if the reply came where the line's echo was expected: if the echo follows, it is
     /// another master's.
@@ -253,6 +268,10 @@ class Attempt {
         contested_ = true;
         reject_reply();
     }
+    bool contested() const { return contested_; }
+    /// True if the first frame since the request began to leave asks the same station, and the
+    /// reply behind it may be the answer to that.
+    bool may_answer_first_heard() const;
     /// True if as many damaged bytes, perhaps the same reply, came in front of it.
     bool came_damaged_before() const;
     /// When the candidate came, if the reply repeats it.
@@ -265,6 +284,7 @@ class Attempt {
     void remember_doubt() {
         group_.doubted = std::exchange(candidate_, std::nullopt).value_or(Bytes{});
         group_.doubted_at = candidate_at_;
+        if (contradicted_) group_.said.insert(group_.said.end(), said_.begin(), said_.end());
         ++group_.doubts;
     }
 
@@ -303,8 +323,8 @@ class Attempt {
     std::vector<modbus::Unused> take_unsolicited();
     /// All damaged bytes since the beginning (bounded).
     const Bytes& damaged_bytes() const { return damaged_bytes_; }
-    /// Takes the bytes that the echo filter still buffers.
-    Bytes release_echo() { return echo_.release(); }
+    /// Takes the bytes that the echo filter still buffers, and what has begun behind the reply.
+    Bytes release_pending();
 
   private:
     /// What the station has sent instead of the reply.
@@ -327,6 +347,11 @@ class Attempt {
     Verdict accept(std::optional<Bytes> reply);
     /// Sets the parts behind this reply aside that answer the request and differ. True if any do.
     bool is_contradicted(const Bytes& reply, std::size_t behind);
+    /// True if this is, or has begun like, another answer to the request.
+    bool differs(const modbus::Unused& part, const Bytes& reply) const;
+    void note_said(ByteView reply);
+    /// Of the answers that differ, the reply is the one that came for an earlier attempt, too.
+    void choose();
     Verdict judge_pending(const Ends& ends);
     void add_unsolicited(const Bytes& pdu) { unsolicited_.push_back(own_frame(pdu)); }
     modbus::Unused own_frame(const Bytes& pdu) const;
@@ -362,12 +387,15 @@ class Attempt {
     bool candidate_early_ = false;
     bool begins_anew_ = false;  ///< the next byte is not the candidate's
     bool contradicted_ = false;
-    bool beheaded_ = false;  ///< the reply lost its first bytes
+    std::vector<Bytes> said_;  ///< the values that came, each once
+    bool beheaded_ = false;    ///< the reply lost its first bytes
     std::vector<modbus::Unused> set_aside_;
     std::optional<TimePoint> first_reply_at_;
     std::vector<modbus::Unused> unsolicited_;
     Bytes damaged_bytes_;
     Bytes stale_;
+    Bytes first_heard_;           ///< the first bytes behind the echo, stale or not
+    std::size_t heard_size_ = 0;  ///< of all of them
     InputPace pace_;
     TimePoint computed_end_;
     TimePoint first_byte_;

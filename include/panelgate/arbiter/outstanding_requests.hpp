@@ -30,7 +30,8 @@ struct Asked {
     Bytes pdu{};
     TimePoint replied{};
     Bytes reply{};           ///< of a broadcast: the normal one
-    bool followed = false;   ///< a frame of the form of its reply came behind that
+    bool followed = false;   ///< a frame of the form of its reply came behind that; of another
+                             ///< master's: its answer
     bool announced = false;  ///< an exception has announced its reply: the next one is not its
 
     /// When it came to be what it is.
@@ -77,6 +78,7 @@ class OutstandingRequests {
         TimePoint closed = TimePoint::min();
         TimePoint passed = TimePoint::min();
         TimePoint contested = TimePoint::min();
+        TimePoint foreign = TimePoint::max();  ///< of another master
     };
     /// What this frame of a station may be. `reply`: without address and CRC. `open`: the PDU
     /// of the request that waits for its reply; empty: none.
@@ -162,6 +164,10 @@ class OutstandingRequests {
     void on_refusal(std::uint8_t station, TimePoint now, ByteView reply);
     /// The bytes begin with another master's request. `maybe`: or with a reply.
     void on_foreign(TimePoint now, ByteView bytes, bool maybe);
+    /// This answered the oldest of another master's requests that it fits.
+    void on_foreign_answered(std::uint8_t station, ByteView reply);
+    /// What they have asked of it so far is over.
+    void on_foreign_over(std::uint8_t station);
     void on_broadcast(TimePoint sent, const Bytes& pdu);
 
     /// A request that left at `sent` was served: those before it on its connection have passed,

@@ -114,6 +114,17 @@ class DuplicateHabit {
         learned_at_ = now;
         confirmed_ = {};
     }
+    /// The reply that was given at `given` came once more. Directly behind another one it may
+    /// follow that, and not the time: a guess again, until several in a row have come so.
+    void on_copy(TimePoint now, TimePoint given, TimePoint last) {
+        const Duration behind = std::max(now - last, timing::kReadingSlack);
+        if (given == last || behind > timing::kReceiveMargin) return learn(now, now - given);
+        const bool is_usual = known() && behind <= settle_time();
+        learn(now, behind);
+        if (is_usual) return;
+        guessed_ = std::max(guessed_, now - given);
+        sooner_ = 0;
+    }
     /// The frame repeats a recent reply, or is an outstanding one with the same values: it is
     /// ambiguous.
     void on_ambiguous(TimePoint now, TimePoint repeated) {
@@ -163,16 +174,20 @@ class DuplicateHabit {
         surplus_delay_ = surplus_++ == 0 ? delay : std::max(surplus_delay_, delay);
         surplus_at_ = now;
     }
-    void on_contradicted(TimePoint now) { surplus_at_ = now; }
+    void on_contradicted(TimePoint now, bool again) {
+        surplus_at_ = now;
+        if (again) on_asked_again(true);
+    }
     /// Asked again, after a rest, it gave two answers, or one: where all requests have two, both
     /// are to the same one.
     void on_asked_again(bool two) { always_two_ = two ? always_two_ + 1 : 0; }
+    /// All its requests have two answers.
+    bool answers_twice() const { return always_two_ >= kAlwaysTwo; }
     /// How long an answer is to be held, because another one may follow that differs.
     Duration hold(TimePoint now) const {
         const bool known = surplus_ >= kSurplus && now - surplus_at_ <= timing::kForgetDuplicates;
-        return known && always_two_ < kConfirmations
-                   ? surplus_delay_ * 3 / 2 + timing::kReceiveMargin
-                   : Duration::zero();
+        return known && !answers_twice() ? surplus_delay_ * 3 / 2 + timing::kReceiveMargin
+                                         : Duration::zero();
     }
     /// Time for which the station is not asked after a reply.
     Duration settle_time() const { return delay() * 3 / 2; }
@@ -201,6 +216,7 @@ class DuplicateHabit {
     TimePoint learned_at_{};
     TimePoint replied_{};
     static constexpr int kSurplus = 2;
+    static constexpr int kAlwaysTwo = 6;  ///< in a row
     int surplus_ = 0;
     int always_two_ = 0;  ///< in a row
     Duration surplus_delay_{};
@@ -354,8 +370,10 @@ class ReplyHabits {
     /// ... but for a reply that may be a duplicate of an earlier one; a duplicate of this
     /// one may follow.
     void on_doubted(OutstandingRequests& book, TimePoint now, const Group& group, TimePoint sent);
-    /// Two answers came that differ; the request is asked again.
-    void on_contradicted(TimePoint now) { duplicates_.on_contradicted(now); }
+    /// True if all requests that it was asked again had two answers that differ.
+    bool answers_twice() const { return duplicates_.answers_twice(); }
+    /// Two answers came that differ; the request is asked again. `again`: not the first time.
+    void on_contradicted(TimePoint now, bool again) { duplicates_.on_contradicted(now, again); }
     /// ... but its reply came damaged. Some panels resend it: until that would be over only the
     /// same request may be sent, and after its answer the same rest applies.
     void on_damaged_reply(OutstandingRequests& book, TimePoint now, const modbus::Request& request,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -28,12 +29,14 @@ class UnsolicitedFrames {
     /// The frame sent last: its echo may come late.
     void on_sent(ByteView adu) {
         last_frame_.assign(adu.begin(), adu.end());
+        values_.clear();
         replied_before_ = std::exchange(replied_, std::uint8_t{0});
     }
-    /// Bytes after this answer are its station's trail.
-    void on_replied(TimePoint now, std::uint8_t station) {
+    /// Bytes after this answer are its station's trail, and may be such `values` as it has.
+    void on_replied(TimePoint now, std::uint8_t station, ByteView values = {}) {
         replied_ = station;
         replied_at_ = now;
+        if (!values.empty()) values_ = modbus::encode_adu(station, values);
     }
     /// True if this is the frame sent last, heard right behind its reply.
     bool is_own_behind_reply(TimePoint heard_at, ByteView adu) const {
@@ -47,6 +50,15 @@ class UnsolicitedFrames {
     /// Unsolicited bytes (MST-04): counted, never matched with a later request.
     void hear(ByteView bytes);
     bool pending() const { return !idle_.empty(); }
+    /// True if that has begun like the last answer, and is shorter: the rest may follow a hole.
+    bool has_begun() const {
+        constexpr std::size_t kHeader = 3;
+        return serial_.mode == SerialMode::rtu && pending() && idle_.size() < values_.size() &&
+               std::equal(
+                   idle_.begin(),
+                   idle_.begin() + static_cast<std::ptrdiff_t>(std::min(kHeader, idle_.size())),
+                   values_.begin());
+    }
     /// True if more is collected than any frame has.
     bool full() const { return idle_.size() > modbus::ReplyFramer::kMaxHeard; }
     /// Takes and classifies what a silence has ended.
@@ -75,6 +87,7 @@ class UnsolicitedFrames {
     modbus::CrcOrders orders_;
     Bytes idle_;
     Bytes last_frame_;
+    Bytes values_;              ///< the answer to it, if a read's
     std::uint8_t replied_ = 0;  ///< to the last frame; 0: none, or not yet
     std::uint8_t replied_before_ = 0;
     TimePoint replied_at_{};

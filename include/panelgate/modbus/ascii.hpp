@@ -132,6 +132,8 @@ class AsciiTranscript {
     void cut();
     /// True if a frame has begun and is not complete.
     bool inside() const { return reader_.partial(); }
+    /// True if, behind what was returned, a frame has begun or was fed.
+    bool goes_on() const;
     /// True if a part of the current frame was already returned.
     bool has_given() const { return given_ > 0; }
 

@@ -55,7 +55,8 @@ class ReplyFramer {
     ReplyFramer(std::uint8_t station, Bytes request_pdu, const CrcOrders& orders = {},
                 Ends ends = Ends::by_length);
 
-    /// Feeds bytes; returns the reply PDU as soon as its last byte is there.
+    /// Feeds bytes; returns the reply PDU as soon as its last byte is there. What has begun behind
+    /// it like another reply to the read stays pending.
     std::optional<Bytes> feed(ByteView bytes);
     /// The line has been silent for the end-of-frame time. Returns a reply that only silence could
     /// end (or that followed noise like the start of a frame); drops the rest.
@@ -95,6 +96,8 @@ class ReplyFramer {
     std::vector<Unused> take_unused();
     /// Number of parts from the next take_unused() that follow the reply.
     std::size_t parts_behind() const { return behind_; }
+    /// Takes the pending bytes unjudged.
+    Bytes take_pending();
     /// Discards pending bytes, which the caller has judged.
     void drop_pending() { discard(heard_.size()); }
 
@@ -119,6 +122,8 @@ class ReplyFramer {
     std::optional<Bytes> accept(std::size_t start, Bytes pdu);
     void discard(std::size_t count);
     void classify(ByteView bytes);
+    bool begins_like_reply(ByteView bytes) const;
+    Bytes classify_behind(ByteView bytes);
     void step_over(Unused part);
 
     std::uint8_t station_;

@@ -27,6 +27,21 @@ class ArbiterAnswersTest : public ArbiterTest {
         script.run_for(10ms);
         return script.submit(17, read_at(number), 1);
     }
+    /// Behind the first answer a second one comes, 4 ms later.
+    void answer_twice(unsigned first, unsigned second) {
+        answer(script, 17, reply_number(first), 12ms);
+        script.run_for(4ms);
+        script.hear_reply(17, reply_number(second));
+    }
+    /// Answers that nobody asked for have come behind those that were.
+    void knows_surplus() {
+        for (const unsigned i : {1u, 20u}) {
+            read(17, i);
+            script.run_for(4ms);
+            script.hear_reply(17, reply_number(500 + i));
+            for (unsigned k = 1; k < 10; ++k) read(17, i + k);
+        }
+    }
     Bytes value(Ticket ticket) {
         const bool good = script.answered(ticket) && script.answer(ticket).pdu.has_value();
         return good ? script.answer(ticket).pdu.value() : Bytes{};
@@ -105,12 +120,7 @@ TEST_F(ArbiterAnswersTest, P1TwoAnswersAtOnceThatDifferAreNone) {
 }
 
 TEST_F(ArbiterAnswersTest, P1APanelThatSendsASurplusAnswerIsBelievedWhenNoneFollows) {
-    for (const unsigned i : {1u, 20u}) {
-        read(17, i);
-        script.run_for(4ms);
-        script.hear_reply(17, reply_number(500 + i));
-        for (unsigned k = 1; k < 10; ++k) read(17, i + k);
-    }
+    knows_surplus();
     const Ticket ticket = ask(50);
     answer(script, 17, reply_number(40), 12ms);
     EXPECT_FALSE(script.answered(ticket));
@@ -122,6 +132,95 @@ TEST_F(ArbiterAnswersTest, P1APanelThatSendsASurplusAnswerIsBelievedWhenNoneFoll
     script.run_for(20ms);
     EXPECT_EQ(value(ticket), reply_number(51));
     EXPECT_EQ(std::ranges::count(script.notes, FrameKind::copy, &Note::kind), 0) << "of nothing";
+}
+
+TEST_F(ArbiterAnswersTest, P1OfTwoAnswersInEachAttemptTheOneIsGivenThatBothHad) {
+    knows_surplus();
+    const Ticket ticket = ask(50);
+    answer_twice(50, 700);
+    EXPECT_FALSE(script.answered(ticket));
+    ASSERT_TRUE(script.next_sent(100ms));
+    answer_twice(50, 701);
+    EXPECT_EQ(value(ticket), reply_number(50));
+}
+
+TEST_F(ArbiterAnswersTest, P1WhereAllAnswersOfTwoAttemptsDifferAThirdDecides) {
+    knows_surplus();
+    for (const bool is_sure : {true, false}) {
+        const Ticket ticket = ask(50);
+        answer_twice(50, 700);
+        ASSERT_TRUE(script.next_sent(100ms));
+        answer_twice(51, 701);
+        EXPECT_FALSE(script.answered(ticket));
+        ASSERT_TRUE(script.next_sent(100ms));
+        answer(script, 17, reply_number(52), 12ms);
+        if (!is_sure) {
+            script.run_for(4ms);
+            script.hear_reply(17, reply_number(702));
+        }
+        script.run_for(50ms);
+        EXPECT_EQ(value(ticket), is_sure ? reply_number(52) : Bytes{});
+        script.run_for(2s);
+    }
+}
+
+TEST_F(ArbiterAnswersTest, P1AnotherAnswerThatHasBegunBehindTheFirstContradictsIt) {
+    for (const std::size_t begun : {1u, 3u, 6u, 10u}) {
+        BusScript line{settings};
+        line.submit(17, read_at(1), 1);
+        answer(line, 17, reply_number(1), 12ms);
+        line.run_for(10ms);
+        const Ticket ticket = line.submit(17, read_at(2), 1);
+        line.run_to_end_of_request();
+        line.run_for(12ms);
+        Bytes both = encode_adu(17, reply_number(9));
+        const std::size_t first = both.size() + begun;
+        const Bytes second = encode_adu(17, reply_number(2));
+        both.insert(both.end(), second.begin(), second.end());
+        line.hear(ByteView(both).first(first));
+        EXPECT_FALSE(line.answered(ticket)) << begun;
+        line.run_for(4ms);
+        line.hear(ByteView(both).subspan(first));
+        EXPECT_FALSE(line.answered(ticket)) << begun;
+        EXPECT_EQ(line.next_sent(100ms).value().adu, encode_adu(17, read_at(2)));
+        answer(line, 17, reply_number(2), 12ms);
+        EXPECT_EQ(line.answer(ticket).pdu.value(), reply_number(2));
+    }
+}
+
+TEST_F(ArbiterAnswersTest, P1ASurplusAnswerWithAHoleInItTeachesThatSuchOnesCome) {
+    for (const unsigned i : {1u, 20u}) {
+        read(17, i);
+        const Bytes other = encode_adu(17, reply_number(500 + i));
+        script.run_for(1ms);
+        script.hear(ByteView(other).first(5));
+        script.run_for(4ms);
+        script.hear(ByteView(other).subspan(5));
+        for (unsigned k = 1; k < 10; ++k) read(17, i + k);
+    }
+    const Ticket ticket = ask(50);
+    answer(script, 17, reply_number(40), 12ms);
+    EXPECT_FALSE(script.answered(ticket)) << "another one may follow";
+}
+
+TEST_F(ArbiterAnswersTest, P5WhereTheReplyBeforeComesOnceMoreBehindAReplyNothingIsWaitedFor) {
+    const auto register_at = [](unsigned i) { return Writer().u8(3).u16(i).u16(1).take(); };
+    know();
+    for (unsigned i = 0; i < 8; ++i) {
+        read(17, 100 + i);
+        script.submit(17, register_at(i), 1);
+        ASSERT_TRUE(script.next_sent(1s));
+        script.run_to_end_of_request();
+        script.run_for(12ms);
+        Bytes both = encode_adu(17, Writer().u8(3).u8(2).u16(900 + i).take());
+        const Bytes before = encode_adu(17, reply_number(100 + i));
+        both.insert(both.end(), before.begin(), before.end());
+        script.hear(both);
+        script.run_for(1s);
+    }
+    read(17, 200);
+    script.submit(17, read_at(201), 1);
+    EXPECT_TRUE(script.next_sent(20ms).has_value());
 }
 
 TEST_F(ArbiterAnswersTest, P4AReplyWithoutItsFirstByteIsDamagedAndNotSilence) {

@@ -93,6 +93,21 @@ TEST_F(AsciiLine, AWrongLrcIsDamageAndTheReadGoesAgainAtOnce) {
     EXPECT_EQ(told(ticket).value(), kReply);
 }
 
+TEST_F(AsciiLine, P1TwoAnswersInOneReadThatDifferAreNone) {
+    const Bytes other = "03 06 00 00 00 00 00 64"_hex;
+    ask(read_at(7));
+    bus.hear(modbus::encode_ascii(17, reply_number(7)));
+    bus.run_for(10ms);
+    const Ticket ticket = ask();
+    Bytes both = modbus::encode_ascii(17, other);
+    both.insert(both.end(), kReplyText.begin(), kReplyText.end());
+    bus.hear(both);
+    EXPECT_FALSE(bus.answered(ticket));
+    ASSERT_TRUE(bus.next_sent(1s));
+    answer(bus, 17, kReply, 2ms);
+    EXPECT_EQ(told(ticket).value(), kReply);
+}
+
 TEST_F(AsciiLine, P1ALateReplyAnswersNoRequestAndEndsTheRest) {
     expect_no_answer_by_a_late_reply(settings);
 }

@@ -255,6 +255,41 @@ TEST_F(Echo, P1AReplyAfterAnotherMastersRequestOfItsShapeIsAmbiguous) {
     EXPECT_EQ(bus.answer(next).pdu.value(), kReply);
 }
 
+/// Its answer may have been slow, or its frames late.
+TEST_F(Echo, P1AReplyIsAmbiguousWhileWhatAnotherMasterAskedBeforeIsUnanswered) {
+    BusScript bus(with(EchoMode::off));
+    bus.submit(17, kRead);
+    answer(bus, 17, kReply);
+    bus.run_for(10ms);
+    bus.hear(encode_adu(17, "03 00 00 00 03"_hex));
+    bus.run_for(10ms);
+    const Ticket ticket = bus.submit(17, kRead);
+    ASSERT_TRUE(bus.next_sent(300ms));
+    answer(bus, 17, reply_number(1));
+    EXPECT_FALSE(bus.answered(ticket));
+    bus.run_for(100ms);
+    EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::damaged);
+    const Ticket next = bus.submit(17, kRead);
+    answer(bus, 17, reply_number(2));
+    EXPECT_EQ(bus.answer(next).pdu.value(), reply_number(2)) << "that is over";
+}
+
+TEST_F(Echo, P1AReplyBehindAnotherMastersRequestThatCameWhileOursLeftIsAmbiguous) {
+    Settings settings = with(EchoMode::off);
+    settings.paced = true;
+    const Bytes theirs = encode_adu(17, "03 00 00 00 03"_hex);
+    for (const std::size_t before : {3u, 8u}) {
+        BusScript bus(settings);
+        const Ticket ticket = bus.submit(17, kRead);
+        bus.hear(ByteView(theirs).first(before));
+        bus.run_to_end_of_request();
+        if (before < theirs.size()) bus.hear_paced(ByteView(theirs).subspan(before));
+        bus.run_for(5ms);
+        bus.hear_paced(encode_adu(17, reply_number(1)));
+        EXPECT_FALSE(bus.answered(ticket)) << before;
+    }
+}
+
 TEST_F(Echo, P8AnEchoThatTheConfigurationDeniesIsFoundAllTheSame) {
     BusScript bus(with(EchoMode::off));
     for (int i = 0; i < 3; ++i) {

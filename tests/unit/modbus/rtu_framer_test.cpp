@@ -298,6 +298,25 @@ TEST_F(FramerOfBothOrders, P1AFrameOfTheOtherOrderInFrontIsSkippedWhole) {
     }
 }
 
+TEST_F(RtuFramer, WhatBeginsBehindTheReplyLikeAnotherOneIsKeptForItsRest) {
+    const Bytes reply = encode_adu(5, kReplyPdu);
+    for (std::size_t begun = 1; begun < reply.size(); ++begun) {
+        ReplyFramer framer(5, kRequest);
+        Bytes heard = reply;
+        heard.insert(heard.end(), reply.begin(), reply.begin() + static_cast<int>(begun));
+        ASSERT_EQ(framer.feed(heard), kReplyPdu);
+        EXPECT_TRUE(framer.has_pending());
+        EXPECT_TRUE(framer.knows_length());
+        EXPECT_EQ(framer.feed(ByteView(reply).subspan(begun)), kReplyPdu) << begun;
+        EXPECT_FALSE(framer.has_pending());
+    }
+    ReplyFramer framer(5, kRequest);
+    Bytes heard = reply;
+    heard.push_back(0);
+    ASSERT_EQ(framer.feed(heard), kReplyPdu);
+    EXPECT_FALSE(framer.has_pending()) << "noise";
+}
+
 TEST_F(FramerOfBothOrders, TheWrongOrderIsDamage) {
     const auto parts = classify_heard(encode_adu(5, kReplyPdu), 6, orders);
     ASSERT_EQ(parts.size(), 1u);
