@@ -334,8 +334,10 @@ void Arbiter::judge_idle(TimePoint now) {
 /// Our own frame may be among what came while nothing was asked.
 void Arbiter::note_idle(TimePoint now, const std::vector<modbus::Unused>& parts) {
     for (const modbus::Unused& part : parts) {
-        if (unsolicited_.is_own_behind_reply(std::min(now, quiet_.since()), part.bytes))
-            hear_again(now, part.station, modbus::pdu_of(part.bytes));
+        const TimePoint heard_at = std::min(now, quiet_.since());
+        const bool late = unsolicited_.late_echo().on_heard(heard_at, part.bytes);
+        if (late || unsolicited_.is_own_behind_reply(heard_at, part.bytes))
+            hear_again(now, part.bytes[0], modbus::pdu_of(part.bytes));
     }
     note(now, parts);
 }
@@ -398,7 +400,7 @@ void Arbiter::start(TimePoint now, Group group) {
     outbox_.written(group, false);
     const Reason why = reason_of(now, group, schedule_.backlog().queue());
     quiet_.on_sent(timing.sent, group.station);
-    unsolicited_.on_sent(adu);
+    unsolicited_.on_sent(now, adu);
     EchoFilter echo(adu, echo_memory_.expect(group.request));
     active_.emplace(std::move(group), timing, std::move(echo), orders_);
     outbox_.transmit(now, *active_, std::move(adu), std::move(wire), why);

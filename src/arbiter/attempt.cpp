@@ -160,18 +160,19 @@ Verdict Attempt::accept(std::optional<Bytes> reply) {
     const std::size_t behind = collect();
     if (!reply) return Verdict::open;
     if (own_.may_be_echo(echo_, *reply)) return Verdict::open;
-    if (group_.is_values(*reply)) note_said(*reply);
     contradicted_ = is_contradicted(*reply, behind) || contradicted_;
     // Two equal replies cannot be distinguished.
     if (const auto candidate = std::exchange(candidate_, std::nullopt);
         candidate && candidate != reply) {
         contradicted_ = contradicted_ || kept_ == Candidate::held;
+        if (contradicted_) note_said(*candidate);
         const bool aside = candidate_early_ || kept_ == Candidate::held;
         (aside ? set_aside_ : unsolicited_).push_back(own_frame(*candidate));
     } else if (candidate) {
         first_reply_at_ = candidate_at_;
     }
     reply_ = std::move(reply);
+    if (contradicted_) note_said(*reply_);
     if (contradicted_) choose();
     return Verdict::replied;
 }

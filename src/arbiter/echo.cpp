@@ -224,4 +224,24 @@ void EchoMemory::on_mismatch() {
     if (mode_ != EchoMode::on) begin();
 }
 
+std::optional<Duration> LateEcho::delay_of(TimePoint now, ByteView adu) const {
+    std::optional<Duration> found;
+    for (const Sent& one : sent_) {
+        const Duration delay = now - one.at;
+        const bool in_time = delay >= timing::kShortestWait && delay < timing::kLatestRepetition;
+        if (!in_time || !std::ranges::equal(one.adu, adu)) continue;
+        if (!found || is_usual(delay)) found = delay;
+    }
+    return found;
+}
+
+bool LateEcho::on_heard(TimePoint now, ByteView adu) {
+    const auto delay = delay_of(now, adu);
+    if (!delay) return false;
+    times_ = is_usual(*delay) ? std::min(times_ + 1, kEnough) : 1;
+    delay_ = *delay;
+    heard_at_ = now;
+    return times_ >= kEnough;
+}
+
 }  // namespace panelgate::arbiter

@@ -49,7 +49,8 @@ std::vector<Unused> UnsolicitedFrames::take_delimited(std::uint8_t asked, bool g
 Facts UnsolicitedFrames::facts_of(TimePoint now, ByteView adu, bool damaged,
                                   const Stations& stations) const {
     const bool begins = begins_with_request(adu, last_frame_, orders_);
-    const Facts facts = when(std::ranges::equal(adu, last_frame_), fact::own_frame) |
+    const bool own = std::ranges::equal(adu, last_frame_) || late_echo_.is_own(now, adu);
+    const Facts facts = when(own, fact::own_frame) |
                         when(begins && (damaged || is_request(adu)), fact::request) |
                         when(damaged, fact::damaged);
     if (damaged) return facts;

@@ -40,8 +40,10 @@ void Arbiter::conclude(TimePoint now, Verdict verdict) {
     const std::vector<modbus::Unused> unsolicited = active_->take_unsolicited();
     const std::uint8_t station = active_->group().station;
     for (const modbus::Unused& part : unsolicited) {
-        if (begins_with_request(part.bytes, active_->echo().frame(), orders_) &&
-            part.bytes[0] == station)
+        if (unsolicited_.late_echo().on_heard(now, part.bytes)) {
+            hear_again(now, part.bytes[0], modbus::pdu_of(part.bytes));
+        } else if (begins_with_request(part.bytes, active_->echo().frame(), orders_) &&
+                   part.bytes[0] == station)
             stations_.book().on_foreign(now, part.bytes, true);
     }
     const std::vector<modbus::Unused> set_aside = active_->take_set_aside();
@@ -68,6 +70,15 @@ void Arbiter::end_broadcast(TimePoint now) {
     for (const Job& job : attempt.group().expire(now)) outbox_.finish(job, Fault::timeout);
     for (const Job& job : attempt.group().jobs)
         outbox_.finish(job, modbus::normal_write_reply(job.request.pdu()));
+}
+
+/// Whether it may be another master's answer, or our own request.
+Facts Arbiter::facts_of_others(TimePoint now, const Claims& claims) const {
+    const bool contested =
+        claims.contested || (active_->may_answer_first_heard() &&
+                             !unsolicited_.late_echo().is_own(now, active_->first_heard()));
+    return when(contested, fact::other_master) |
+           when(active_->is_late_echo(now, echo_memory_), fact::impossible);
 }
 
 /// What is true of the frame that has the form of the answer.
@@ -102,13 +113,12 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
     const bool repeats = station.may_be_duplicate(now, attempt, claims, is_early);
     const bool may_ask = group.may_doubt(reply) ||
                          (refusal && group.may_doubt_refusal() && attempt.may_have_collided());
-    return fact::answers |
-           when(claims.contested || attempt.may_answer_first_heard(), fact::other_master) |
-           when(refuses_other, fact::refuses_other) | when(impossible, fact::impossible) |
-           when(overdue, fact::overdue) | when(like_echo, fact::like_echo) |
-           when(misnumbered, fact::misnumbered) | when(repeats, fact::repeats) |
-           when(like_broadcast, fact::like_broadcast) | when(too_soon, fact::too_soon) |
-           when(before_end, fact::before_end) | when(contradicted, fact::contradicted) |
+    return fact::answers | facts_of_others(now, claims) | when(refuses_other, fact::refuses_other) |
+           when(impossible, fact::impossible) | when(overdue, fact::overdue) |
+           when(like_echo, fact::like_echo) | when(misnumbered, fact::misnumbered) |
+           when(repeats, fact::repeats) | when(like_broadcast, fact::like_broadcast) |
+           when(too_soon, fact::too_soon) | when(before_end, fact::before_end) |
+           when(contradicted, fact::contradicted) |
            when(first && holds_answer(now, habits) > Duration::zero(), fact::may_be_followed) |
            when(may_ask, fact::may_ask) | when(first && attempt.precedes_echo(), fact::before_echo);
 }
@@ -162,8 +172,7 @@ void Arbiter::settle(TimePoint now) {
     if (settings_.may_stall) stations_.on_proved(now, proved);
     if (!settings_.paced && pace_.unbound() && now < attempt.timing().sent)
         quiet_.on_answered_early(now);
-    unsolicited_.on_replied(now, group.station,
-                            group.is_values(reply) ? ByteView(reply) : ByteView{});
+    unsolicited_.on_replied(now, group.station, reply);
     quiet_.rest_until(station.trail_until());
     outbox_.on_answered(now, attempt, think, replied);
     attempt.teach(echo_memory_);

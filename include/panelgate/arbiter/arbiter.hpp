@@ -137,6 +137,7 @@ class Arbiter {
     void conclude(TimePoint now, Verdict verdict);
     void end_broadcast(TimePoint now);
     Facts facts_of_reply(TimePoint now, const Station& station, bool early) const;
+    Facts facts_of_others(TimePoint now, const Claims& claims) const;
     bool takes_reply(TimePoint now, const Station& station, bool early);
     Duration holds_answer(TimePoint now, const ReplyHabits& habits) const;
     void settle(TimePoint now);

@@ -14,6 +14,7 @@
 #include "panelgate/arbiter/reply_times.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/pool.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/function.hpp"
@@ -46,9 +47,9 @@ struct Group {
     bool first_silence = false;  ///< its station was healthy when it was first sent
     /// The queued job for which this read only detects the echo.
     Ticket learns_for = 0;
-    std::vector<Bytes> said{};  ///< values that came for the attempts before, where they differed
-    int doubts = 0;             ///< attempts whose answer was doubtful
-    bool odd_pace = false;      ///< its reply began before it had left, where that is unusual
+    PoolVector<Bytes> said{};  ///< values that came for the attempts before, where they differed
+    int doubts = 0;            ///< attempts whose answer was doubtful
+    bool odd_pace = false;     ///< its reply began before it had left, where that is unusual
 
     static constexpr int kMostDoubts = 2;  ///< after which there is no sure answer
 
@@ -263,6 +264,11 @@ class Attempt {
                (line.comes_again(now, group_.station) ||
                 (!behind_echo && (too_quick || line.echoes_writes())));
     }
+    /// True if this answer to a read is that read itself, where requests come back late.
+    bool is_late_echo(TimePoint now, const EchoMemory& line) const {
+        return group_.request.is_read() && echo_.is_own(*reply_) &&
+               line.comes_again(now, group_.station);
+    }
     /// Rejects a reply that also answers another master's request; the station was not silent.
     void reject_contested() {
         contested_ = true;
@@ -272,6 +278,7 @@ class Attempt {
     /// True if the first frame since the request began to leave asks the same station, and the
     /// reply behind it may be the answer to that.
     bool may_answer_first_heard() const;
+    const Bytes& first_heard() const { return first_heard_; }
     /// True if as many damaged bytes, perhaps the same reply, came in front of it.
     bool came_damaged_before() const;
     /// When the candidate came, if the reply repeats it.
@@ -387,8 +394,8 @@ class Attempt {
     bool candidate_early_ = false;
     bool begins_anew_ = false;  ///< the next byte is not the candidate's
     bool contradicted_ = false;
-    std::vector<Bytes> said_;  ///< the values that came, each once
-    bool beheaded_ = false;    ///< the reply lost its first bytes
+    PoolVector<Bytes> said_;  ///< the values that came, where they differ, each once
+    bool beheaded_ = false;   ///< the reply lost its first bytes
     std::vector<modbus::Unused> set_aside_;
     std::optional<TimePoint> first_reply_at_;
     std::vector<modbus::Unused> unsolicited_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -184,6 +185,42 @@ class EchoMemory {
     std::uint8_t habit_ = 0;    ///< this station repeats requests, the line has no echo
     std::optional<bool> writes_echo_;  ///< empty: no write has shown it since the device was opened
     std::optional<TimePoint> again_at_;  ///< when a request came back once more
+};
+
+/// Our own frames that come back long after they have left: from a repeater, or a radio. Each is
+/// byte for byte what was sent and comes after the same time, while another master that asks the
+/// same does so at any time. Pure.
+class LateEcho {
+  public:
+    void on_sent(TimePoint now, ByteView adu) {
+        sent_[next_] = {now, Bytes(adu.begin(), adu.end())};
+        next_ = (next_ + 1) % sent_.size();
+    }
+    /// This frame was heard. True if it is one of ours, and three in a row have come so.
+    bool on_heard(TimePoint now, ByteView adu);
+    /// ... without learning from it.
+    bool is_own(TimePoint now, ByteView adu) const {
+        return times_ >= kEnough && now <= heard_at_ + timing::kForgetHabit && delay_of(now, adu);
+    }
+
+  private:
+    static constexpr int kEnough = 3;
+    static constexpr std::size_t kSent = 16;
+    struct Sent {
+        TimePoint at{};
+        Bytes adu{};
+    };
+    /// How long before it was sent: the most usual of the times that are possible.
+    std::optional<Duration> delay_of(TimePoint now, ByteView adu) const;
+    bool is_usual(Duration delay) const {
+        return delay - delay_ <= timing::kReceiveMargin && delay_ - delay <= timing::kReceiveMargin;
+    }
+
+    std::array<Sent, kSent> sent_;
+    std::size_t next_ = 0;
+    Duration delay_{};
+    int times_ = 0;  ///< in a row
+    TimePoint heard_at_{};
 };
 
 }  // namespace panelgate::arbiter

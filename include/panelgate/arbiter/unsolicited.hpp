@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/judge.hpp"
 #include "panelgate/arbiter/outbox.hpp"
 #include "panelgate/arbiter/quiet.hpp"
@@ -14,6 +15,7 @@
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/modbus/rtu_framer.hpp"
 
@@ -27,17 +29,21 @@ class UnsolicitedFrames {
         : serial_(serial), orders_(orders) {}
 
     /// The frame sent last: its echo may come late.
-    void on_sent(ByteView adu) {
+    void on_sent(TimePoint now, ByteView adu) {
+        late_echo_.on_sent(now, adu);
         last_frame_.assign(adu.begin(), adu.end());
         values_.clear();
         replied_before_ = std::exchange(replied_, std::uint8_t{0});
     }
-    /// Bytes after this answer are its station's trail, and may be such `values` as it has.
-    void on_replied(TimePoint now, std::uint8_t station, ByteView values = {}) {
+    /// Bytes after this answer are its station's trail, and may be such values as it has.
+    void on_replied(TimePoint now, std::uint8_t station, ByteView reply = {}) {
         replied_ = station;
         replied_at_ = now;
-        if (!values.empty()) values_ = modbus::encode_adu(station, values);
+        if (!reply.empty() && reply[0] <= modbus::kReadInputRegisters)
+            values_ = modbus::encode_adu(station, reply);
     }
+    LateEcho& late_echo() { return late_echo_; }
+    const LateEcho& late_echo() const { return late_echo_; }
     /// True if this is the frame sent last, heard right behind its reply.
     bool is_own_behind_reply(TimePoint heard_at, ByteView adu) const {
         return replied_ != 0 && heard_at <= replied_at_ + timing::kLongestTrail &&
@@ -87,6 +93,7 @@ class UnsolicitedFrames {
     modbus::CrcOrders orders_;
     Bytes idle_;
     Bytes last_frame_;
+    LateEcho late_echo_;
     Bytes values_;              ///< the answer to it, if a read's
     std::uint8_t replied_ = 0;  ///< to the last frame; 0: none, or not yet
     std::uint8_t replied_before_ = 0;

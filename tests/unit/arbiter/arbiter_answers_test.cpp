@@ -223,6 +223,40 @@ TEST_F(ArbiterAnswersTest, P5WhereTheReplyBeforeComesOnceMoreBehindAReplyNothing
     EXPECT_TRUE(script.next_sent(20ms).has_value());
 }
 
+/// Its answer may have been slow, or its frames late.
+TEST_F(ArbiterAnswersTest, P1AReplyIsAmbiguousWhileWhatAnotherMasterAskedBeforeIsUnanswered) {
+    settings.echo = EchoMode::off;
+    BusScript bus(settings);
+    bus.submit(17, kRead);
+    answer(bus, 17, kReply);
+    bus.run_for(10ms);
+    bus.hear(encode_adu(17, "03 00 00 00 03"_hex));
+    bus.run_for(10ms);
+    const Ticket ticket = bus.submit(17, kRead);
+    ASSERT_TRUE(bus.next_sent(300ms));
+    answer(bus, 17, reply_number(1));
+    EXPECT_FALSE(bus.answered(ticket));
+    ASSERT_TRUE(bus.next_sent(200ms));
+    answer(bus, 17, reply_number(2));
+    EXPECT_EQ(bus.answer(ticket).pdu.value(), reply_number(2)) << "that is over";
+}
+
+TEST_F(ArbiterAnswersTest, P1AReplyBehindAnotherMastersRequestThatCameWhileOursLeftIsAmbiguous) {
+    settings.echo = EchoMode::off;
+    settings.paced = true;
+    const Bytes theirs = encode_adu(17, "03 00 00 00 03"_hex);
+    for (const std::size_t before : {3u, 8u}) {
+        BusScript bus(settings);
+        const Ticket ticket = bus.submit(17, kRead);
+        bus.hear(ByteView(theirs).first(before));
+        bus.run_to_end_of_request();
+        if (before < theirs.size()) bus.hear_paced(ByteView(theirs).subspan(before));
+        bus.run_for(5ms);
+        bus.hear_paced(encode_adu(17, reply_number(1)));
+        EXPECT_FALSE(bus.answered(ticket)) << before;
+    }
+}
+
 TEST_F(ArbiterAnswersTest, P4AReplyWithoutItsFirstByteIsDamagedAndNotSilence) {
     settings.stations[0].retries = 0;
     for (const std::size_t lost : {1u, 2u, 3u}) {

@@ -145,5 +145,24 @@ TEST_F(EchoMemoryTest, P8APanelThatRepeatsRequestsNoMoreIsForgotten) {
     EXPECT_FALSE(memory.comes_again(TimePoint{}, 17));
 }
 
+TEST(LateEcho, ComesAfterTheSameTimeEachTime) {
+    const Bytes read = "11 03 00 00 00 01"_hex;
+    for (const bool steady : {true, false}) {
+        LateEcho line;
+        TimePoint now{100s};
+        bool known = false;
+        for (int i = 0; i < 6; ++i) {
+            line.on_sent(now, read);
+            known = line.on_heard(now + (steady ? 40ms : 30ms + 50ms * i), read);
+            now += 1s;
+        }
+        EXPECT_EQ(known, steady) << "another master asks at any time";
+        line.on_sent(now, read);
+        EXPECT_EQ(line.is_own(now + 40ms, read), steady);
+        EXPECT_FALSE(line.is_own(now + 40ms, "11 03 00 00 00 02"_hex));
+        EXPECT_FALSE(line.is_own(now + 2s, read));
+    }
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter::echo_memory_test

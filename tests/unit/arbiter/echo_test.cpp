@@ -255,39 +255,31 @@ TEST_F(Echo, P1AReplyAfterAnotherMastersRequestOfItsShapeIsAmbiguous) {
     EXPECT_EQ(bus.answer(next).pdu.value(), kReply);
 }
 
-/// Its answer may have been slow, or its frames late.
-TEST_F(Echo, P1AReplyIsAmbiguousWhileWhatAnotherMasterAskedBeforeIsUnanswered) {
-    BusScript bus(with(EchoMode::off));
-    bus.submit(17, kRead);
-    answer(bus, 17, kReply);
-    bus.run_for(10ms);
-    bus.hear(encode_adu(17, "03 00 00 00 03"_hex));
-    bus.run_for(10ms);
-    const Ticket ticket = bus.submit(17, kRead);
-    ASSERT_TRUE(bus.next_sent(300ms));
-    answer(bus, 17, reply_number(1));
-    EXPECT_FALSE(bus.answered(ticket));
-    bus.run_for(100ms);
-    EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::damaged);
-    const Ticket next = bus.submit(17, kRead);
-    answer(bus, 17, reply_number(2));
-    EXPECT_EQ(bus.answer(next).pdu.value(), reply_number(2)) << "that is over";
-}
-
-TEST_F(Echo, P1AReplyBehindAnotherMastersRequestThatCameWhileOursLeftIsAmbiguous) {
-    Settings settings = with(EchoMode::off);
-    settings.paced = true;
-    const Bytes theirs = encode_adu(17, "03 00 00 00 03"_hex);
-    for (const std::size_t before : {3u, 8u}) {
-        BusScript bus(settings);
-        const Ticket ticket = bus.submit(17, kRead);
-        bus.hear(ByteView(theirs).first(before));
-        bus.run_to_end_of_request();
-        if (before < theirs.size()) bus.hear_paced(ByteView(theirs).subspan(before));
-        bus.run_for(5ms);
-        bus.hear_paced(encode_adu(17, reply_number(1)));
-        EXPECT_FALSE(bus.answered(ticket)) << before;
+/// A repeater, or a radio.
+TEST_F(Echo, P8AnEchoThatComesLateConfirmsNothingAndIsNoValue) {
+    BusScript bus(with(EchoMode::automatic));
+    const auto come_back = [&] {
+        bus.run_for(40ms);
+        bus.hear(bus.sent.back().adu);
+    };
+    for (int i = 0; i < 5; ++i) {
+        bus.submit(17, kRead);
+        answer(bus, 17, kReply, 5ms);
+        come_back();
+        bus.run_for(50ms);
     }
+    const std::uint64_t requests = bus.arbiter().station_counters().at(17).symptoms.requests;
+    for (const Bytes& pdu : {kWriteCoil, "01 03 75 00 18"_hex}) {
+        const Ticket ticket = bus.submit(17, pdu);
+        ASSERT_EQ(bus.sent.back().adu, encode_adu(17, pdu));
+        bus.run_to_end_of_request();
+        come_back();
+        bus.run_for(2s);
+        EXPECT_FALSE(bus.answer(ticket).pdu);
+    }
+    const Symptoms& symptoms = bus.arbiter().station_counters().at(17).symptoms;
+    EXPECT_EQ(symptoms.requests, requests) << "another master's";
+    EXPECT_GE(symptoms.echoed_again, 3u);
 }
 
 TEST_F(Echo, P8AnEchoThatTheConfigurationDeniesIsFoundAllTheSame) {

@@ -32,7 +32,7 @@ Settings one_station() {
 class UnsolicitedFramesTest : public testing::Test {
   protected:
     UnsolicitedFramesTest() {
-        unsolicited.on_sent(encode_adu(17, kRead));
+        unsolicited.on_sent(now, encode_adu(17, kRead));
         quiet.on_sent(now, 17);
         stations.of(17);
     }
@@ -128,7 +128,7 @@ TEST_F(UnsolicitedFramesTest, AReplyToABroadcastIsOneForSeconds) {
     const Bytes write = "10 00 01 00 01 02 00 05"_hex;
     const Bytes reply = encode_adu(17, modbus::normal_write_reply(write));
     stations.book().on_broadcast(now, write);
-    for (int i = 0; i < 10; ++i) unsolicited.on_sent(encode_adu(17, kRead));
+    for (int i = 0; i < 10; ++i) unsolicited.on_sent(now, encode_adu(17, kRead));
     now += 900ms;
     EXPECT_FALSE(is_wrong_reply(reply));
     now += timing::kLatestBroadcastAnswer;
@@ -150,9 +150,9 @@ TEST_F(UnsolicitedFramesTest, TheTrailBelongsToTheStationThatAnsweredLast) {
     EXPECT_EQ(unsolicited.replied_before(), 0);
     unsolicited.on_replied(now, 17);
     EXPECT_EQ(unsolicited.replied_before(), 0) << "it answered what is on the wire";
-    unsolicited.on_sent(encode_adu(18, kRead));
+    unsolicited.on_sent(now, encode_adu(18, kRead));
     EXPECT_EQ(unsolicited.replied_before(), 17);
-    unsolicited.on_sent(encode_adu(18, kRead));
+    unsolicited.on_sent(now, encode_adu(18, kRead));
     EXPECT_EQ(unsolicited.replied_before(), 0) << "the one between was not answered";
 }
 
