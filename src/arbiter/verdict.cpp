@@ -153,6 +153,8 @@ void Arbiter::settle(TimePoint now) {
     Station& station = stations_.of(active_->group().station);
     const bool early = active_->replied_early();
     if (!takes_reply(now, station, early)) return;
+    if (active_->group().doubted_as_early)
+        pace_.on_asked_again(active_->reply() == active_->group().doubted);
     pace_.on_reply(early);
     pace_.on_rate(active_->pace().hasty());
     if (const auto& look = active_->pace().end_look()) wake_latency_.on_look(look->whole);

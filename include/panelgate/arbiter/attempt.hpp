@@ -37,6 +37,7 @@ struct Group {
     Duration cut_after{};    ///< duration of the previous attempt if its reply broke off, else 0
     Bytes doubted{};         ///< reply to the previous attempt that may be a duplicate; or empty
     TimePoint doubted_at{};  ///< time of that reply
+    bool doubted_as_early = false;
     bool probe = false;
     bool distinct_length = false;  ///< its reply's length differs from all outstanding ones
     /// Set if this read checks whether the reply to a write was that write's echo, or a broadcast's
@@ -292,6 +293,7 @@ class Attempt {
         group_.doubted = std::exchange(candidate_, std::nullopt).value_or(Bytes{});
         group_.doubted_at = candidate_at_;
         if (contradicted_) group_.said.insert(group_.said.end(), said_.begin(), said_.end());
+        group_.doubted_as_early = candidate_early_;
         ++group_.doubts;
     }
 

@@ -93,9 +93,9 @@ class Quiet {
 
 /// Whether a line that is no real UART behaves like one: replies never begin before the request has
 /// left, and bytes come no faster than the line's rate. One early reply disproves it until the line
-/// is reopened; after several in a row the line does not keep its rate at all. Bytes that come too
-/// fast may have been delayed by a busy sender: that must happen repeatedly, and is forgotten.
-/// Pure.
+/// is reopened, as does one that comes again whenever it is asked for again; after several in a row
+/// the line does not keep its rate at all. Bytes that come too fast may have been delayed by a busy
+/// sender: that must happen repeatedly, and is forgotten. Pure.
 class Pace {
   public:
     void on_reply(bool early) {
@@ -111,6 +111,14 @@ class Pace {
     }
     /// An early reply was all that came.
     void on_doubted() { ++doubted_; }
+    /// Asked again, the `same` came, or another reply: the early one was none. Values change, so
+    /// one alone proves neither.
+    void on_asked_again(bool same) {
+        shown_ = std::clamp(shown_ + (same ? 1 : -1), -kEnough, kEnough);
+        if (shown_ < kEnough) return;
+        kept_ = false;
+        comes_early_ = true;
+    }
     /// `hasty`: bytes of a reply came faster than the line's rate allows.
     void on_rate(bool hasty) {
         hasty_ = hasty ? std::min(hasty_ + kWeight, kHasty * kWeight) : std::max(hasty_ - 1, 0);
@@ -121,7 +129,7 @@ class Pace {
     /// True if an early frame is no reply, as far as the last ones show: then only asking again
     /// tells. Twice in a row nothing else came: it may be one.
     bool expects_none_early() const {
-        return (believed() || in_time_ >= kAgain) && doubted_ < kDoubts;
+        return !comes_early_ && (believed() || in_time_ >= kAgain) && doubted_ < kDoubts;
     }
     /// True if the line does not keep its rate. A single early reply may be a late one to an
     /// earlier attempt.
@@ -138,7 +146,9 @@ class Pace {
     int early_ = 0;    // in a row
     int in_time_ = 0;  // in a row
     int doubted_ = 0;  // early ones in a row
+    int shown_ = 0;    // early ones that were the reply, less those that were not
     bool kept_ = true;
+    bool comes_early_ = false;
     int hasty_ = 0;  // +kWeight for each hasty reply, -1 for any other
 };
 

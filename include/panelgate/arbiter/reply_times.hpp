@@ -128,6 +128,11 @@ class RecentTimes {
     }
     /// True if a longer one than longest() is an exception, or a shorter one than shortest().
     bool is_significant() const { return seen_ >= kEnough; }
+    /// True if it is shorter than all by a quarter, and by more than the host may be late.
+    bool is_far_below(Duration time) const {
+        if (!is_significant()) return false;
+        return time < *shortest() * 3 / 4 && *shortest() - time > timing::kReadingSlack;
+    }
 
   private:
     struct Range {

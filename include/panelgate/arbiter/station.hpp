@@ -121,14 +121,12 @@ class Station {
         return shortest && first_sign < *shortest;
     }
     /// ... by a wide margin.
-    bool is_far_too_quick(Duration first_sign) const {
-        return times_.is_significant() && first_sign < *times_.shortest() * 3 / 4;
-    }
+    bool is_far_too_quick(Duration first_sign) const { return times_.is_far_below(first_sign); }
     /// ... compared with the whole `line` if few replies of the station are known. Where few of
     /// that are, too: before the request had left, and none of them had.
     bool is_far_too_quick(Duration first_sign, const RecentTimes& line) const {
         if (times_.is_significant()) return is_far_too_quick(first_sign);
-        if (line.is_significant()) return first_sign < *line.shortest() * 3 / 4;
+        if (line.is_significant()) return line.is_far_below(first_sign);
         return first_sign <= Duration::zero() && line.shortest() > Duration::zero();
     }
 

@@ -110,6 +110,31 @@ TEST(Pace, P1OneReplyThatCameTooEarlySettlesIt) {
     }
 }
 
+TEST(Pace, AnEarlyReplyThatComesAgainWhenAskedAgainIsOneHere) {
+    Pace pace;
+    reply(pace, false, 8);
+    for (int i = 0; i < 3; ++i) {
+        EXPECT_TRUE(pace.expects_none_early());
+        pace.on_doubted();
+        pace.on_asked_again(true);
+        reply(pace, false, 1);
+    }
+    EXPECT_FALSE(pace.expects_none_early());
+    EXPECT_FALSE(pace.believed());
+    reply(pace, false, 100);
+    EXPECT_FALSE(pace.expects_none_early()) << "some come early, some in time";
+}
+
+TEST(Pace, P1OldRepliesThatNowAndThenAreTheSameProveNothing) {
+    Pace pace;
+    reply(pace, false, 8);
+    for (int i = 0; i < 30; ++i) {
+        pace.on_asked_again(i % 3 == 0);
+        reply(pace, false, 1);
+        EXPECT_TRUE(pace.expects_none_early());
+    }
+}
+
 TEST(Pace, HasteNowAndThenIsASenderThatWasHeldUpAndAgainAndAgainNoPaceUntilItHasCeased) {
     Pace pace;
     for (int i = 0; i < 50; ++i) {

@@ -16,6 +16,19 @@ void timely(LateWindow& window, int replies) {
     for (int i = 0; i < replies; ++i) window.on_timely();
 }
 
+TEST(RecentTimes, AQuarterSoonerIsSoonerOnlyWhereAHostCanTell) {
+    RecentTimes slow;
+    RecentTimes quick;
+    for (unsigned i = 0; i < RecentTimes::kEnough; ++i) {
+        EXPECT_FALSE(slow.is_far_below(1ms)) << "too few are known";
+        slow.add(8ms);
+        quick.add(40us);
+    }
+    EXPECT_TRUE(slow.is_far_below(5ms));
+    EXPECT_FALSE(slow.is_far_below(7ms));
+    EXPECT_FALSE(quick.is_far_below(0us)) << "a native device: that is the host's jitter";
+}
+
 TEST(LateWindow, StaysWhatItWasConfiguredToBeOrStartsAtTheResponseTimeout) {
     EXPECT_EQ(LateWindow(std::nullopt, kTimeout).value(), kTimeout);
     LateWindow window(30ms, kTimeout);
