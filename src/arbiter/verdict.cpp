@@ -148,16 +148,21 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     return done == Done::accept;
 }
 
-/// The reply has come.
-void Arbiter::settle(TimePoint now) {
-    Station& station = stations_.of(active_->group().station);
-    const bool early = active_->replied_early();
-    if (!takes_reply(now, station, early)) return;
+/// Learns from the reply that has come whether the line keeps its rate.
+void Arbiter::learn_pace(bool early) {
     if (active_->group().doubted_as_early)
         pace_.on_asked_again(active_->reply() == active_->group().doubted);
     pace_.on_reply(early);
     pace_.on_rate(active_->pace().hasty());
     if (const auto& look = active_->pace().end_look()) wake_latency_.on_look(look->whole);
+}
+
+/// The reply has come.
+void Arbiter::settle(TimePoint now) {
+    Station& station = stations_.of(active_->group().station);
+    const bool early = active_->replied_early();
+    if (!takes_reply(now, station, early)) return;
+    learn_pace(early);
     Attempt attempt = take_active(now);
     Group& group = attempt.group();
     const Bytes& reply = attempt.reply();
@@ -169,6 +174,8 @@ void Arbiter::settle(TimePoint now) {
         station.replies().surely_answered(book, attempt.timing().started, reply);
     const Station::Replied replied = station.on_reply(book, now, attempt, needed, think);
     stations_.on_reply(now, group.shows_pace() ? std::optional(needed) : std::nullopt);
+    // The others pay no more for what may follow its answers than for failures.
+    station.on_line_rests(now, now - attempt.came_at(now));
     explain_condition(now, group.station, replied.before);
     if (replied.back) stations_.on_recovery();
     if (settings_.may_stall) stations_.on_proved(now, proved);
@@ -219,6 +226,7 @@ void Arbiter::ask_again(TimePoint now) {
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
     station.replies().on_doubted(stations_.book(), now, group, attempt.timing().sent);
+    station.on_line_rests(now, now - group.doubted_at);
     if (attempt.contradicted()) station.replies().on_contradicted(now, group.doubts > 1);
     group.silent_after = group.cut_after = {};
     finish_barred(group);

@@ -140,6 +140,7 @@ class Arbiter {
     Facts facts_of_others(TimePoint now, const Claims& claims) const;
     bool takes_reply(TimePoint now, const Station& station, bool early);
     Duration holds_answer(TimePoint now, const ReplyHabits& habits) const;
+    void learn_pace(bool early);
     void settle(TimePoint now);
     void ask_again(TimePoint now);
     void confirm(TimePoint now, const Group& group, ByteView reply, bool echoed);

@@ -171,6 +171,7 @@ class Station {
     }
     /// The whole line rests for `rest` because of it.
     void on_line_rests(TimePoint now, Duration rest) {
+        if (rest == Duration::zero()) return;
         spend(now, rest);
         if (failing()) failing_.add(rest);
     }
