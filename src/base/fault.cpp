@@ -52,13 +52,12 @@ Outcome outcome_of(Fault fault) {
         case Fault::timeout:
             return Outcome::timeout;
         case Fault::damaged:
+        case Fault::wrong:
             return Outcome::damaged;
         case Fault::offline:
             return Outcome::offline;
         case Fault::cancelled:
             return Outcome::cancelled;
-        case Fault::wrong:
-            return Outcome::wrong;
     }
     std::abort();
 }

@@ -158,8 +158,6 @@ std::string_view label(Outcome outcome) {
             return "cached";
         case Outcome::shared:
             return "shared";
-        case Outcome::wrong:
-            return "wrong";
     }
     std::abort();
 }

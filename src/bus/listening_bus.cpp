@@ -74,11 +74,10 @@ Outcome outcome_of(const tap::Transaction& heard) {
         case tap::End::silent:
             return Outcome::timeout;
         case tap::End::damaged:
+        case tap::End::wrong:
             return Outcome::damaged;
         case tap::End::unasked:
             return Outcome::ok;
-        case tap::End::wrong:
-            return Outcome::wrong;
     }
     std::abort();
 }

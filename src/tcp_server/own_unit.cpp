@@ -1,6 +1,7 @@
 #include "own_unit.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
@@ -221,13 +222,10 @@ std::uint16_t RegisterMap::fixed(std::size_t address) const {
 
 std::uint16_t RegisterMap::of_station(std::size_t offset) const {
     if (!station_) return 0;
-    const OutcomeCounts& all = station_->outcomes;
-    const std::uint64_t wide[] = {age_of(station_->last_answer),
-                                  answered(all),
-                                  all[Outcome::exception],
-                                  all[Outcome::timeout],
-                                  all[Outcome::damaged] + all[Outcome::wrong],
-                                  not_sent(all)};
+    const OutcomeCounts& outcomes = station_->outcomes;
+    const std::array<std::uint64_t, 6> wide = {
+        age_of(station_->last_answer), answered(outcomes),         outcomes[Outcome::exception],
+        outcomes[Outcome::timeout],    outcomes[Outcome::damaged], not_sent(outcomes)};
     switch (offset) {
         case 0:
             return word_of(station_->state);

@@ -103,7 +103,7 @@ enum class Outcome : std::uint8_t {
     ok,
     exception,  ///< from the panel
     timeout,
-    damaged,
+    damaged,  ///< the panel was heard, but its answer was damaged or did not fit
     refused,  ///< denied, malformed or not routed
     busy,
     expired,
@@ -112,12 +112,11 @@ enum class Outcome : std::uint8_t {
     line_down,
     cached,  ///< answered from the cache
     shared,  ///< answered by another request's transaction
-    wrong,   ///< good frames of the panel came that do not answer it
 };
-inline constexpr std::array kAllOutcomes{
-    Outcome::ok,     Outcome::exception, Outcome::timeout,   Outcome::damaged, Outcome::refused,
-    Outcome::busy,   Outcome::expired,   Outcome::cancelled, Outcome::offline, Outcome::line_down,
-    Outcome::cached, Outcome::shared,    Outcome::wrong};
+inline constexpr std::array kAllOutcomes{Outcome::ok,        Outcome::exception, Outcome::timeout,
+                                         Outcome::damaged,   Outcome::refused,   Outcome::busy,
+                                         Outcome::expired,   Outcome::cancelled, Outcome::offline,
+                                         Outcome::line_down, Outcome::cached,    Outcome::shared};
 
 /// Returns the value of panelgate_requests_total{outcome} and of a transaction's event.
 std::string_view label(Outcome outcome);

@@ -206,7 +206,7 @@ std::string words(std::size_t count) {
 TEST(Words, AreThoseOfMetricsRestAndTheTrace) {
     EXPECT_EQ(words<Outcome>(kAllOutcomes.size()),
               "ok,exception,timeout,damaged,refused,busy,expired,cancelled,offline,line_down,"
-              "cached,shared,wrong");
+              "cached,shared");
     for (std::size_t i = 0; i < kAllOutcomes.size(); ++i)
         EXPECT_EQ(static_cast<std::size_t>(kAllOutcomes[i]), i) << "counted by its place";
     EXPECT_EQ(words<PriorityClass>(kPriorityClasses), "write,read,poll,probe");
@@ -233,9 +233,8 @@ TEST(OutcomeCounts, CountEachOutcomeByItself) {
 }
 
 TEST(Fault, HasAWordOfItsOwnAndAnOutcomeOfTheMetric) {
-    const std::set<std::string_view> outcomes = {"timeout",   "damaged",   "refused",
-                                                 "busy",      "expired",   "offline",
-                                                 "cancelled", "line_down", "wrong"};
+    const std::set<std::string_view> outcomes = {"timeout", "damaged", "refused",   "busy",
+                                                 "expired", "offline", "cancelled", "line_down"};
     std::set<std::string_view> labels;
     std::set<std::string_view> used;
     for (const Fault fault : kAllFaults) {

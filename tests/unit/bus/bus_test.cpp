@@ -368,7 +368,7 @@ TEST_F(BusTest, P10CountsByConfiguredNamesOnly) {
     ASSERT_EQ(report.stations.size(), 3u);
     EXPECT_EQ(report.stations[0].station, "other");
     EXPECT_EQ(report.stations[0].requests.at(3)[Outcome::ok], 1u);
-    EXPECT_EQ(report.stations[0].requests.at(kOtherFunctions)[Outcome::wrong], 1u);
+    EXPECT_EQ(report.stations[0].requests.at(kOtherFunctions)[Outcome::damaged], 1u);
     EXPECT_EQ(report.stations[1].station, "press");
     EXPECT_EQ(report.stations[1].requests.at(3)[Outcome::ok], 1u);
     EXPECT_EQ(report.stations[1].up, true);
