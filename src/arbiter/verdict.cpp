@@ -174,8 +174,7 @@ void Arbiter::settle(TimePoint now) {
         station.replies().surely_answered(book, attempt.timing().started, reply);
     const Station::Replied replied = station.on_reply(book, now, attempt, needed, think);
     stations_.on_reply(now, group.shows_pace() ? std::optional(needed) : std::nullopt);
-    // The others pay no more for what may follow its answers than for failures.
-    station.on_line_rests(now, now - attempt.came_at(now));
+    station.on_kept(now, attempt.came_at(now));
     explain_condition(now, group.station, replied.before);
     if (replied.back) stations_.on_recovery();
     if (settings_.may_stall) stations_.on_proved(now, proved);
@@ -226,7 +225,7 @@ void Arbiter::ask_again(TimePoint now) {
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
     station.replies().on_doubted(stations_.book(), now, group, attempt.timing().sent);
-    station.on_line_rests(now, now - group.doubted_at);
+    station.on_kept(now, group.doubted_at);
     if (attempt.contradicted()) station.replies().on_contradicted(now, group.doubts > 1);
     group.silent_after = group.cut_after = {};
     finish_barred(group);

@@ -171,9 +171,13 @@ class Station {
     }
     /// The whole line rests for `rest` because of it.
     void on_line_rests(TimePoint now, Duration rest) {
-        if (rest == Duration::zero()) return;
         spend(now, rest);
         if (failing()) failing_.add(rest);
+    }
+    /// An answer was kept since it `came`: it costs the others what a failure would, if that is
+    /// because this station sends surplus ones.
+    void on_kept(TimePoint now, TimePoint came) {
+        if (replies_.holds_answers(now) > Duration::zero()) on_line_rests(now, now - came);
     }
     bool may_retry(const Group& group) const;
     /// Its request is retried; `silent`: after silence.
