@@ -230,7 +230,7 @@ void Attempt::choose() {
 
 Bytes Attempt::release_pending() {
     Bytes pending = echo_.release();
-    const Bytes begun = framer_.take_pending();
+    const Bytes begun = own_.borrowed ? Bytes{} : framer_.take_pending();
     pending.insert(pending.end(), begun.begin(), begun.end());
     return pending;
 }

@@ -243,7 +243,7 @@ class Attempt {
                (is_copy || !said(*reply_) || std::ranges::count_if(said_, said) > 1);
     }
     /// True if behind the reply another one may have begun: its rest is still to come.
-    bool goes_on() const { return framer_.has_pending(); }
+    bool goes_on() const { return !own_.borrowed && framer_.has_pending(); }
     bool had_candidate() const { return kept_ != Candidate::none; }
     /// True if the reply came where the line's echo was expected: if the echo follows, it is
     /// another master's.

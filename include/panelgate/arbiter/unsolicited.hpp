@@ -56,14 +56,13 @@ class UnsolicitedFrames {
     /// Unsolicited bytes (MST-04): counted, never matched with a later request.
     void hear(ByteView bytes);
     bool pending() const { return !idle_.empty(); }
-    /// True if that has begun like the last answer, and is shorter: the rest may follow a hole.
+    /// True if that has begun with the last answer's header, and is shorter: the rest may follow a
+    /// hole. Fewer bytes may be left of an echo.
     bool has_begun() const {
         constexpr std::size_t kHeader = 3;
-        return serial_.mode == SerialMode::rtu && pending() && idle_.size() < values_.size() &&
-               std::equal(
-                   idle_.begin(),
-                   idle_.begin() + static_cast<std::ptrdiff_t>(std::min(kHeader, idle_.size())),
-                   values_.begin());
+        return serial_.mode == SerialMode::rtu && idle_.size() >= kHeader &&
+               idle_.size() < values_.size() &&
+               std::equal(idle_.begin(), idle_.begin() + kHeader, values_.begin());
     }
     /// True if more is collected than any frame has.
     bool full() const { return idle_.size() > modbus::ReplyFramer::kMaxHeard; }
