@@ -93,7 +93,9 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
     const bool refusal = modbus::exception_of(reply).has_value();
     const bool first = !attempt.had_candidate();
     const bool is_early = early && !settings_.paced && pace_.believed();
-    const bool before_end = early && first && !settings_.paced && pace_.expects_none_early();
+    // What comes early again, and is the same, answers each time.
+    const bool before_end =
+        early && first && !settings_.paced && pace_.expects_none_early() && reply != group.doubted;
     // An earlier request may have been refused; the next refusal may be that again.
     const bool refuses_other =
         refusal && !group.probe && (attempt.refusal_was_rejected() || claims.other_outstanding);

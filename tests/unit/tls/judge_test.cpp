@@ -15,7 +15,8 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-constexpr std::int64_t kDay = 24 * 3600;
+constexpr std::int64_t kHour = 3600;  // a new certificate is valid since an hour before
+constexpr std::int64_t kDay = 24 * kHour;
 
 class JudgeTest : public ::testing::Test {
   protected:
@@ -35,7 +36,7 @@ TEST_F(JudgeTest, HasNoDoubtsAboutWhatIsFine) {
 TEST_F(JudgeTest, AnnouncesTheEnd14DaysBeforeAndNamesTheDay) {
     EXPECT_THAT(after(15), IsEmpty());
     EXPECT_THAT(after(17), ElementsAre(HasSubstr("the certificate in gateway.crt expires on " +
-                                                 date_text(made + 30 * kDay) + ", in 1")));
+                                                 date_text(made + 30 * kDay - kHour) + ", in 1")));
     EXPECT_THAT(after(31), ElementsAre(HasSubstr("has expired")));
     EXPECT_THAT(after(-1), testing::Contains(HasSubstr("compare the clock")));
     EXPECT_THAT(after(400), testing::Contains(HasSubstr("the CA CN=Plant CA in ca.crt")));
