@@ -81,6 +81,13 @@ Facts Arbiter::facts_of_others(TimePoint now, const Claims& claims) const {
            when(active_->is_late_echo(now, echo_memory_), fact::impossible);
 }
 
+/// True if a reply that began before its request had left is none, as far as the last ones show.
+/// What comes early again, and is the same, answers each time.
+bool Arbiter::begins_too_early() const {
+    return !settings_.paced && pace_.expects_none_early() &&
+           active_->reply() != active_->group().doubted;
+}
+
 /// What is true of the frame that has the form of the answer.
 Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early) const {
     const Attempt& attempt = *active_;
@@ -93,9 +100,7 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
     const bool refusal = modbus::exception_of(reply).has_value();
     const bool first = !attempt.had_candidate();
     const bool is_early = early && !settings_.paced && pace_.believed();
-    // What comes early again, and is the same, answers each time.
-    const bool before_end =
-        early && first && !settings_.paced && pace_.expects_none_early() && reply != group.doubted;
+    const bool before_end = early && first && begins_too_early();
     // An earlier request may have been refused; the next refusal may be that again.
     const bool refuses_other =
         refusal && !group.probe && (attempt.refusal_was_rejected() || claims.other_outstanding);

@@ -141,6 +141,7 @@ class Arbiter {
     bool takes_reply(TimePoint now, const Station& station, bool early);
     Duration holds_answer(TimePoint now, const ReplyHabits& habits) const;
     void learn_pace(bool early);
+    bool begins_too_early() const;
     void settle(TimePoint now);
     void ask_again(TimePoint now);
     void confirm(TimePoint now, const Group& group, ByteView reply, bool echoed);
