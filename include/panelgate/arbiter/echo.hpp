@@ -193,7 +193,8 @@ class EchoMemory {
 class LateEcho {
   public:
     void on_sent(TimePoint now, ByteView adu) {
-        sent_[next_] = {now, Bytes(adu.begin(), adu.end())};
+        sent_[next_].at = now;
+        sent_[next_].adu.assign(adu.begin(), adu.end());
         next_ = (next_ + 1) % sent_.size();
     }
     /// This frame was heard. True if it is one of ours, and three in a row have come so.

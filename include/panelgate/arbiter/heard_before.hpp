@@ -9,13 +9,11 @@
 
 namespace panelgate::arbiter {
 
-/// What was heard of each station before, as far as the line diagnosis compares
-/// it: its latest replies, and its latest reads that went unanswered. By hash;
-/// bounded.
+/// What was heard of each station before, as far as the line diagnosis compares it: its latest
+/// replies, and its latest reads that went unanswered. By hash; bounded.
 class HeardBefore {
   public:
-    /// A reply was accepted. Returns true if the same read went unanswered a
-    /// while ago.
+    /// A reply was accepted. Returns true if the same read went unanswered a while ago.
     bool on_answered(std::uint8_t station, ByteView request, ByteView reply);
     void on_unanswered(std::uint8_t station, ByteView request);
     /// True if the station has said this not last, but a while ago.

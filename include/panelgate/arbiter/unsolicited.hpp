@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -32,15 +33,16 @@ class UnsolicitedFrames {
     void on_sent(TimePoint now, ByteView adu) {
         late_echo_.on_sent(now, adu);
         last_frame_.assign(adu.begin(), adu.end());
-        values_.clear();
+        values_size_ = 0;
         replied_before_ = std::exchange(replied_, std::uint8_t{0});
     }
     /// Bytes after this answer are its station's trail, and may be such values as it has.
     void on_replied(TimePoint now, std::uint8_t station, ByteView reply = {}) {
         replied_ = station;
         replied_at_ = now;
-        if (!reply.empty() && reply[0] <= modbus::kReadInputRegisters)
-            values_ = modbus::encode_adu(station, reply);
+        if (reply.size() < 2 || reply[0] > modbus::kReadInputRegisters) return;
+        values_header_ = {station, reply[0], reply[1]};
+        values_size_ = reply.size() + modbus::kAduOverhead;
     }
     LateEcho& late_echo() { return late_echo_; }
     const LateEcho& late_echo() const { return late_echo_; }
@@ -59,10 +61,9 @@ class UnsolicitedFrames {
     /// True if that has begun with the last answer's header, and is shorter: the rest may follow a
     /// hole. Fewer bytes may be left of an echo.
     bool has_begun() const {
-        constexpr std::size_t kHeader = 3;
-        return serial_.mode == SerialMode::rtu && idle_.size() >= kHeader &&
-               idle_.size() < values_.size() &&
-               std::equal(idle_.begin(), idle_.begin() + kHeader, values_.begin());
+        return serial_.mode == SerialMode::rtu && idle_.size() >= values_header_.size() &&
+               idle_.size() < values_size_ &&
+               std::equal(values_header_.begin(), values_header_.end(), idle_.begin());
     }
     /// True if more is collected than any frame has.
     bool full() const { return idle_.size() > modbus::ReplyFramer::kMaxHeard; }
@@ -93,8 +94,9 @@ class UnsolicitedFrames {
     Bytes idle_;
     Bytes last_frame_;
     LateEcho late_echo_;
-    Bytes values_;              ///< the answer to it, if a read's
-    std::uint8_t replied_ = 0;  ///< to the last frame; 0: none, or not yet
+    std::array<std::uint8_t, 3> values_header_{};  ///< of the answer to it, if a read's
+    std::size_t values_size_ = 0;                  ///< with address and CRC; 0: none
+    std::uint8_t replied_ = 0;                     ///< to the last frame; 0: none, or not yet
     std::uint8_t replied_before_ = 0;
     TimePoint replied_at_{};
 };
