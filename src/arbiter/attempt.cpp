@@ -160,20 +160,10 @@ Verdict Attempt::accept(std::optional<Bytes> reply) {
     const std::size_t behind = collect();
     if (!reply) return Verdict::open;
     if (own_.may_be_echo(echo_, *reply)) return Verdict::open;
-    contradicted_ = is_contradicted(*reply, behind) || contradicted_;
-    // Two equal replies cannot be distinguished.
-    if (const auto candidate = std::exchange(candidate_, std::nullopt);
-        candidate && candidate != reply) {
-        contradicted_ = contradicted_ || kept_ == Candidate::held;
-        if (contradicted_) note_said(*candidate);
-        const bool aside = candidate_early_ || kept_ == Candidate::held;
-        (aside ? set_aside_ : unsolicited_).push_back(own_frame(*candidate));
-    } else if (candidate) {
-        first_reply_at_ = candidate_at_;
-    }
-    reply_ = std::move(reply);
-    if (contradicted_) note_said(*reply_);
-    if (contradicted_) choose();
+    Answers::Others others = take_others(*reply, behind);
+    if (const auto surplus = answers_.add(std::move(*reply), std::move(others), group_))
+        add_unsolicited(*surplus);
+    if (const auto& before = answers_.believed()) first_byte_ = before->began;
     return Verdict::replied;
 }
 
@@ -191,41 +181,28 @@ bool Attempt::differs(const Unused& part, const Bytes& reply) const {
            modbus::answers(group_.request.pdu(), pdu);
 }
 
-bool Attempt::is_contradicted(const Bytes& reply, std::size_t behind) {
-    if (!group_.is_values(reply)) return false;
-    const auto other = [&](const Unused& part) { return differs(part, reply); };
+Answers::Others Attempt::take_others(const Bytes& reply, std::size_t behind) {
+    Answers::Others others;
+    if (!group_.is_values(reply)) return others;
     const auto first = unsolicited_.end() - static_cast<std::ptrdiff_t>(behind);
-    const bool any = std::any_of(first, unsolicited_.end(), other);
+    others.any = std::any_of(first, unsolicited_.end(),
+                             [&](const Unused& part) { return differs(part, reply); });
     const auto whole = [&](const Unused& part) {
-        return part.kind == Unused::Kind::own && other(part);
+        return part.kind == Unused::Kind::own && differs(part, reply);
     };
     const auto found = std::partition(first, unsolicited_.end(), std::not_fn(whole));
-    for (auto part = found; part != unsolicited_.end(); ++part)
-        note_said(modbus::pdu_of(part->bytes));
-    std::move(found, unsolicited_.end(), std::back_inserter(set_aside_));
+    for (auto part = found; part != unsolicited_.end(); ++part) {
+        const ByteView pdu = modbus::pdu_of(part->bytes);
+        others.whole.emplace_back(pdu.begin(), pdu.end());
+    }
     unsolicited_.erase(found, unsolicited_.end());
-    return any;
+    return others;
 }
 
-void Attempt::note_said(ByteView reply) {
-    constexpr std::size_t kMost = 8;
-    const auto is = [&](const Bytes& one) { return std::ranges::equal(one, reply); };
-    if (said_.size() < kMost && std::ranges::none_of(said_, is))
-        said_.emplace_back(reply.begin(), reply.end());
-}
-
-void Attempt::choose() {
-    const auto said = [&](const Unused& part) {
-        return group_.was_said(modbus::pdu_of(part.bytes));
-    };
-    const auto found = std::ranges::find_if(set_aside_, said);
-    if (found == set_aside_.end() || group_.was_said(*reply_)) return;
-    const ByteView chosen = modbus::pdu_of(found->bytes);
-    Bytes reply(chosen.begin(), chosen.end());
-    found->bytes = adu_of(std::exchange(*reply_, std::move(reply)));
-    if (kept_ != Candidate::held) return;
-    first_byte_ = candidate_began_;
-    believed_ = candidate_at_;
+std::vector<Unused> Attempt::take_set_aside() {
+    std::vector<Unused> frames;
+    for (const Bytes& pdu : answers_.take_set_aside()) frames.push_back(own_frame(pdu));
+    return frames;
 }
 
 Bytes Attempt::release_pending() {
@@ -272,10 +249,8 @@ std::size_t Attempt::collect() {
         if (std::ranges::equal(parts[i].bytes, echo_.frame())) on_own_frame(in_front);
         const bool damaged = parts[i].kind == Unused::Kind::damaged;
         frames_in_front_ = frames_in_front_ || (in_front && (!damaged || foreign));
-        if (damaged && candidate_ && kept_ == Candidate::held && differs(parts[i], *candidate_)) {
-            kept_ = Candidate::doubted;
-            contradicted_ = true;
-        }
+        if (damaged && answers_.holds() && differs(parts[i], answers_.candidate()))
+            answers_.on_other_begun();
         if (damaged && !foreign) {
             if (in_front) noise_in_front_ += parts[i].bytes.size();
             own_.fragment =
@@ -295,7 +270,7 @@ void Attempt::on_own_frame(bool in_front) {
     begins_anew_ = true;  // the reply, behind it
     if (!timing_.echoes) return;
     own_.behind = true;
-    if (candidate_) add_unsolicited(*std::exchange(candidate_, std::nullopt));
+    if (const auto candidate = answers_.drop_candidate()) add_unsolicited(*candidate);
 }
 
 std::vector<Unused> Attempt::take_unsolicited() { return std::exchange(unsolicited_, {}); }
@@ -323,11 +298,10 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
         judge_unsolicited(before, ends);
     }
     const bool usual_is_over = now >= timing_.sent + timing_.usual;
-    if (candidate_ && usual_is_over && is_doubted()) return Verdict::doubtful;
-    if (candidate_ && usual_is_over) {
-        reply_ = std::exchange(candidate_, std::nullopt);
-        first_byte_ = candidate_began_;
-        believed_ = candidate_at_;
+    if (answers_.has_candidate() && usual_is_over) {
+        if (answers_.is_doubted()) return Verdict::doubtful;
+        answers_.believe();
+        first_byte_ = answers_.believed()->began;
         return Verdict::replied;
     }
     if (instead_ == Instead::reply) return Verdict::wrong;
@@ -377,12 +351,12 @@ void Attempt::teach(EchoMemory& memory) const {
 
 Duration Attempt::waited(TimePoint now) const {
     if (pace_.is_shorter()) return std::max(first_byte_ - timing_.sent, Duration::zero());
-    const Duration reply = frame_time(timing_.serial, reply_->size() + modbus::kAduOverhead);
-    return std::max(came_at(now) - timing_.sent - reply, Duration::zero());
+    const Duration frame = frame_time(timing_.serial, reply().size() + modbus::kAduOverhead);
+    return std::max(came_at(now) - timing_.sent - frame, Duration::zero());
 }
 
 TimePoint Attempt::first_byte() const {
-    if (!reply_ || !timing_.steady) return first_byte_;
+    if (!answers_.has_reply() || !timing_.steady) return first_byte_;
     return std::min(first_byte_, timing_.sent + waited(last_byte_));
 }
 
@@ -390,13 +364,13 @@ bool Attempt::may_answer_first_heard() const {
     const std::size_t size = modbus::request_adu_length(first_heard_);
     return begins_with_request(first_heard_, echo_.frame(), orders_) &&
            first_heard_[0] == group_.station &&
-           heard_size_ >= size + reply_->size() + modbus::kAduOverhead &&
-           modbus::answers(modbus::pdu_of(ByteView(first_heard_).first(size)), *reply_);
+           heard_size_ >= size + reply().size() + modbus::kAduOverhead &&
+           modbus::answers(modbus::pdu_of(ByteView(first_heard_).first(size)), reply());
 }
 
 bool Attempt::came_damaged_before() const {
-    if (noise_in_front_ < reply_->size() + modbus::kAduOverhead) return false;
-    const std::array head{group_.station, reply_->front()};
+    if (noise_in_front_ < reply().size() + modbus::kAduOverhead) return false;
+    const std::array head{group_.station, reply().front()};
     const auto behind = std::ranges::search(damaged_bytes_, head).end();
     // A part of our own request's echo begins like the reply, but continues as the request.
     return behind != damaged_bytes_.end() && *behind != group_.request.pdu()[1];
@@ -411,21 +385,19 @@ Unused Attempt::own_frame(const Bytes& pdu) const {
 }
 
 void Attempt::reject_reply() {
-    refusal_rejected_ = refusal_rejected_ || (reply_->front() & modbus::kExceptionBit) != 0;
-    add_unsolicited(*std::exchange(reply_, std::nullopt));
+    const Bytes rejected = answers_.reject();
+    refusal_rejected_ = refusal_rejected_ || modbus::exception_of(rejected).has_value();
+    add_unsolicited(rejected);
     heard_ = false;
     disturbed_ = true;
 }
 
-void Attempt::keep_candidate(Duration needed, Candidate kind) {
-    kept_ = kind;
+void Attempt::keep_candidate(Duration needed, Answers::Kept kind) {
+    answers_.keep(kind, {first_byte_, last_byte_});
     timing_.usual = std::min(timing_.usual, needed);
     // The reply that the duplicate has delayed comes after it.
-    if (is_doubted() || kind == Candidate::held)
+    if (answers_.is_doubted() || kind == Answers::Kept::held)
         timing_.usual = std::min(last_byte_ - timing_.sent + needed, timing_.patience);
-    candidate_ = std::exchange(reply_, std::nullopt);
-    candidate_at_ = last_byte_;
-    candidate_began_ = first_byte_;
     begins_anew_ = true;
     disturbed_ = true;
 }

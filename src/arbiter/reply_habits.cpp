@@ -60,7 +60,7 @@ Facts ReplyHabits::facts(const OutstandingRequests& book, TimePoint now, ByteVie
 bool ReplyHabits::may_be_duplicate(TimePoint now, const Attempt& attempt, const Claims& claims,
                                    bool early, bool quicker) const {
     const Group& group = attempt.group();
-    if (attempt.had_candidate() || attempt.reply() == group.doubted) return false;
+    if (attempt.answers().had_candidate() || attempt.reply() == group.doubted) return false;
     return is_impossible(attempt, claims, early) ||
            duplicates_.repeats_itself(now, claims.repeated) ||
            duplicates_.suspicious(now, group.request.pdu(), attempt.reply(), claims) ||
@@ -144,8 +144,9 @@ void ReplyHabits::learn_of_duplicates(OutstandingRequests& book, TimePoint now,
     const auto given = [&](TimePoint at, const Bytes& said, TimePoint before = TimePoint::max()) {
         return book.given(id_, at, said, before);
     };
-    if (!group.doubted.empty()) duplicates_.on_asked_again(attempt.contradicted());
-    const bool was_candidate = attempt.had_candidate() && given(now, reply) != TimePoint{};
+    if (!group.doubted.empty()) duplicates_.on_asked_again(attempt.answers().contradicted());
+    const bool was_candidate =
+        attempt.answers().had_candidate() && given(now, reply) != TimePoint{};
     if (reply == group.doubted || (was_candidate && !group.is_values(reply))) {
         duplicates_.on_confirmed(group.request.pdu(), reply);
     } else if (!group.doubted.empty()) {
@@ -155,7 +156,7 @@ void ReplyHabits::learn_of_duplicates(OutstandingRequests& book, TimePoint now,
         if (repeated != TimePoint{} || !group.is_values(group.doubted))
             duplicates_.on_denied(at, repeated);
     }
-    if (const auto first = attempt.first_reply_at(); first && !book.any(id_))
+    if (const auto first = attempt.answers().first_came(); first && !book.any(id_))
         duplicates_.on_repeated_reply(now, *first, given(*first, reply));
     if (attempt.came_damaged_before()) duplicates_.on_doubt(timing::kRepeatsDamaged);
     remember(book, now, group.request.pdu(), reply);

@@ -98,7 +98,7 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
     const Claims claims = habits.claims(book, now, reply, &attempt);
     const Duration first_sign = attempt.first_sign(now);
     const bool refusal = modbus::exception_of(reply).has_value();
-    const bool first = !attempt.had_candidate();
+    const bool first = !attempt.answers().had_candidate();
     const bool is_early = early && !settings_.paced && pace_.believed();
     const bool before_end = early && first && begins_too_early();
     // An earlier request may have been refused; the next refusal may be that again.
@@ -143,13 +143,13 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     const Done done = judge(facts);
     if (done == Done::contested) attempt.reject_contested();
     if (done == Done::reject) attempt.reject_reply();
-    const auto keep = [&](Attempt::Candidate as) { attempt.keep_candidate(station.needed(), as); };
-    if (done == Done::keep) keep(Attempt::Candidate::believed);
-    if (done == Done::ask_again) keep(Attempt::Candidate::doubted);
-    if (done == Done::suspect_echo) keep(Attempt::Candidate::echo);
+    const auto keep = [&](Answers::Kept as) { attempt.keep_candidate(station.needed(), as); };
+    if (done == Done::keep) keep(Answers::Kept::believed);
+    if (done == Done::ask_again) keep(Answers::Kept::doubted);
+    if (done == Done::suspect_echo) keep(Answers::Kept::echo);
     if (done == Done::hold)
-        attempt.keep_candidate(holds_answer(now, station.replies()), Attempt::Candidate::held);
-    if (done != Done::accept && (facts & fact::before_end) != 0) attempt.mark_candidate_early();
+        attempt.keep_candidate(holds_answer(now, station.replies()), Answers::Kept::held);
+    if (done != Done::accept && (facts & fact::before_end) != 0) attempt.answers().mark_early();
     attempt.group().odd_pace =
         early && !settings_.paced && !pace_.unbound() && attempt.group().attempts <= 1;
     return done == Done::accept;
@@ -191,7 +191,7 @@ void Arbiter::settle(TimePoint now) {
     quiet_.rest_until(station.trail_until());
     outbox_.on_answered(now, attempt, think, replied);
     attempt.teach(echo_memory_);
-    if (attempt.may_be_echo()) echo_memory_.on_suspected(now, group.station);
+    if (attempt.answers().may_be_echo()) echo_memory_.on_suspected(now, group.station);
     const bool refused = modbus::exception_of(reply).has_value();
     outbox_.report(attempt, refused ? TransactionEnd::exception : TransactionEnd::ok);
     if (!group.confirms.empty()) return confirm(now, group, reply, attempt.echoed());
@@ -225,7 +225,7 @@ void Arbiter::confirm(TimePoint now, const Group& group, ByteView reply, bool ec
 /// The reply may be a duplicate of an earlier one, and the real one may still come. The station's
 /// health is not affected.
 void Arbiter::ask_again(TimePoint now) {
-    if (active_->candidate_is_early()) pace_.on_doubted();
+    if (active_->answers().is_early()) pace_.on_doubted();
     active_->remember_doubt();
     Attempt attempt = take_active(now);
     outbox_.report(attempt, TransactionEnd::doubtful);
@@ -233,7 +233,7 @@ void Arbiter::ask_again(TimePoint now) {
     Station& station = stations_.of(group.station);
     station.replies().on_doubted(stations_.book(), now, group, attempt.timing().sent);
     station.on_kept(now, group.doubted_at);
-    if (attempt.contradicted()) station.replies().on_contradicted(now, group.doubts > 1);
+    if (attempt.answers().contradicted()) station.replies().on_contradicted(now, group.doubts > 1);
     group.silent_after = group.cut_after = {};
     finish_barred(group);
     if (group.doubts <= Group::kMostDoubts && in_time(now, group) && !group.abandoned()) {

@@ -8,7 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "panelgate/arbiter/answers.hpp"
 #include "panelgate/arbiter/echo.hpp"
+#include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/input_pace.hpp"
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/reply_times.hpp"
@@ -23,77 +25,6 @@
 #include "panelgate/modbus/rtu_framer.hpp"
 
 namespace panelgate::arbiter {
-
-/// The jobs that one transaction answers, and its request. jobs[0] leads; a probe has none.
-struct Group {
-    Jobs jobs{};
-    std::uint8_t station = 0;
-    modbus::Request request;
-    std::optional<modbus::Span> span{};  ///< of a read that can be shared
-    int attempts = 0;
-    Transaction transaction = 0;  ///< of the latest attempt
-    TimePoint started{};          ///< of the first attempt: the answer was sampled at or after it
-    Duration silent_after{};      ///< wait of the previous attempt; 0: it was not silent
-    Duration cut_after{};    ///< duration of the previous attempt if its reply broke off, else 0
-    Bytes doubted{};         ///< reply to the previous attempt that may be a duplicate; or empty
-    TimePoint doubted_at{};  ///< time of that reply
-    bool doubted_as_early = false;
-    bool probe = false;
-    bool distinct_length = false;  ///< its reply's length differs from all outstanding ones
-    /// Set if this read checks whether the reply to a write was that write's echo, or a broadcast's
-    /// answer: the answer for the jobs if it was not.
-    Bytes confirms{};
-    Bytes written{};             ///< the request of that write
-    bool repeatable = true;      ///< of a write: the station's `retry_writes` when it began
-    bool first_silence = false;  ///< its station was healthy when it was first sent
-    /// The queued job for which this read only detects the echo.
-    Ticket learns_for = 0;
-    PoolVector<Bytes> said{};  ///< values that came for the attempts before, where they differed
-    int doubts = 0;            ///< attempts whose answer was doubtful
-    bool odd_pace = false;     ///< its reply began before it had left, where that is unusual
-
-    static constexpr int kMostDoubts = 2;  ///< after which there is no sure answer
-
-    /// True if it asks for more than any of its jobs.
-    bool joined() const {
-        return !jobs.empty() &&
-               std::ranges::none_of(jobs, [&](const Job& job) { return job.request == request; });
-    }
-    bool has(Client client, std::uint8_t to) const {
-        return (station == to || station == 0) &&
-               std::ranges::any_of(jobs, [&](const Job& job) { return job.client == client; });
-    }
-    void on_client_gone(Client client) {
-        for (Job& job : jobs) job.gone = job.gone || job.client == client;
-    }
-    /// Removes and returns the jobs whose own deadline has passed; the others keep waiting.
-    Jobs expire(TimePoint now) {
-        return take_if(jobs, [&](const Job& job) { return job.deadline <= now; });
-    }
-    /// True if a reply that may be a duplicate must be confirmed by asking again: values, for
-    /// clients. Exceptions are not asked for again; they may be gone by then.
-    bool may_doubt(ByteView reply) const { return is_values(reply) && !jobs.empty(); }
-    /// True if an exception reply to it may be confirmed by asking again.
-    bool may_doubt_refusal() const {
-        return request.is_read() && doubted.empty() && !jobs.empty() && confirms.empty();
-    }
-    /// True if the reply holds values: the request is a read, and it was not refused.
-    bool is_values(ByteView reply) const {
-        return request.is_read() && reply[0] == request.function();
-    }
-    /// True if an earlier attempt had these values, too, among others.
-    bool was_said(ByteView reply) const {
-        return std::ranges::any_of(
-            said, [&](const Bytes& one) { return std::ranges::equal(one, reply); });
-    }
-    /// True if its reply shows the station's pace: the reply to a retry may answer the attempt
-    /// before.
-    bool shows_pace() const { return silent_after + cut_after == Duration::zero() && !odd_pace; }
-    /// True if a poll has brought it its turn.
-    bool is_poll() const { return !jobs.empty() && jobs.front().priority == PriorityClass::poll; }
-    /// True if no client waits for it any more.
-    bool abandoned() const { return std::ranges::all_of(jobs, &Job::gone); }
-};
 
 /// Outcome of an attempt.
 enum class Verdict : std::uint8_t {
@@ -189,14 +120,18 @@ class Attempt {
     const Timing& timing() const { return timing_; }
     TimePoint give_up() const { return timing_.sent + timing_.patience; }
     /// The whole reply PDU.
-    const Bytes& reply() const { return *reply_; }
+    const Bytes& reply() const { return answers_.reply(); }
+    const Answers& answers() const { return answers_; }
+    Answers& answers() { return answers_; }
     /// True if its first byte came before the computed end of the request. Noise in front of it
     /// makes that unknown.
     bool replied_early() const { return first_byte_ < timing_.sent && noise_in_front_ == 0; }
     /// ... and earlier than a clock difference of kRatesDiffer explains.
     bool replied_too_early() const { return replied_early() && first_byte_ < earliest_end(); }
     /// When the reply came that is judged now: before, if it was a candidate.
-    TimePoint came_at(TimePoint now) const { return believed_.value_or(now); }
+    TimePoint came_at(TimePoint now) const {
+        return answers_.believed() ? answers_.believed()->came : now;
+    }
     /// Time from the end of the request to the start of the reply, whose last byte came now.
     Duration waited(TimePoint now) const;
     /// Time from the end of the request to the first sign of a reply, as received: adapters buffer
@@ -209,42 +144,24 @@ class Attempt {
     /// When the last byte came that could not yet be a reply because our frame was still leaving.
     /// Empty: none did, or the reply began then.
     std::optional<TimePoint> early_noise() const {
-        return reply_ && replied_early() ? std::nullopt : early_;
+        return answers_.has_reply() && replied_early() ? std::nullopt : early_;
     }
     /// Rejects the reply as a duplicate of an earlier one: the station counts as heard, and the
     /// attempt goes on.
     void reject_reply();
     /// True if the rejected reply was an exception: the next one may be the same again.
     bool refusal_was_rejected() const { return refusal_rejected_; }
-    /// What becomes of a candidate when nothing else comes.
-    enum class Candidate : std::uint8_t {
-        none,      ///< there has been no candidate
-        believed,  ///< it is the answer
-        doubted,   ///< the attempt is doubtful
-        held,      ///< it is the answer, unless another one differs
-        echo,      ///< the same: it may be the echo, on a line that had none so far
-    };
     /// Keeps the reply as a candidate because it may be a duplicate. Nothing else comes: until
     /// `needed` after the request, the longest time the station has needed, or, if doubted, after
     /// the candidate.
-    void keep_candidate(Duration needed, Candidate kind);
-    /// The candidate began before the request had left: no reply of any request here.
-    void mark_candidate_early() { candidate_early_ = true; }
-    bool candidate_is_early() const { return candidate_early_; }
+    void keep_candidate(Duration needed, Answers::Kept kind);
     /// Takes the frames that were answers, but began too early or contradict another one.
-    std::vector<modbus::Unused> take_set_aside() { return std::exchange(set_aside_, {}); }
-    /// True if two answers came that differ, before one was given.
-    bool contradicted() const { return contradicted_; }
-    /// ... unless just one of these came for an earlier attempt, too: the reply. `is_copy`: it has
-    /// answered another request.
-    bool is_undecided(bool is_copy) const {
-        const auto said = [&](const Bytes& one) { return group_.was_said(one); };
-        return contradicted_ &&
-               (is_copy || !said(*reply_) || std::ranges::count_if(said_, said) > 1);
-    }
+    std::vector<modbus::Unused> take_set_aside();
+    /// True if the answers that came differ, and which is the reply is unknown. `is_copy`: this one
+    /// has answered another request.
+    bool is_undecided(bool is_copy) const { return answers_.is_undecided(is_copy, group_); }
     /// True if behind the reply another one may have begun: its rest is still to come.
     bool goes_on() const { return !own_.borrowed && framer_.has_pending(); }
-    bool had_candidate() const { return kept_ != Candidate::none; }
     /// True if the reply came where the line's echo was expected: if the echo follows, it is
     /// another master's.
     bool precedes_echo() const {
@@ -261,13 +178,13 @@ class Attempt {
     /// once more.
     bool may_be_its_echo(TimePoint now, bool too_quick, const EchoMemory& line) const {
         const bool behind_echo = echo_.complete() || own_.seen;
-        return !group_.request.is_read() && echo_.is_own(*reply_) &&
+        return !group_.request.is_read() && echo_.is_own(reply()) &&
                (line.comes_again(now, group_.station) ||
                 (!behind_echo && (too_quick || line.echoes_writes())));
     }
     /// True if this answer to a read is that read itself, where requests come back late.
     bool is_late_echo(TimePoint now, const EchoMemory& line) const {
-        return group_.request.is_read() && echo_.is_own(*reply_) &&
+        return group_.request.is_read() && echo_.is_own(reply()) &&
                line.comes_again(now, group_.station);
     }
     /// Rejects a reply that also answers another master's request; the station was not silent.
@@ -282,20 +199,8 @@ class Attempt {
     const Bytes& first_heard() const { return first_heard_; }
     /// True if as many damaged bytes, perhaps the same reply, came in front of it.
     bool came_damaged_before() const;
-    /// When the candidate came, if the reply repeats it.
-    std::optional<TimePoint> first_reply_at() const {
-        return may_be_echo() ? std::nullopt : first_reply_at_;
-    }
-    /// True if its candidate may have been the echo.
-    bool may_be_echo() const { return kept_ == Candidate::echo; }
     /// Records the doubtful reply in its group.
-    void remember_doubt() {
-        group_.doubted = std::exchange(candidate_, std::nullopt).value_or(Bytes{});
-        group_.doubted_at = candidate_at_;
-        if (contradicted_) group_.said.insert(group_.said.end(), said_.begin(), said_.end());
-        group_.doubted_as_early = candidate_early_;
-        ++group_.doubts;
-    }
+    void remember_doubt() { answers_.remember_in(group_); }
 
     const EchoFilter& echo() const { return echo_; }
     /// True if the whole echo came back, and no byte of it was needed to complete the reply.
@@ -354,13 +259,10 @@ class Attempt {
     Verdict take_from_echo(const Ends& ends);
     Verdict feed(ByteView bytes, const Ends& ends);
     Verdict accept(std::optional<Bytes> reply);
-    /// Sets the parts behind this reply aside that answer the request and differ. True if any do.
-    bool is_contradicted(const Bytes& reply, std::size_t behind);
+    /// Takes the parts behind this reply that answer the request and differ.
+    Answers::Others take_others(const Bytes& reply, std::size_t behind);
     /// True if this is, or has begun like, another answer to the request.
     bool differs(const modbus::Unused& part, const Bytes& reply) const;
-    void note_said(ByteView reply);
-    /// Of the answers that differ, the reply is the one that came for an earlier attempt, too.
-    void choose();
     Verdict judge_pending(const Ends& ends);
     void add_unsolicited(const Bytes& pdu) { unsolicited_.push_back(own_frame(pdu)); }
     modbus::Unused own_frame(const Bytes& pdu) const;
@@ -375,7 +277,6 @@ class Attempt {
     bool is_stale(TimePoint now, std::size_t size) const;
     /// True if other bytes were heard: the reply may be lost, so wait only the usual time.
     bool in_doubt() const { return framer_.was_damaged() || echo_.mismatch() || disturbed_; }
-    bool is_doubted() const { return kept_ == Candidate::doubted || may_be_echo(); }
     bool is_hearing() const { return framer_.has_pending() || echo_.pending(); }
 
     Group group_;
@@ -387,19 +288,9 @@ class Attempt {
     /// As framer_, in case the echo's last byte was lost and the reply's first byte was taken for
     /// it.
     std::optional<modbus::ReplyFramer> lender_;
-    std::optional<Bytes> reply_;
-    std::optional<Bytes> candidate_;  ///< a reply that may be a duplicate
-    Candidate kept_ = Candidate::none;
-    TimePoint candidate_at_{};
-    TimePoint candidate_began_{};
-    std::optional<TimePoint> believed_;  ///< when the reply came that was a candidate
-    bool candidate_early_ = false;
+    Answers answers_;
     bool begins_anew_ = false;  ///< the next byte is not the candidate's
-    bool contradicted_ = false;
-    PoolVector<Bytes> said_;  ///< the values that came, where they differ, each once
-    bool beheaded_ = false;   ///< the reply lost its first bytes
-    std::vector<modbus::Unused> set_aside_;
-    std::optional<TimePoint> first_reply_at_;
+    bool beheaded_ = false;     ///< the reply lost its first bytes
     std::vector<modbus::Unused> unsolicited_;
     Bytes damaged_bytes_;
     Bytes stale_;

@@ -125,7 +125,7 @@ TEST_F(AttemptTest, P1ARejectedReplyCountsAsHeardAndTheNextOneAnswers) {
 
 TEST_F(AttemptTest, P1ACandidateAnswersWhenNothingElseCameInTheTimeThatTheStationNeeds) {
     ASSERT_EQ(hear(10ms, kReplyAdu), Verdict::replied);
-    attempt_.keep_candidate(60ms, Attempt::Candidate::believed);
+    attempt_.keep_candidate(60ms, Answers::Kept::believed);
     Attempt other = attempt_;
     EXPECT_EQ(hear(15ms, "FF FF"_hex), Verdict::open);
     EXPECT_EQ(attempt_.on_deadline(attempt_.timing().sent + 60ms - 1ns, ends_), Verdict::open);
@@ -140,7 +140,7 @@ TEST_F(AttemptTest, P1ACandidateAnswersWhenNothingElseCameInTheTimeThatTheStatio
 
 TEST_F(AttemptTest, P1WhereDuplicatesAreKnownTheCandidateIsNoAnswer) {
     ASSERT_EQ(hear(10ms, kReplyAdu), Verdict::replied);
-    attempt_.keep_candidate(60ms, Attempt::Candidate::doubted);
+    attempt_.keep_candidate(60ms, Answers::Kept::doubted);
     EXPECT_EQ(run_to_verdict(), Verdict::doubtful) << "and it is asked once more";
     EXPECT_EQ(ended_, Duration(70ms)) << "a duplicate may have kept it from saying its own";
     EXPECT_TRUE(attempt_.take_unsolicited().empty()) << "it proves no duplicate either";
@@ -148,7 +148,7 @@ TEST_F(AttemptTest, P1WhereDuplicatesAreKnownTheCandidateIsNoAnswer) {
 
 TEST_F(AttemptTest, P1ACandidateThatComesOnceMoreIsTheAnswerAndShowsNoDuplicate) {
     ASSERT_EQ(hear(10ms, kReplyAdu), Verdict::replied);
-    attempt_.keep_candidate(60ms, Attempt::Candidate::doubted);
+    attempt_.keep_candidate(60ms, Answers::Kept::doubted);
     EXPECT_EQ(hear(30ms, kReplyAdu), Verdict::replied);
     EXPECT_EQ(attempt_.reply(), kReply);
     EXPECT_TRUE(attempt_.take_unsolicited().empty());
