@@ -6,8 +6,8 @@
 #include <iterator>
 #include <utility>
 
-#include "panelgate/arbiter/job_queue.hpp"
-#include "panelgate/arbiter/timing.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
+#include "panelgate/arbiter/queue/job_queue.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"

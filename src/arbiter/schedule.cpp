@@ -1,5 +1,5 @@
 #include "panelgate/arbiter/schedule.hpp"
-#include "panelgate/arbiter/timing.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
 
 #include <algorithm>
 #include <iterator>

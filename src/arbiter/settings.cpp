@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/queue/job.hpp"
 
 namespace panelgate::arbiter {
 

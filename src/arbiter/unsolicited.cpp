@@ -1,6 +1,6 @@
 #include "panelgate/arbiter/unsolicited.hpp"
-#include "panelgate/arbiter/echo.hpp"
-#include "panelgate/arbiter/timing.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
+#include "panelgate/arbiter/habits/echo.hpp"
 
 #include <algorithm>
 #include <cstdlib>

@@ -12,7 +12,7 @@
 #include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/arbiter/counters.hpp"
-#include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/who.hpp"

@@ -13,7 +13,7 @@
 #include "line_doctor.hpp"
 #include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/counters.hpp"
-#include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/words.hpp"
 #include "panelgate/bus/bus_client.hpp"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "panelgate/arbiter/arbiter.hpp"
-#include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "panelgate/arbiter/read_cache.hpp"
+#include "panelgate/arbiter/queue/read_cache.hpp"
 #include "plan.hpp"
 #include "watch.hpp"
 

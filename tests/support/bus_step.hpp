@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
 

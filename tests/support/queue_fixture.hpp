@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "panelgate/arbiter/job_queue.hpp"
+#include "panelgate/arbiter/queue/job_queue.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "support/request.hpp"
 

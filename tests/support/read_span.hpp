@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "panelgate/arbiter/read_cache.hpp"
+#include "panelgate/arbiter/queue/read_cache.hpp"
 #include "panelgate/modbus/request.hpp"
 
 namespace panelgate::test {

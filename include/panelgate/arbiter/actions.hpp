@@ -7,7 +7,7 @@
 #include <string_view>
 #include <variant>
 
-#include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/time.hpp"

@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "panelgate/arbiter/answers.hpp"
-#include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/group.hpp"
-#include "panelgate/arbiter/input_pace.hpp"
-#include "panelgate/arbiter/job.hpp"
-#include "panelgate/arbiter/reply_times.hpp"
+#include "panelgate/arbiter/habits/echo.hpp"
+#include "panelgate/arbiter/habits/input_pace.hpp"
+#include "panelgate/arbiter/habits/reply_times.hpp"
+#include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/pool.hpp"

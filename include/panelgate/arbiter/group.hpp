@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/pool.hpp"
 #include "panelgate/base/time.hpp"

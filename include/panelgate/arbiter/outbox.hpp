@@ -10,10 +10,10 @@
 
 #include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/attempt.hpp"
+#include "panelgate/arbiter/book/judge.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/arbiter/heard_before.hpp"
-#include "panelgate/arbiter/job.hpp"
-#include "panelgate/arbiter/judge.hpp"
+#include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station.hpp"
 #include "panelgate/base/pool.hpp"

@@ -8,11 +8,11 @@
 #include <utility>
 
 #include "panelgate/arbiter/attempt.hpp"
-#include "panelgate/arbiter/judge.hpp"
-#include "panelgate/arbiter/outstanding_requests.hpp"
-#include "panelgate/arbiter/reply_times.hpp"
+#include "panelgate/arbiter/book/judge.hpp"
+#include "panelgate/arbiter/book/outstanding_requests.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
+#include "panelgate/arbiter/habits/reply_times.hpp"
 #include "panelgate/arbiter/settings.hpp"
-#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/function.hpp"

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "panelgate/arbiter/attempt.hpp"
-#include "panelgate/arbiter/echo.hpp"
-#include "panelgate/arbiter/job_queue.hpp"
+#include "panelgate/arbiter/habits/echo.hpp"
+#include "panelgate/arbiter/queue/job_queue.hpp"
+#include "panelgate/arbiter/queue/read_cache.hpp"
 #include "panelgate/arbiter/quiet.hpp"
-#include "panelgate/arbiter/read_cache.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station.hpp"
 #include "panelgate/arbiter/stations.hpp"

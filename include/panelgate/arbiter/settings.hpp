@@ -1,10 +1,10 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
+#include "panelgate/arbiter/queue/settings.hpp"
 #include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
@@ -40,13 +40,6 @@ struct StationSettings {
     /// station has answered before (P6).
     bool vouched = false;
     friend bool operator==(const StationSettings&, const StationSettings&) = default;
-};
-
-struct QueueSettings {
-    std::size_t limit = 256;      ///< requests that wait on this line
-    std::size_t per_client = 32;  ///< of one client
-    Duration deadline = 2s;       ///< of a request, from its arrival to its answer
-    friend bool operator==(const QueueSettings&, const QueueSettings&) = default;
 };
 
 /// Which stations rest after a timeout until a late reply can no longer come (P1).

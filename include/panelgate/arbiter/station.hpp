@@ -6,13 +6,13 @@
 #include <optional>
 
 #include "panelgate/arbiter/attempt.hpp"
-#include "panelgate/arbiter/judge.hpp"
-#include "panelgate/arbiter/outstanding_requests.hpp"
+#include "panelgate/arbiter/book/judge.hpp"
+#include "panelgate/arbiter/book/outstanding_requests.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
+#include "panelgate/arbiter/habits/reply_times.hpp"
 #include "panelgate/arbiter/reply_habits.hpp"
-#include "panelgate/arbiter/reply_times.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station_health.hpp"
-#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 

@@ -3,12 +3,12 @@
 #include <map>
 #include <optional>
 
-#include "panelgate/arbiter/outstanding_requests.hpp"
-#include "panelgate/arbiter/reply_times.hpp"
+#include "panelgate/arbiter/book/outstanding_requests.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
+#include "panelgate/arbiter/habits/reply_times.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station.hpp"
 #include "panelgate/arbiter/station_health.hpp"
-#include "panelgate/arbiter/timing.hpp"
 
 namespace panelgate::arbiter {
 

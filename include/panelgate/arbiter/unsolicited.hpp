@@ -7,12 +7,12 @@
 #include <utility>
 #include <vector>
 
-#include "panelgate/arbiter/echo.hpp"
-#include "panelgate/arbiter/judge.hpp"
+#include "panelgate/arbiter/book/judge.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
+#include "panelgate/arbiter/habits/echo.hpp"
 #include "panelgate/arbiter/outbox.hpp"
 #include "panelgate/arbiter/quiet.hpp"
 #include "panelgate/arbiter/stations.hpp"
-#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"

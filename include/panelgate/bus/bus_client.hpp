@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/inline_function.hpp"

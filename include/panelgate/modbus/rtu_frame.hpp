@@ -12,6 +12,9 @@
 
 namespace panelgate::modbus {
 
+/// The address of requests to all stations: serial line V1.02, 2.2.
+inline constexpr std::uint8_t kBroadcast = 0;
+
 /// CRC-16 of the serial line (V1.02, 2.5.1.2): generator 8005h reflected, preset FFFFh, no final
 /// XOR. Sent low byte first; over a whole good frame, its CRC included, it is 0.
 std::uint16_t crc16(ByteView bytes);

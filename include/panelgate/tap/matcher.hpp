@@ -6,7 +6,7 @@
 #include <map>
 #include <optional>
 
-#include "panelgate/arbiter/outstanding_requests.hpp"
+#include "panelgate/arbiter/book/outstanding_requests.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/tap/cutter.hpp"

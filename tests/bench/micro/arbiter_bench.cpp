@@ -8,8 +8,8 @@
 #include <variant>
 
 #include "panelgate/arbiter/arbiter.hpp"
-#include "panelgate/arbiter/job_queue.hpp"
-#include "panelgate/arbiter/read_cache.hpp"
+#include "panelgate/arbiter/queue/job_queue.hpp"
+#include "panelgate/arbiter/queue/read_cache.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/request.hpp"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "arbiter_fixture.hpp"
-#include "panelgate/arbiter/timing.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::arbiter::arbiter_health_test {

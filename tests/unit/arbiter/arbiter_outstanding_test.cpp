@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "arbiter_fixture.hpp"
-#include "panelgate/arbiter/outstanding_requests.hpp"
-#include "panelgate/arbiter/timing.hpp"
+#include "panelgate/arbiter/book/outstanding_requests.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 

@@ -5,7 +5,7 @@
 #include <cstddef>
 
 #include "arbiter_fixture.hpp"
-#include "panelgate/arbiter/echo.hpp"
+#include "panelgate/arbiter/habits/echo.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 #include "support/request.hpp"

@@ -1,5 +1,5 @@
 // The line hears what it sends: that is learned, taken out, and confirms no write (P8).
-#include "panelgate/arbiter/echo.hpp"
+#include "panelgate/arbiter/habits/echo.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cstddef>
 
 #include "arbiter_fixture.hpp"
-#include "panelgate/arbiter/reply_times.hpp"
+#include "panelgate/arbiter/habits/reply_times.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 #include "support/request.hpp"

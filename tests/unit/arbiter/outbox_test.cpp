@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "arbiter_fixture.hpp"
-#include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/attempts.hpp"
 #include "support/hex.hpp"

@@ -1,5 +1,5 @@
 #include "panelgate/arbiter/station.hpp"
-#include "panelgate/arbiter/timing.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 
 #include "arbiter_fixture.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/arbiter/counters.hpp"
-#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 

@@ -1,6 +1,6 @@
-#include "panelgate/arbiter/outstanding_requests.hpp"
+#include "panelgate/arbiter/book/outstanding_requests.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/arbiter/reply_habits.hpp"
-#include "panelgate/arbiter/timing.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/read_cache.hpp"
+#include "panelgate/arbiter/queue/read_cache.hpp"
 
 #include <gtest/gtest.h>
 

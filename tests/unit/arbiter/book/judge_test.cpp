@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/judge.hpp"
+#include "panelgate/arbiter/book/judge.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <tuple>
 
-#include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/inline_function.hpp"
 #include "panelgate/base/pool.hpp"

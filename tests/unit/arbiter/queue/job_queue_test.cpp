@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/job_queue.hpp"
+#include "panelgate/arbiter/queue/job_queue.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

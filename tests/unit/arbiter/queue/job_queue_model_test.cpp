@@ -12,7 +12,7 @@
 #include <tuple>
 #include <vector>
 
-#include "panelgate/arbiter/job_queue.hpp"
+#include "panelgate/arbiter/queue/job_queue.hpp"
 #include "support/read_span.hpp"
 #include "support/request.hpp"
 

@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <optional>
 
-#include "panelgate/arbiter/reply_times.hpp"
-#include "panelgate/arbiter/timing.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
+#include "panelgate/arbiter/habits/reply_times.hpp"
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::arbiter {

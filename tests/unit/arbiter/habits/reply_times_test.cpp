@@ -1,5 +1,5 @@
-#include "panelgate/arbiter/reply_times.hpp"
-#include "panelgate/arbiter/timing.hpp"
+#include "panelgate/arbiter/habits/reply_times.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
 
 #include <gtest/gtest.h>
 

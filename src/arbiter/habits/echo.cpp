@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/echo.hpp"
+#include "panelgate/arbiter/habits/echo.hpp"
 
 #include <algorithm>
 #include <cstdlib>

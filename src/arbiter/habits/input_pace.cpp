@@ -1,5 +1,5 @@
-#include "panelgate/arbiter/input_pace.hpp"
-#include "panelgate/arbiter/timing.hpp"
+#include "panelgate/arbiter/habits/input_pace.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
 
 #include <algorithm>
 

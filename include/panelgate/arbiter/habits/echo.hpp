@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "panelgate/arbiter/timing.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/words.hpp"

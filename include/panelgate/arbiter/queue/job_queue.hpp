@@ -7,9 +7,9 @@
 #include <tuple>
 #include <utility>
 
-#include "panelgate/arbiter/job.hpp"
-#include "panelgate/arbiter/read_cache.hpp"
-#include "panelgate/arbiter/settings.hpp"
+#include "panelgate/arbiter/queue/job.hpp"
+#include "panelgate/arbiter/queue/read_cache.hpp"
+#include "panelgate/arbiter/queue/settings.hpp"
 #include "panelgate/base/inline_function.hpp"
 #include "panelgate/base/pool.hpp"
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "panelgate/arbiter/timing.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
 

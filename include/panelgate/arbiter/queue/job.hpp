@@ -13,6 +13,7 @@
 #include "panelgate/base/who.hpp"
 #include "panelgate/base/words.hpp"
 #include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::arbiter {
 
@@ -42,8 +43,7 @@ class TransactionNumbers {
 
 /// Identifies one accepted job; never reused.
 using Ticket = std::uint64_t;
-/// The station id of requests to all.
-inline constexpr std::uint8_t kBroadcast = 0;
+using modbus::kBroadcast;
 using Client = std::uint64_t;
 /// Where a client comes from: the same for all connections from one address.
 using Host = std::uint64_t;

@@ -1,10 +1,9 @@
-#include "panelgate/arbiter/outstanding_requests.hpp"
+#include "panelgate/arbiter/book/outstanding_requests.hpp"
 
 #include <algorithm>
 #include <utility>
 
-#include "panelgate/arbiter/job.hpp"
-#include "panelgate/arbiter/timing.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/response.hpp"
 
@@ -12,6 +11,7 @@ namespace panelgate::arbiter {
 
 namespace {
 
+using modbus::kBroadcast;
 using State = Asked::State;
 
 bool is_outstanding(const Asked& one) { return one.state == State::outstanding; }
