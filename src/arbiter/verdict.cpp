@@ -115,7 +115,7 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
     const bool too_soon = first && group.attempts <= 1 && station.is_far_too_quick(first_sign);
     const bool contradicted = attempt.is_undecided(claims.repeats_other) &&
                               (group.doubts == 0 || !habits.answers_twice());
-    const bool misnumbered = refusal && group.may_doubt_refusal() && first &&
+    const bool misnumbered = refusal && group.may_doubt_refusal() &&
                              habits.may_refuse_other(book, now, claims, group.request.function());
     const bool repeats = station.may_be_duplicate(now, attempt, claims, is_early);
     const bool may_ask = group.may_doubt(reply) ||

@@ -271,6 +271,20 @@ TEST_F(ArbiterAnswersTest, P4AReplyWithoutItsFirstByteIsDamagedAndNotSilence) {
     }
 }
 
+TEST_F(ArbiterAnswersTest,
+       P1ARefusalThatMayHaveAnotherFunctionsNumberIsAskedForAgainAlsoIfItCameTwice) {
+    know();
+    const Ticket first = ask(100);
+    while (!script.answered(first)) script.run_for(1ms);
+    const Ticket second = script.submit(17, "04 00 0A 00 04"_hex, 2);
+    answer(script, 17, "84 02"_hex, 12ms);  // it may be that to the first, late
+    script.run_for(4ms);
+    script.hear_reply(17, "84 02"_hex);
+    EXPECT_FALSE(script.answered(second));
+    answer_next(script, 17, "04 08 00 01 00 02 00 03 00 04"_hex, 12ms);
+    EXPECT_EQ(value(second), "04 08 00 01 00 02 00 03 00 04"_hex);
+}
+
 class ArbiterAnnouncedTest : public ArbiterAnswersTest,
                              public testing::WithParamInterface<Bytes> {};
 
