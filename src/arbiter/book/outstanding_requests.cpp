@@ -16,14 +16,9 @@ using State = Asked::State;
 
 bool is_outstanding(const Asked& one) { return one.state == State::outstanding; }
 
-/// What was announced is not announced, or refused for being busy, once more.
+/// What was announced has had its exception.
 bool may_answer(const Asked& one, ByteView reply) {
-    const auto code = one.announced ? modbus::exception_of(reply) : std::nullopt;
-    const auto is = [&](modbus::ExceptionCode what) {
-        return code == static_cast<std::uint8_t>(what);
-    };
-    return !is(modbus::ExceptionCode::acknowledge) &&
-           !is(modbus::ExceptionCode::server_device_busy) && modbus::answers(one.pdu, reply);
+    return !(one.announced && modbus::exception_of(reply)) && modbus::answers(one.pdu, reply);
 }
 
 bool is_closed(const Asked& one) {

@@ -303,6 +303,15 @@ TEST_P(ArbiterAnnouncedTest, P1ItAnswersNoOtherReadThatWasAnnouncedToo) {
     EXPECT_FALSE(script.answered(third));
 }
 
+TEST_P(ArbiterAnnouncedTest, P4ARefusalBehindItIsThatOfTheNextRequest) {
+    know();
+    ASSERT_TRUE(ask(100));
+    answer(script, 17, GetParam(), 12ms);
+    const Ticket other = script.submit(17, "03 00 00 00 01"_hex, 2);
+    answer_next(script, 17, "83 02"_hex, 12ms);
+    EXPECT_EQ(value(other), "83 02"_hex);
+}
+
 INSTANTIATE_TEST_SUITE_P(Each, ArbiterAnnouncedTest, testing::Values("83 05"_hex, "83 06"_hex));
 
 TEST_F(ArbiterAnswersTest, P5APanelThatIsOftenBusyIsNotWaitedFor) {
