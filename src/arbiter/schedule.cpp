@@ -412,12 +412,12 @@ std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& 
 }
 
 void Schedule::retry(TimePoint now, Group group, Duration patience) {
-    const bool first = !backlog_.has_retries();
+    const bool begins = !backlog_.has_retries() || group.attempts > group.doubts + 1;
     const bool at_once = !group.confirms.empty();
     // A retried write has had its turn among the writes.
     if (group.request.is_read()) patience_ = std::max(patience_, patience);
     backlog_.retry(std::move(group));
-    if (first) let_others_go_first(now);
+    if (begins) let_others_go_first(now);
     if (at_once) turns_ = 0;
 }
 

@@ -156,6 +156,19 @@ TEST_F(ScheduleTest, P4ADearRetryLeavesTheOthersNoMoreTimeThanItMayTake) {
     EXPECT_EQ(order(), "r1 3") << "what the others took counts";
 }
 
+TEST_F(ScheduleTest, P4BetweenTwoDearRetriesTheOthersHaveTheirTurns) {
+    wait(2);
+    wait(2);
+    schedule.retry(now, failed(1), kDear);
+    schedule.retry(now, failed(3), kDear);
+    EXPECT_EQ(order(1), "2");
+    Group silent = *next().group;
+    now += kDear;
+    ++silent.attempts;
+    schedule.retry(now, std::move(silent), kDear);
+    EXPECT_EQ(order(), "2 r3 r1");
+}
+
 /// Each station has one turn while a retry waits; a write that takes it counts for the reads that
 /// it passes over.
 TEST_F(ScheduleTest, P9AReaderWaitsForFourWritesAlsoBesideARetry) {
