@@ -40,8 +40,9 @@ class Checker : public Witness {
     void on_spin() { fail("it spins: its deadline passes and nothing changes"); }
     // Truth
     void on_heard(TimePoint now, std::size_t bytes);
-    /// A good answer to the request on the wire was delivered to its last byte.
-    void on_answered(TimePoint now);
+    /// A good answer of this station was delivered to its last byte: to the request on the wire, if
+    /// that asks it.
+    void on_answered(TimePoint now, std::uint8_t station);
     void on_served(TimePoint now, std::uint8_t station) override { truth_.on_served(now, station); }
     void on_executed(TimePoint now, std::uint8_t station, ByteView pdu) override {
         truth_.on_executed(now, station, pdu);
@@ -98,6 +99,9 @@ class Checker : public Witness {
         bool write = false;
         bool sent = false;  ///< in a frame, and not known to wait again
         bool gone = false;  ///< its client
+        /// It was not answered with the frame that it was taken to be in: that was a part of a
+        /// joined read, which goes alone, or the joined read itself, and has failed.
+        bool again = false;
     };
     struct Client {
         std::map<std::uint8_t, TimePoint> own_write;  ///< executed and confirmed, by station
@@ -128,6 +132,7 @@ class Checker : public Witness {
     TimePoint owed_until() const;
     // Who waits, and whose turn it is (checker_queue.cpp)
     void mark_sent(std::uint8_t station, ByteView pdu, FrameKind what);
+    void mark_answered(std::uint8_t station);
     bool joins_attempt(TimePoint now, const arbiter::Job& job) const;
     std::size_t waiting() const;
     void check_turn(TimePoint now, bool write);

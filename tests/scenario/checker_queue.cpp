@@ -24,12 +24,17 @@ void Checker::mark_sent(std::uint8_t station, ByteView pdu, FrameKind what) {
         const bool goes = span && own ? span->contains(*own)
                                       : open.job.station == station &&
                                             std::ranges::equal(open.job.request.pdu(), pdu);
-        if (goes && (open.sent || !behind.contains(open.job.client))) {
-            open.sent = true;
-        } else {
-            behind.insert(open.job.client);
-        }
+        const bool taken = goes && (open.sent || !behind.contains(open.job.client));
+        open.again = open.sent && !taken;
+        open.sent = open.sent || taken;
+        if (!taken) behind.insert(open.job.client);
     }
+}
+
+/// All that went with the frame are answered in the same moment.
+void Checker::mark_answered(std::uint8_t station) {
+    for (auto& [ticket, open] : open_)
+        open.again = open.again || (open.sent && open.job.station == station);
 }
 
 /// A read that comes while one which contains it is still leaving goes along with it, unless
@@ -55,7 +60,7 @@ std::size_t Checker::waiting() const {
     std::size_t waiting = 0;
     std::map<std::pair<unsigned, modbus::Table>, std::vector<arbiter::ReadSpan>> reads;
     for (const auto& [ticket, open] : open_) {
-        if (open.sent || open.gone) continue;
+        if ((open.sent && !open.again) || open.gone) continue;
         const auto span = test::read_span(open.job.station, open.job.request.pdu());
         if (!span || !settings_.share_reads) {
             ++waiting;

@@ -46,10 +46,11 @@ void Checker::on_heard(TimePoint now, std::size_t bytes) {
     attempt_.heard = true;
 }
 
-void Checker::on_answered(TimePoint now) {
+void Checker::on_answered(TimePoint now, std::uint8_t station) {
     on_heard(now, 1);
-    if (attempt_.answered) return;
+    if (attempt_.answered || attempt_.station != station) return;
     attempt_.answered = true;
+    silent_before_[attempt_.station] = false;
     attempt_.first = !watch_.has_answered(attempt_.station);
     const bool is_first = watch_.on_answered(now, attempt_.station, now - attempt_.sent);
     // What the way held back may have reached the station only now.

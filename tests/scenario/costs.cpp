@@ -43,7 +43,9 @@ std::string Costs::on_unanswered(TimePoint now, const Attempt& attempt, bool wan
     const Duration most = settings_.unlisted.response_timeout + frames(attempt);
     const Duration cost = std::min(now - attempt.started, most);
     dead_ += cost;
-    if (!wanted) return {};
+    // A death costs its first silence, whenever it happens.
+    const bool unforeseen = !attempt.was_silent && !attempt.again;
+    if (!wanted || unforeseen) return {};
     constexpr int kShare = 5;  // a fifth
     level_ = std::max(level_ - (now - level_at_) / kShare, Duration{}) + cost;
     level_at_ = now;

@@ -279,7 +279,7 @@ TEST(Checker, CatchesDeadStationsThatTakeTooMuch) {
         checker.on_transmit(now, {2, 3, 0, 0, 0, 1, 0x84, 0x39}, FrameKind::probe, true);
         now += 100ms;
         checker.on_transmit(now, {1, 3, 0, 0, 0, 1, 0x84, 0x0A}, FrameKind::request, false);
-        checker.on_answered(now + 50ms);
+        checker.on_answered(now + 50ms, 1);
     }
     EXPECT_FALSE(checker.failed()) << checker.violation();
     checker.at_end(now);

@@ -139,7 +139,7 @@ void Wire::deliver(const FramePtr& frame, std::size_t from, std::size_t to) {
     const auto its = [&](bool is) { return ends && is ? frame->station : std::uint8_t{0}; };
     arrive(
         {{part.begin(), part.end()},
-         answered,
+         answered ? frame->station : std::uint8_t{0},
          frame->connection,
          its(frame->copy),
          its(frame->imitation),
@@ -176,7 +176,7 @@ void Wire::arrive(Held held) {
     if (!held.overtaken.empty()) witness_.on_overtaken(held.overtaken);
     if (held.imitation_of != 0) agenda_.tell("next ends what is no answer");
     if (held.imitation_of != 0) witness_.on_imitation(held.imitation_of);
-    hear_(held.bytes, held.answered);
+    hear_(held.bytes, held.answer_of);
 }
 
 void Wire::stall(TimePoint until) {

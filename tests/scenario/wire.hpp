@@ -34,8 +34,9 @@ struct Said {
 /// damages both.
 class Wire {
   public:
-    /// Bytes reach the gateway; `answered` when a good answer has come to its last byte.
-    using Hear = std::function<void(ByteView bytes, bool answered)>;
+    /// Bytes reach the gateway; `answer_of`: the station whose good answer has come to its last
+    /// byte, or 0.
+    using Hear = std::function<void(ByteView bytes, std::uint8_t answer_of)>;
     /// A request has left undamaged, on this connection.
     using Ask = std::function<void(ByteView adu, std::uint64_t connection)>;
 
@@ -76,7 +77,7 @@ class Wire {
     using FramePtr = std::shared_ptr<Frame>;
     struct Held {
         Bytes bytes;
-        bool answered = false;
+        std::uint8_t answer_of = 0;
         std::uint64_t connection = 0;
         std::uint8_t copy_of = 0;       ///< the station whose answer it repeats
         std::uint8_t imitation_of = 0;  ///< ... or imitates

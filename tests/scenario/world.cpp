@@ -20,7 +20,7 @@ World::World(const Plan& plan, Subject& subject, Checker& checker)
       trouble_(plan_, agenda_, wire_, random_, [this] { return is_over(); }) {
     for (const PanelPlan& panel : plan_.panels)
         panels_.emplace_back(panel, plan_, agenda_, wire_, random_, checker_);
-    wire_.connect([this](ByteView bytes, bool answered) { hear(bytes, answered); },
+    wire_.connect([this](ByteView bytes, std::uint8_t answer_of) { hear(bytes, answer_of); },
                   [this](ByteView adu, std::uint64_t connection) { ask_panels(adu, connection); });
 }
 
@@ -131,18 +131,18 @@ void World::act(const arbiter::Reset&) {
     });
 }
 
-void World::hear(ByteView bytes, bool answered) {
+void World::hear(ByteView bytes, std::uint8_t answer_of) {
     if (asleep_) {
         unread_.insert(unread_.end(), bytes.begin(), bytes.end());
-        if (answered) checker_.on_answered(now());
+        if (answer_of != 0) checker_.on_answered(now(), answer_of);
         return;
     }
-    if (answered) {
-        checker_.on_answered(now());
+    if (answer_of != 0) {
+        checker_.on_answered(now(), answer_of);
     } else {
         checker_.on_heard(now(), bytes.size());
     }
-    agenda_.tell(answered ? "heard, the answer's end" : "heard", bytes);
+    agenda_.tell(answer_of != 0 ? "heard, the answer's end" : "heard", bytes);
     const bool hold = holds_input();
     unread_.insert(unread_.end(), bytes.begin(), bytes.end());
     if (!hold) read_device();

@@ -47,7 +47,7 @@ class World {
     void act(const arbiter::Written&) {}
     void act(const arbiter::StationEvent&) {}
 
-    void hear(ByteView bytes, bool answered);
+    void hear(ByteView bytes, std::uint8_t answer_of);
     void ask_panels(ByteView wire, std::uint64_t connection);
     bool is_dead(std::uint8_t station) const;
     /// As soon as the process runs.
