@@ -166,9 +166,11 @@ void ReplyHabits::learn_of_duplicates(OutstandingRequests& book, TimePoint now,
 void ReplyHabits::settle(OutstandingRequests& book, TimePoint now, const Attempt& attempt) {
     const Group& group = attempt.group();
     const TimePoint sent = attempt.timing().sent;
+    const TimePoint settled = now + duplicates_.take_doubt();
+    not_before_ = std::max(not_before_, settled);
     if (attempt.reply() == group.doubted && book.count(id_) <= 1) {
         book.settle(id_);  // both have come
-        rest_is_over(now + duplicates_.take_doubt());
+        rest_is_over(settled);
     } else if (announces(attempt.reply())) {
         // The reply comes later. Of another request's, too: which one it refers to is unknown.
         on_unanswered(book, now, group.request.pdu(), sent, true);
@@ -182,7 +184,6 @@ void ReplyHabits::settle(OutstandingRequests& book, TimePoint now, const Attempt
         on_unanswered(book, now, group.request.pdu(), sent);
     } else {
         if (!disordered_at_) book.pass(id_, sent);
-        not_before_ = std::max(not_before_, now + duplicates_.take_doubt());
         if (!book.any(id_)) until_ = {};
     }
 }
@@ -220,11 +221,11 @@ ReplyHabits::Heard ReplyHabits::on_late(OutstandingRequests& book, TimePoint now
     const Asked answered = *book.first(id_, pdu, now - latest_reply());
     const TimePoint due = answered.sent + late_.timeout();
     if (answered.announced) unkept_ = 0;
+    const bool may_be_meant = asked && modbus::exception_of(pdu);  // for the request on the wire
     // After a shortened wait it shows how long the panel needs; a reply delayed beyond the whole
     // timeout does not.
-    if (now <= due) heard.needed = now - answered.sent;
+    if (now <= due && !may_be_meant) heard.needed = now - answered.sent;
     heard.lateness = std::max(now - due, Duration::zero());
-    const bool may_be_meant = asked && modbus::exception_of(pdu);  // for the request on the wire
     if (heard.lateness > Duration::zero() && !may_be_meant) late_.on_late(heard.lateness);
     // A repetition of the previous reply may be a duplicate, and the outstanding reply still comes.
     if (may_repeat) {

@@ -74,6 +74,19 @@ TEST_F(ArbiterTest, P1AStationThatSendsItsRepliesTwiceRestsUntilTheSecondHasPass
     EXPECT_GE(bus.next_sent().value().at - replied, Duration(120ms));
 }
 
+TEST_F(ArbiterTest, P1SoItDoesBehindARefusalForBeingBusy) {
+    bus.submit(17, kRead, 1);
+    answer(bus, 17, kReply, 3ms);
+    bus.run_for(80ms);
+    bus.hear_reply(17, kReply);  // the duplicate
+    bus.run_for(200ms);
+    bus.submit(17, read_at(5), 1);
+    answer(bus, 17, "83 06"_hex, 3ms);
+    const TimePoint replied = bus.now();
+    bus.submit(17, "03 00 00 00 01"_hex, 1);
+    EXPECT_GE(bus.next_sent(300ms).value().at - replied, Duration(120ms));
+}
+
 /// Two reads of station 17, the second of which is answered like the first.
 class ArbiterDoubtTest : public ArbiterTest {
   protected:

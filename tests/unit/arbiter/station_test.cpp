@@ -127,6 +127,13 @@ TEST_F(StationTest, P1EachAttemptHasAnOutstandingReplyAndTheLastOneThatComesEnds
     EXPECT_TRUE(may_ask(now_ + 20ms, kOther));
 }
 
+TEST_F(StationTest, P4ARefusalThatMayBeMeantForTheOpenRequestShowsNoNeed) {
+    answer(kRead, kReply);
+    station_.replies().on_unanswered(book_, now_, kRead, now_);
+    hear(now_ + 100ms, "83 02"_hex, true);
+    EXPECT_EQ(station_.slowest(), 30ms);
+}
+
 /// It may be the damaged reply resent: then the reply to the retry still comes.
 TEST_F(StationTest, P1AfterADamagedReplyTheRetrysReplyOfALateStationIsOutstanding) {
     const auto repeat = [&] {
