@@ -5,14 +5,16 @@
 namespace panelgate::arbiter {
 
 std::optional<Bytes> Answers::add(Bytes reply, Others others, const Group& group) {
-    believed_.reset();
+    in_time_.reset();
+    first_came_.reset();
     contradicted_ = contradicted_ || others.any;
     for (const Bytes& other : others.whole) note_said(other);
     std::ranges::move(others.whole, std::back_inserter(set_aside_));
     std::optional<Bytes> surplus = drop_candidate();
     // Two equal ones cannot be distinguished.
     if (surplus == reply) {
-        first_came_ = times_.came;
+        if (!may_be_echo()) first_came_ = times_.came;
+        if (!may_be_echo() && !early_) in_time_ = times_;
         surplus.reset();
     } else if (surplus) {
         contradicted_ = contradicted_ || kept_ == Kept::held;
@@ -36,7 +38,7 @@ void Answers::choose(const Group& group) {
         std::ranges::find_if(set_aside_, [&](const Bytes& one) { return group.was_said(one); });
     if (chosen == set_aside_.end() || group.was_said(*reply_)) return;
     std::swap(*chosen, *reply_);
-    if (kept_ == Kept::held) believed_ = times_;
+    if (kept_ == Kept::held) in_time_ = times_;
 }
 
 bool Answers::is_undecided(bool is_copy, const Group& group) const {

@@ -88,7 +88,8 @@ std::size_t Attempt::missing() const {
 
 Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     const bool was_complete = echo_.complete();
-    const ByteView rest = echo_.feed(bytes);
+    const TimePoint before = std::exchange(buffered_at_, now);
+    ByteView rest = echo_.feed(bytes);
     if (echo_.complete() && !was_complete) {
         pace_.restart(now, rest.size());
     }
@@ -106,11 +107,8 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     append_up_to(modbus::kReadRequestAdu, first_heard_, rest);
     heard_size_ += rest.size();
     if (now < timing_.sent && !comes_back(rest)) early_ = now;
-    if (is_stale(now, rest.size())) {
-        disturbed_ = true;
-        stale_.insert(stale_.end(), rest.begin(), rest.end());
-        return Verdict::open;
-    }
+    rest = drop_stale(now, before, rest, std::min(rest.size(), bytes.size()));
+    if (rest.empty()) return Verdict::open;
     drop_what_ended(now, rest.size());
     const bool anew = std::exchange(begins_anew_, false);
     if (!heard_ || anew) first_byte_ = now;
@@ -123,6 +121,19 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     heard_ = true;
     last_byte_ = now;
     return feed(rest, ends);
+}
+
+/// Returns the bytes that may be of a reply. All but the last `fresh` the echo filter gives back:
+/// they came `before`, and are the beginning of our own frame.
+ByteView Attempt::drop_stale(TimePoint now, TimePoint before, ByteView bytes, std::size_t fresh) {
+    const std::size_t given_back = bytes.size() - fresh;
+    std::size_t stale = given_back > 0 && is_stale(before, given_back) ? given_back : 0;
+    if (fresh > 0 && is_stale(now, fresh)) {
+        disturbed_ = true;
+        stale = bytes.size();
+    }
+    stale_.insert(stale_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(stale));
+    return bytes.subspan(stale);
 }
 
 /// True if all that has come while the request is leaving is its beginning, these bytes, too.
@@ -163,7 +174,7 @@ Verdict Attempt::accept(std::optional<Bytes> reply) {
     Answers::Others others = take_others(*reply, behind);
     if (const auto surplus = answers_.add(std::move(*reply), std::move(others), group_))
         add_unsolicited(*surplus);
-    if (const auto& before = answers_.believed()) first_byte_ = before->began;
+    if (const auto& before = answers_.in_time()) first_byte_ = before->began;
     return Verdict::replied;
 }
 
@@ -256,7 +267,7 @@ std::size_t Attempt::collect() {
             own_.fragment =
                 own_.fragment || (in_front && holds_fragment(parts[i].bytes, echo_.frame()));
             append_up_to(modbus::ReplyFramer::kMaxHeard, damaged_bytes_, parts[i].bytes);
-            disturbed_ = true;
+            disturbed_ = disturbed_ || !is_only_own_beginning();
         }
         unsolicited_.push_back(std::move(parts[i]));
     }
@@ -301,22 +312,25 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
     if (answers_.has_candidate() && usual_is_over) {
         if (answers_.is_doubted()) return Verdict::doubtful;
         answers_.believe();
-        first_byte_ = answers_.believed()->began;
+        first_byte_ = answers_.in_time()->began;
         return Verdict::replied;
     }
     if (instead_ == Instead::reply) return Verdict::wrong;
     beheaded_ = beheaded_ || framer_.ends_beheaded(damaged_bytes_);
-    const bool damaged = framer_.was_damaged() || echo_.mismatch() || contested_;
-    if (framer_.was_damaged_whole() || beheaded_) return Verdict::damaged;
+    if (answers_.has_candidate()) return Verdict::open;  // something else came behind it
+    const bool own = is_only_own_beginning();
+    if ((framer_.was_damaged_whole() && !own) || beheaded_) return Verdict::damaged;
     const Duration wait = in_doubt() ? timing_.usual : timing_.patience;
     if (now < timing_.sent + wait) return Verdict::open;
     if (instead_ == Instead::unrelated) return Verdict::wrong;
+    const bool damaged = (framer_.was_damaged() && !own) || echo_.mismatch() || contested_;
     return damaged ? Verdict::damaged : Verdict::silent;
 }
 
 Verdict Attempt::take_from_echo(const Ends& ends) {
     const Bytes released = echo_.release();
     if (released.empty()) return Verdict::open;
+    if (drop_stale(buffered_at_, buffered_at_, released, 0).empty()) return Verdict::open;
     heard_ = true;
     return feed(released, ends);
 }
@@ -327,7 +341,8 @@ Verdict Attempt::on_frame_end(bool good, const Ends& ends) {
     if (accept(framer_.on_end(good)) == Verdict::replied) return Verdict::replied;
     judge_unsolicited(before, ends);
     if (instead_ == Instead::reply) return Verdict::wrong;
-    return framer_.was_damaged_whole() ? Verdict::damaged : Verdict::open;
+    const bool damaged = framer_.was_damaged_whole() && !answers_.has_candidate();
+    return damaged ? Verdict::damaged : Verdict::open;
 }
 
 void Attempt::on_end(TimePoint now, Duration left) {
@@ -352,7 +367,8 @@ void Attempt::teach(EchoMemory& memory) const {
 Duration Attempt::waited(TimePoint now) const {
     if (pace_.is_shorter()) return std::max(first_byte_ - timing_.sent, Duration::zero());
     const Duration frame = frame_time(timing_.serial, reply().size() + modbus::kAduOverhead);
-    return std::max(came_at(now) - timing_.sent - frame, Duration::zero());
+    const auto& before = answers_.in_time();
+    return std::max((before ? before->came : now) - timing_.sent - frame, Duration::zero());
 }
 
 TimePoint Attempt::first_byte() const {
@@ -366,6 +382,17 @@ bool Attempt::may_answer_first_heard() const {
            first_heard_[0] == group_.station &&
            heard_size_ >= size + reply().size() + modbus::kAduOverhead &&
            modbus::answers(modbus::pdu_of(ByteView(first_heard_).first(size)), reply());
+}
+
+/// An adapter that switches late lets a part of our request through: no damage where no reply can
+/// begin so. That to a write does.
+bool Attempt::is_only_own_beginning() const {
+    constexpr std::size_t kHeader = 3;  // address, function, byte count
+    const ByteView own = echo_.frame();
+    const auto length = group_.request.reply_length();
+    if (damaged_bytes_.size() < kHeader || damaged_bytes_.size() > own.size()) return false;
+    return group_.request.is_read() && length && own[2] != *length - kHeader - 2 &&
+           std::ranges::equal(damaged_bytes_, own.first(damaged_bytes_.size()));
 }
 
 bool Attempt::came_damaged_before() const {

@@ -88,6 +88,23 @@ bool Arbiter::begins_too_early() const {
            active_->reply() != active_->group().doubted;
 }
 
+/// Whether it may be the echo of the request, or a confirmation to all, which equal the answer to a
+/// write. `early`: it began before the request had left, on a line that keeps pace.
+Facts Arbiter::facts_of_equals(TimePoint now, const Station& station, bool early) const {
+    const Attempt& attempt = *active_;
+    if (attempt.answers().had_candidate()) return 0;
+    const Group& group = attempt.group();
+    const Bytes& reply = attempt.reply();
+    const bool too_quick =
+        early || station.is_far_too_quick(attempt.first_sign(now), stations_.times());
+    const bool like_broadcast =
+        !modbus::exception_of(reply) && group.doubted.empty() && !group.request.is_read() &&
+        station.replies().may_answer_broadcast(stations_.book().behind_broadcast(now, reply));
+    return when(attempt.may_be_its_echo(now, too_quick, echo_memory_), fact::like_echo) |
+           when(like_broadcast, fact::like_broadcast) |
+           when(attempt.precedes_echo(), fact::before_echo);
+}
+
 /// What is true of the frame that has the form of the answer.
 Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early) const {
     const Attempt& attempt = *active_;
@@ -106,12 +123,8 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
         refusal && !group.probe && (attempt.refusal_was_rejected() || claims.other_outstanding);
     const bool impossible =
         ReplyHabits::is_impossible(attempt, claims, is_early && attempt.replied_too_early());
-    const bool overdue = claims.passed && first_sign > station.usual(stations_.slowest());
-    const bool too_quick = is_early || station.is_far_too_quick(first_sign, stations_.times());
-    const bool like_echo = first && attempt.may_be_its_echo(now, too_quick, echo_memory_);
-    const bool like_broadcast = first && !refusal && group.doubted.empty() &&
-                                !group.request.is_read() &&
-                                habits.may_answer_broadcast(book.behind_broadcast(now, reply));
+    const bool overdue =
+        claims.passed && attempt.begun_after(now) > station.usual(stations_.slowest());
     const bool too_soon = first && group.attempts <= 1 && station.is_far_too_quick(first_sign);
     const bool contradicted = attempt.is_undecided(claims.repeats_other) &&
                               (group.doubts == 0 || !habits.answers_twice());
@@ -122,12 +135,11 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
                          (refusal && group.may_doubt_refusal() && attempt.may_have_collided());
     return fact::answers | facts_of_others(now, claims) | when(refuses_other, fact::refuses_other) |
            when(impossible, fact::impossible) | when(overdue, fact::overdue) |
-           when(like_echo, fact::like_echo) | when(misnumbered, fact::misnumbered) |
-           when(repeats, fact::repeats) | when(like_broadcast, fact::like_broadcast) |
-           when(too_soon, fact::too_soon) | when(before_end, fact::before_end) |
-           when(contradicted, fact::contradicted) |
+           facts_of_equals(now, station, is_early) | when(misnumbered, fact::misnumbered) |
+           when(repeats, fact::repeats) | when(too_soon, fact::too_soon) |
+           when(before_end, fact::before_end) | when(contradicted, fact::contradicted) |
            when(first && holds_answer(now, habits) > Duration::zero(), fact::may_be_followed) |
-           when(may_ask, fact::may_ask) | when(first && attempt.precedes_echo(), fact::before_echo);
+           when(may_ask, fact::may_ask);
 }
 
 /// How long the answer is held because another one may follow, or has already begun.

@@ -53,7 +53,11 @@ void Panel::hear(ByteView adu, std::uint64_t connection) {
     if (random_.chance(plan_.drop)) return;
     if (pdu[0] > 4 && plan_.deaf_to_writes > 0 && random_.chance(plan_.deaf_to_writes)) return;
     if (plan_.overtakes) return begin({{pdu.begin(), pdu.end()}, agenda_.now(), connection});
-    if (busy_ && (!plan_.ring || waiting_.size() >= kRing)) return;
+    if (busy_ && (!plan_.ring || waiting_.size() >= kRing)) {
+        // While it says what nobody expects behind its answer, that has hit the request.
+        if (agenda_.now() >= answer_ends_) witness_.on_collision(agenda_.now(), plan_.id);
+        return;
+    }
     waiting_.push_back({{pdu.begin(), pdu.end()}, agenda_.now(), connection});
     if (!busy_) serve_next();
 }
@@ -71,6 +75,7 @@ void Panel::answer_broadcast(ByteView pdu, std::uint64_t connection) {
 void Panel::serve_next() {
     busy_ = !waiting_.empty();
     if (!busy_) return;
+    answer_ends_ = TimePoint::max();
     Request request = std::move(waiting_.front());
     waiting_.pop_front();
     const Duration silence = plan_.eager ? Duration{} : silent_interval(line_.serial);
@@ -164,7 +169,9 @@ void Panel::say_all(std::vector<Utterance> all, std::size_t next, std::uint64_t 
         ++next;
         if (piece.said.bytes.empty()) continue;
         piece.said.connection = connection;
+        const bool is_answer = piece.said.answer_to > 0;
         const TimePoint end = wire_.say(std::move(piece.said));
+        if (is_answer) answer_ends_ = end;
         if (next == all.size())
             return agenda_.at(end + silent_interval(line_.serial), [this] { serve_next(); });
         agenda_.at(end, [this, all = std::move(all), next, connection] {

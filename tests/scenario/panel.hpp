@@ -67,6 +67,7 @@ class Panel {
     bool busy_ = false;
     TimePoint dark_until_{};
     TimePoint imitated_{};
+    TimePoint answer_ends_ = TimePoint::max();  ///< of what it is saying
     TimePoint answered_{};  ///< when the latest request had arrived that it has answered
     Bytes last_reply_;
 };

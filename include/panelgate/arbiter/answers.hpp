@@ -59,7 +59,7 @@ class Answers {
     /// Nothing else came: the candidate is the reply.
     void believe() {
         reply_ = drop_candidate();
-        believed_ = times_;
+        in_time_ = times_;
     }
     /// The attempt is doubtful: its group remembers what came.
     void remember_in(Group& group);
@@ -77,12 +77,10 @@ class Answers {
     bool is_doubted() const { return kept_ == Kept::doubted || may_be_echo(); }
     /// True if the candidate may have been the echo.
     bool may_be_echo() const { return kept_ == Kept::echo; }
-    /// Set if the reply was a candidate.
-    const std::optional<Times>& believed() const { return believed_; }
+    /// Set if the reply was a candidate, or repeats one that may have been it.
+    const std::optional<Times>& in_time() const { return in_time_; }
     /// When the candidate came, if the reply repeats it.
-    std::optional<TimePoint> first_came() const {
-        return may_be_echo() ? std::nullopt : first_came_;
-    }
+    const std::optional<TimePoint>& first_came() const { return first_came_; }
     /// True if two came that differ, before one was given.
     bool contradicted() const { return contradicted_; }
     /// ... unless just one of these came for an earlier attempt, too: the reply. `is_copy`: it has
@@ -99,7 +97,7 @@ class Answers {
     std::optional<Bytes> candidate_;
     Kept kept_ = Kept::none;
     Times times_;  ///< of the candidate
-    std::optional<Times> believed_;
+    std::optional<Times> in_time_;
     std::optional<TimePoint> first_came_;
     bool early_ = false;
     bool contradicted_ = false;

@@ -138,6 +138,7 @@ class Arbiter {
     void end_broadcast(TimePoint now);
     Facts facts_of_reply(TimePoint now, const Station& station, bool early) const;
     Facts facts_of_others(TimePoint now, const Claims& claims) const;
+    Facts facts_of_equals(TimePoint now, const Station& station, bool early) const;
     bool takes_reply(TimePoint now, const Station& station, bool early);
     Duration holds_answer(TimePoint now, const ReplyHabits& habits) const;
     void learn_pace(bool early);

@@ -130,7 +130,7 @@ class Attempt {
     bool replied_too_early() const { return replied_early() && first_byte_ < earliest_end(); }
     /// When the reply came that is judged now: before, if it was a candidate.
     TimePoint came_at(TimePoint now) const {
-        return answers_.believed() ? answers_.believed()->came : now;
+        return answers_.in_time() && !answers_.first_came() ? answers_.in_time()->came : now;
     }
     /// Time from the end of the request to the start of the reply, whose last byte came now.
     Duration waited(TimePoint now) const;
@@ -138,6 +138,10 @@ class Attempt {
     /// bytes.
     Duration first_sign(TimePoint now) const {
         return std::max(waited(now), first_byte_ - timing_.sent);
+    }
+    /// ... by which the reply has begun at the latest: pauses inside it count only behind noise.
+    Duration begun_after(TimePoint now) const {
+        return noise_in_front_ > 0 ? first_sign(now) : heard_after();
     }
     /// ... of whatever was heard.
     Duration heard_after() const { return first_byte_ - timing_.sent; }
@@ -249,6 +253,7 @@ class Attempt {
     };
     void drop_what_ended(TimePoint now, std::size_t size);
     bool comes_back(ByteView bytes);
+    ByteView drop_stale(TimePoint now, TimePoint before, ByteView bytes, std::size_t fresh);
     Verdict hear(TimePoint now, ByteView bytes, const Ends& ends);
     /// Bytes until the frame that has begun can be judged. 0: each may decide.
     std::size_t missing() const;
@@ -276,7 +281,12 @@ class Attempt {
     void on_own_frame(bool in_front);
     bool is_stale(TimePoint now, std::size_t size) const;
     /// True if other bytes were heard: the reply may be lost, so wait only the usual time.
-    bool in_doubt() const { return framer_.was_damaged() || echo_.mismatch() || disturbed_; }
+    bool in_doubt() const {
+        return (framer_.was_damaged() && !is_only_own_beginning()) || echo_.mismatch() ||
+               disturbed_;
+    }
+    /// True if the damaged bytes are the beginning of our own frame, and of no reply.
+    bool is_only_own_beginning() const;
     bool is_hearing() const { return framer_.has_pending() || echo_.pending(); }
 
     Group group_;
@@ -300,6 +310,7 @@ class Attempt {
     TimePoint computed_end_;
     TimePoint first_byte_;
     std::optional<TimePoint> echo_since_;  ///< when the echo filter buffered its first byte
+    TimePoint buffered_at_{};              ///< ... its last
     std::optional<TimePoint> early_;
     TimePoint last_byte_;
     Duration longest_pause_{};

@@ -28,7 +28,7 @@ class AnswersTest : public testing::Test {
 TEST_F(AnswersTest, TheLastAnswerIsTheReply) {
     EXPECT_FALSE(add(kOne));
     EXPECT_EQ(answers_.reply(), kOne);
-    EXPECT_FALSE(answers_.believed());
+    EXPECT_FALSE(answers_.in_time());
     EXPECT_FALSE(answers_.contradicted());
 }
 
@@ -38,7 +38,7 @@ TEST_F(AnswersTest, ACandidateIsTheReplyIfNothingElseComes) {
     EXPECT_FALSE(answers_.has_reply());
     answers_.believe();
     EXPECT_EQ(answers_.reply(), kOne);
-    EXPECT_EQ(answers_.believed()->came, kFirst.came);
+    EXPECT_EQ(answers_.in_time()->came, kFirst.came);
 }
 
 TEST_F(AnswersTest, ACandidateThatIsFollowedWasNone) {
@@ -72,7 +72,7 @@ TEST_F(AnswersTest, WhatAnEarlierAttemptHadTooIsTheReply) {
     keep(Kept::held);
     add(kTwo);
     EXPECT_EQ(answers_.reply(), kOne);
-    EXPECT_EQ(answers_.believed()->came, kFirst.came);
+    EXPECT_EQ(answers_.in_time()->came, kFirst.came);
     EXPECT_FALSE(answers_.is_undecided(false, group_));
     EXPECT_TRUE(answers_.is_undecided(true, group_));  // it may be another request's
     EXPECT_EQ(answers_.take_set_aside(), std::vector<Bytes>{kTwo});
@@ -101,7 +101,7 @@ TEST_F(AnswersTest, WhatComesBehindABelievedOneThatWasRejectedHasItsOwnTime) {
     answers_.believe();
     EXPECT_EQ(answers_.reject(), kOne);
     add(kTwo);
-    EXPECT_FALSE(answers_.believed());
+    EXPECT_FALSE(answers_.in_time());
 }
 
 TEST_F(AnswersTest, TheGroupRemembersTheDoubt) {

@@ -357,6 +357,86 @@ TEST_F(AttemptPaceTest, AnEchoIsLookedAtWhenItCanHaveComeBack) {
     EXPECT_EQ(attempt_.busy_until(), std::nullopt);
 }
 
+TEST_F(AttemptTest, P1AGlitchBehindADoubtedReplyIsNoReasonToCallItDamaged) {
+    const Bytes frame = encode_adu(kStation, kRead);
+    EXPECT_EQ(hear(5ms, {frame.begin(), frame.begin() + 4}), Verdict::open) << "of our echo";
+    ASSERT_EQ(hear(10ms, kReplyAdu), Verdict::replied);
+    attempt_.keep_candidate(60ms, Answers::Kept::doubted);
+    EXPECT_EQ(hear(12ms, Bytes(kReplyAdu.size(), 0xFF)), Verdict::open);
+    EXPECT_EQ(run_to_verdict(), Verdict::doubtful);
+}
+
+TEST_F(AttemptTest, P1AReplyThatRepeatsTheCandidateCameWhenThatDid) {
+    ASSERT_EQ(hear(10ms, kReplyAdu), Verdict::replied);
+    const Duration first = attempt_.begun_after(attempt_.last_byte());
+    attempt_.keep_candidate(60ms, Answers::Kept::doubted);
+    ASSERT_EQ(hear(50ms, kReplyAdu), Verdict::replied);
+    EXPECT_EQ(attempt_.begun_after(attempt_.last_byte()), first);
+    EXPECT_EQ(attempt_.first_sign(attempt_.last_byte()), first);
+    EXPECT_EQ(attempt_.came_at(attempt_.last_byte()), attempt_.last_byte()) << "both are over";
+}
+
+TEST_F(AttemptTest, P1APauseInsideAReplyMakesItNoLaterUnlessNoiseCameBeforeIt) {
+    const Bytes front(kReplyAdu.begin(), kReplyAdu.begin() + 5);
+    const Bytes rest(kReplyAdu.begin() + 5, kReplyAdu.end());
+    Attempt noisy = attempt_;
+    hear(10ms, front);
+    ASSERT_EQ(hear(50ms, rest), Verdict::replied);
+    EXPECT_EQ(attempt_.begun_after(attempt_.last_byte()), Duration(10ms));
+    EXPECT_GT(attempt_.first_sign(attempt_.last_byte()), Duration(10ms));
+    std::swap(attempt_, noisy);
+    hear(1ms, "FF FF"_hex);
+    hear(10ms, front);
+    ASSERT_EQ(hear(50ms, rest), Verdict::replied);
+    EXPECT_EQ(attempt_.begun_after(attempt_.last_byte()),
+              attempt_.first_sign(attempt_.last_byte()));
+}
+
+/// An adapter that switches late returns the first 1 to 7 bytes of what it sends.
+class APartOfTheEcho : public testing::TestWithParam<EchoFilter::Expect> {
+  protected:
+    Verdict hear(Duration after, const Bytes& bytes) {
+        return attempt_.on_rx(attempt_.timing().sent + after, bytes, ends_);
+    }
+
+    static Attempt::Timing paced() {
+        Settings line;
+        line.paced = true;
+        return timing_of(100ms, line);
+    }
+    const Bytes frame_ = encode_adu(kStation, kRead);
+    Attempt attempt_{group_of(kStation, kRead), paced(), {frame_, GetParam()}};
+    Attempt::Ends ends_ = [](ByteView) { return true; };
+};
+
+TEST_P(APartOfTheEcho, TakesNoByteOfTheReplyWithIt) {
+    hear(-3ms, {frame_.begin(), frame_.begin() + 6});
+    EXPECT_EQ(hear(5ms, {kReplyAdu.begin(), kReplyAdu.begin() + 2}), Verdict::open);
+    EXPECT_EQ(hear(9ms, {kReplyAdu.begin() + 2, kReplyAdu.end()}), Verdict::replied);
+    EXPECT_FALSE(attempt_.take_stale().empty());
+}
+
+TEST_P(APartOfTheEcho, ReadLateTakesNoByteOfTheReplyWithIt) {
+    hear(-5ms, {frame_.begin(), frame_.begin() + 4});
+    hear(3ms, {frame_.begin() + 4, frame_.begin() + 7});
+    const auto middle = kReplyAdu.end() - 2;
+    EXPECT_EQ(hear(12ms, {kReplyAdu.begin(), middle}), Verdict::open);
+    EXPECT_EQ(hear(14ms, {middle, kReplyAdu.end()}), Verdict::replied);
+}
+
+TEST_P(APartOfTheEcho, AloneIsSilenceAndNoReplyThatCameDamaged) {
+    for (const std::ptrdiff_t size : {3, 7}) {
+        Attempt attempt = attempt_;
+        attempt.on_rx(attempt.timing().sent, {frame_.begin(), frame_.begin() + size}, ends_);
+        Verdict verdict = Verdict::open;
+        while (verdict == Verdict::open) verdict = attempt.on_deadline(attempt.deadline(), ends_);
+        EXPECT_EQ(verdict, Verdict::silent) << size;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Every, APartOfTheEcho,
+                         testing::Values(EchoFilter::Expect::nothing, EchoFilter::Expect::perhaps));
+
 TEST_F(AttemptTest, AFrameThatBrokeOffDoesNotHoldUpTheReplyBehindIt) {
     EXPECT_EQ(hear(5ms, "12 03 20"_hex), Verdict::open) << "of another station";
     EXPECT_EQ(hear(60ms, kReplyAdu), Verdict::replied);
