@@ -308,7 +308,7 @@ void add_listeners(Families& out, const Snapshot& snapshot) {
 
 void add_loop(Families& out, const Snapshot& snapshot) {
     Family lag = make_histogram("panelgate_loop_lag_seconds",
-                                "How late the event loop serves a timer, sampled every 100 ms.");
+                                "How late the event loop serves a timer, sampled once a second.");
     lag.histogram({}, snapshot.runtime.loop_lag);
     out.push_back(lag.take());
 }

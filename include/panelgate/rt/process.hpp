@@ -54,7 +54,7 @@ std::vector<std::string> be_punctual(const RealtimeSettings& settings);
 /// records one late tick for them.
 class LoopLag {
   public:
-    static constexpr Duration kEvery = 100ms;
+    static constexpr Duration kEvery = 1s;  ///< each is a wake-up, also of an idle gateway
 
     /// The clock outlives it.
     explicit LoopLag(Clock& clock) : clock_(clock), alarm_(clock.make_alarm()) {}
@@ -63,7 +63,7 @@ class LoopLag {
 
     void start();
     void stop() { alarm_->cancel(); }
-    /// Lag in seconds, one sample per 100 ms.
+    /// Lag in seconds, one sample a second.
     const Histogram& seconds() const { return seconds_; }
 
   private:
