@@ -159,7 +159,7 @@ std::optional<Admission> Doors::by_unit(const WhoRef& who, std::string_view line
     if (door == doors_.end()) return std::nullopt;
     if (!is_allowed(who->listener, who->address)) return not_allowed(who);
     // What the plant has no more is its line's to say.
-    if (leads_to(plant_, line, station) && !leads_to(door->second.reach, line, station))
+    if (!leads_to(door->second.reach, line, station) && leads_to(plant_, line, station))
         return out(who, "access", "its listener does not lead there any more");
     const tcp_server::Settings& listener = *door->second.listener;
     if (listener.read_only) return only_reads(who, "access", "its listener is read-only now");

@@ -96,6 +96,7 @@ std::optional<Group> Backlog::take_retry(const InlineFunction<bool(const Group&)
 
 Jobs Backlog::remove_retries(const JobQueue::Test& match) {
     Jobs removed;
+    if (retries_.empty()) return removed;
     for (Group& group : retries_) {
         append(removed, take_if(group.jobs, match));
         if (!group.abandoned()) continue;

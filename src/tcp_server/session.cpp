@@ -128,23 +128,25 @@ void Session::read() {
     auto handler = [self = shared_from_this()](const error_code& error, std::size_t size) {
         self->on_read(error, size);
     };
-    stream_.async_read_some(asio::buffer(input_),
-                            asio::bind_allocator(PoolAllocator<std::byte>(), std::move(handler)));
+    auto pooled = asio::bind_allocator(PoolAllocator<std::byte>(), std::move(handler));
+    stream_.read_some(asio::buffer(input_), std::move(pooled));
 }
 
 void Session::on_read(const error_code& error, std::size_t size) {
     reading_ = false;
     if (closed_) return;
-    if (error == asio::error::eof) return on_end_of_input();
-    if (error == tls::kDamaged) {
-        ++shared_->counters.protocol_errors;
-        return fail("its bytes are no TLS, or were changed on the way");
-    }
-    if (error) return close();
+    if (error) return on_read_error(error);
     active_ = shared_->clock.now();
     if (input_state_ == Input::served)
         reader_->feed(shared_->clock.now(), ByteView(input_.data(), size));
     go_on();
+}
+
+void Session::on_read_error(const error_code& error) {
+    if (error == asio::error::eof) return on_end_of_input();
+    if (error != tls::kDamaged) return close();
+    ++shared_->counters.protocol_errors;
+    fail("its bytes are no TLS, or were changed on the way");
 }
 
 /// Takes complete requests from the reader as far as there is room.

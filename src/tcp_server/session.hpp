@@ -67,6 +67,7 @@ class Session : public std::enable_shared_from_this<Session> {
     void go_on();
     void read();
     void on_read(const boost::system::error_code& error, std::size_t size);
+    void on_read_error(const boost::system::error_code& error);
     void on_end_of_input();
     void watch_for_reset();
     void take_requests();

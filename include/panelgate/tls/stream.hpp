@@ -57,6 +57,9 @@ class Stream {
     auto async_read_some(const Buffers& buffers, Token&& token);
     template <class Buffers, class Token>
     auto async_write_some(const Buffers& buffers, Token&& token);
+    /// The same without a time limit (expires_after): a plain one costs what the socket's own does.
+    template <class Handler>
+    void read_some(boost::asio::mutable_buffer into, Handler handler);
     /// Writes what can be written at once; would_block if nothing. After would_block the next write
     /// must begin with the same bytes, and have as many of them or more.
     std::size_t write_some(boost::asio::const_buffer bytes, boost::system::error_code& error);
@@ -223,6 +226,12 @@ auto Stream::async_read_some(const Buffers& buffers, Token&& token) {
     ++pending_;
     return boost::asio::async_compose<Token, void(boost::system::error_code, std::size_t)>(
         Transfer<Buffers, Reading>{*this, buffers}, token, socket_);
+}
+
+template <class Handler>
+void Stream::read_some(boost::asio::mutable_buffer into, Handler handler) {
+    if (is_secure()) return async_read_some(into, std::move(handler));
+    socket_.async_read_some(into, std::move(handler));
 }
 
 template <class Buffers, class Token>

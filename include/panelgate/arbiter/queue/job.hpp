@@ -81,6 +81,7 @@ using Jobs = PoolVector<Job>;
 template <class Match>
 Jobs take_if(Jobs& jobs, const Match& match) {
     Jobs taken;
+    if (std::ranges::none_of(jobs, match)) return taken;
     std::ranges::copy_if(jobs, std::back_inserter(taken), match);
     std::erase_if(jobs, match);
     return taken;
