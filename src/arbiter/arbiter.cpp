@@ -332,7 +332,8 @@ void Arbiter::judge_idle(TimePoint now) {
 }
 
 /// Our own frame may be among what came while nothing was asked.
-void Arbiter::note_idle(TimePoint now, const std::vector<modbus::Unused>& parts) {
+void Arbiter::note_idle(TimePoint now, std::vector<modbus::Unused> heard) {
+    const std::vector<modbus::Unused> parts = unsolicited_.joined(now, std::move(heard), stations_);
     for (const modbus::Unused& part : parts) {
         const TimePoint heard_at = std::min(now, quiet_.since());
         const bool late = unsolicited_.late_echo().on_heard(heard_at, part.bytes);

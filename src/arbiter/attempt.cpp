@@ -164,7 +164,22 @@ Verdict Attempt::feed(ByteView bytes, const Ends& ends) {
             return accept(std::move(reply));
         }
     }
+    if (is_hold_over()) return believe();
     return framer_.ends_with_other_frame() ? judge_pending(ends) : Verdict::open;
+}
+
+/// True if the candidate was held only for what had begun behind it, and that is no other answer.
+bool Attempt::is_hold_over() const {
+    if (!answers_.holds() || framer_.has_candidate()) return false;
+    Unused begun;
+    begun.bytes.assign(framer_.pending().begin(), framer_.pending().end());
+    return last_byte_ >= timing_.sent + timing_.usual && !differs(begun, answers_.candidate());
+}
+
+Verdict Attempt::believe() {
+    answers_.believe();
+    first_byte_ = answers_.in_time()->began;
+    return Verdict::replied;
 }
 
 Verdict Attempt::accept(std::optional<Bytes> reply) {
@@ -259,7 +274,7 @@ std::size_t Attempt::collect() {
         const bool in_front = i + behind < parts.size();
         if (std::ranges::equal(parts[i].bytes, echo_.frame())) on_own_frame(in_front);
         const bool damaged = parts[i].kind == Unused::Kind::damaged;
-        frames_in_front_ = frames_in_front_ || (in_front && (!damaged || foreign));
+        if (in_front && (!damaged || foreign)) on_frame_in_front();
         if (damaged && answers_.holds() && differs(parts[i], answers_.candidate()))
             answers_.on_other_begun();
         if (damaged && !foreign) {
@@ -274,10 +289,17 @@ std::size_t Attempt::collect() {
     return std::min(behind, parts.size());
 }
 
+/// The reply begins behind it: if both came at once, when is unknown.
+void Attempt::on_frame_in_front() {
+    frames_in_front_ = begins_anew_ = true;
+    first_byte_ = std::max(first_byte_, std::min(last_byte_, timing_.sent));
+}
+
 /// Our own request came, which the filter did not take out: a candidate came before it.
 void Attempt::on_own_frame(bool in_front) {
     own_.came_back = true;
-    own_.again = own_.again || echo_.complete() || !in_front;
+    const bool is_behind = !in_front || (answers_.has_candidate() && !timing_.echoes);
+    own_.again = own_.again || echo_.complete() || is_behind;
     begins_anew_ = true;  // the reply, behind it
     if (!timing_.echoes) return;
     own_.behind = true;
@@ -309,12 +331,8 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
         judge_unsolicited(before, ends);
     }
     const bool usual_is_over = now >= timing_.sent + timing_.usual;
-    if (answers_.has_candidate() && usual_is_over) {
-        if (answers_.is_doubted()) return Verdict::doubtful;
-        answers_.believe();
-        first_byte_ = answers_.in_time()->began;
-        return Verdict::replied;
-    }
+    if (answers_.has_candidate() && usual_is_over)
+        return answers_.is_doubted() ? Verdict::doubtful : believe();
     if (instead_ == Instead::reply) return Verdict::wrong;
     beheaded_ = beheaded_ || framer_.ends_beheaded(damaged_bytes_);
     if (answers_.has_candidate()) return Verdict::open;  // something else came behind it

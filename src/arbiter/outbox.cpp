@@ -179,7 +179,12 @@ void Outbox::on_unsolicited(TimePoint now, const modbus::Unused& part, Done done
     const bool elsewhere = unsure || (done == Done::damaged && inside_attempt_);
     const bool old = is_surplus(done) && before_.is_old_reply(part.station, pdu_of(part));
     if (!in_time && !elsewhere) ++(symptoms.*(old ? &Symptoms::old_replies : shown.symptom));
-    if (done == Done::damaged) join(part.bytes, asked);
+    if (done == Done::damaged) {
+        join(part.bytes, asked);
+    } else if (const Bytes begun = std::exchange(cut_, {});
+               !begun.empty() && std::ranges::mismatch(begun, part.bytes).in1 == begun.end()) {
+        ++symptoms_of(cut_for_).torn;  // it was no damage
+    }
     if (inside_attempt_ && is_surplus(done) && !old && part.station != asked)
         other_frame_.assign(pdu_of(part).begin(), pdu_of(part).end());
     actions_.push_back(Note{now, shown.kind, part.bytes, {}});

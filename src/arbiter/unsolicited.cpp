@@ -46,10 +46,28 @@ std::vector<Unused> UnsolicitedFrames::take_delimited(std::uint8_t asked, bool g
     return {modbus::classify_frame(bytes, asked, good && modbus::crc_ok(bytes, orders_))};
 }
 
+std::vector<Unused> UnsolicitedFrames::joined(TimePoint now, std::vector<Unused> parts,
+                                              const Stations& stations) {
+    for (Unused& part : parts) {
+        Bytes whole = std::exchange(cut_, {});
+        if (part.kind != Unused::Kind::damaged) continue;
+        const bool first = whole.empty();
+        whole.insert(whole.end(), part.bytes.begin(), part.bytes.end());
+        const bool good = modbus::crc_ok(whole, orders_);
+        const Facts wanted = fact::own_frame | fact::request | fact::other_master;
+        if ((facts_of(now, whole, !good, stations) & wanted) != 0) {
+            if (!first) part = modbus::classify_frame(whole, part.station, good);
+        } else if (whole.size() < modbus::kMaxRtuAdu) {
+            cut_ = std::move(whole);
+        }
+    }
+    return parts;
+}
+
 Facts UnsolicitedFrames::facts_of(TimePoint now, ByteView adu, bool damaged,
                                   const Stations& stations) const {
     const bool begins = begins_with_request(adu, last_frame_, orders_);
-    const bool own = std::ranges::equal(adu, last_frame_) || late_echo_.is_own(now, adu);
+    const bool own = std::ranges::equal(adu, last_frame_) || is_own(now, adu);
     const Facts facts = when(own, fact::own_frame) |
                         when(begins && (damaged || is_request(adu)), fact::request) |
                         when(damaged, fact::damaged);
@@ -75,11 +93,14 @@ void UnsolicitedFrames::note(TimePoint now, const std::vector<modbus::Unused>& p
         }
         outbox.on_unsolicited(now, part, done, quiet.station());
         if (done == Done::damaged) stations.on_damaged(heard_at, part.bytes);
-        if (done == Done::damaged && idle) stations.on_trail(heard_at, replied_);
+        if ((done == Done::damaged || done == Done::echo) && idle)
+            stations.on_trail(heard_at, replied_);
+        if (done == Done::echo) quiet.has_come();
         if (done == Done::request) stations.book().on_foreign(heard_at, part.bytes, false);
         if (done == Done::request) let_reply_pass(now, part.bytes, stations, quiet);
-        if (done == Done::nobodys)
-            stations.book().on_foreign_answered(part.station, modbus::pdu_of(part.bytes));
+        if (done == Done::nobodys &&
+            stations.book().on_foreign_answered(part.station, modbus::pdu_of(part.bytes)))
+            quiet.has_come();
         if (done != Done::broadcast) continue;
         const auto delay = stations.book().behind_broadcast(heard_at, modbus::pdu_of(part.bytes));
         stations.on_broadcast_answered(part.station, *delay, is_exception(part.bytes));
@@ -114,7 +135,7 @@ void UnsolicitedFrames::let_reply_pass(TimePoint now, ByteView request, const St
         frame_time(serial_, modbus::reply_length_from_request(pdu).value_or(kShort));
     const Duration think = std::clamp(3 * stations.slowest().value_or(timing::kForeignThink),
                                       timing::kShortestForeign, timing::kLongestForeign);
-    quiet.rest_until(now + silent_interval(serial_) + think + reply);
+    quiet.await_until(now + silent_interval(serial_) + think + reply);
 }
 
 bool UnsolicitedFrames::is_wrong_reply(TimePoint now, ByteView adu, const Stations& stations,

@@ -37,10 +37,12 @@ bool in_time(TimePoint now, const Group& group) {
 }  // namespace
 
 void Arbiter::conclude(TimePoint now, Verdict verdict) {
-    const std::vector<modbus::Unused> unsolicited = active_->take_unsolicited();
+    const std::vector<modbus::Unused> unsolicited =
+        unsolicited_.joined(now, active_->take_unsolicited(), stations_);
     const std::uint8_t station = active_->group().station;
     for (const modbus::Unused& part : unsolicited) {
-        if (unsolicited_.late_echo().on_heard(now, part.bytes)) {
+        if (unsolicited_.late_echo().on_heard(now, part.bytes) ||
+            unsolicited_.is_own_behind_reply(now, part.bytes)) {
             hear_again(now, part.bytes[0], modbus::pdu_of(part.bytes));
         } else if (begins_with_request(part.bytes, active_->echo().frame(), orders_) &&
                    part.bytes[0] == station)
@@ -74,9 +76,8 @@ void Arbiter::end_broadcast(TimePoint now) {
 
 /// Whether it may be another master's answer, or our own request.
 Facts Arbiter::facts_of_others(TimePoint now, const Claims& claims) const {
-    const bool contested =
-        claims.contested || (active_->may_answer_first_heard() &&
-                             !unsolicited_.late_echo().is_own(now, active_->first_heard()));
+    const bool contested = claims.contested || (active_->may_answer_first_heard() &&
+                                                !unsolicited_.is_own(now, active_->first_heard()));
     return when(contested, fact::other_master) |
            when(active_->is_late_echo(now, echo_memory_), fact::impossible);
 }
@@ -138,14 +139,18 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
            facts_of_equals(now, station, is_early) | when(misnumbered, fact::misnumbered) |
            when(repeats, fact::repeats) | when(too_soon, fact::too_soon) |
            when(before_end, fact::before_end) | when(contradicted, fact::contradicted) |
-           when(first && holds_answer(now, habits) > Duration::zero(), fact::may_be_followed) |
+           when(first && is_held(now, habits), fact::may_be_followed) |
            when(may_ask, fact::may_ask);
 }
 
-/// How long the answer is held because another one may follow, or has already begun.
+/// How long the answer is held because another one may follow, or (ASCII) has already begun.
 Duration Arbiter::holds_answer(TimePoint now, const ReplyHabits& habits) const {
-    const bool begun = active_->goes_on() || (ascii_ && ascii_->goes_on());
+    const bool begun = ascii_ && ascii_->goes_on();
     return std::max(habits.holds_answers(now), begun ? active_->timing().hole : Duration::zero());
+}
+
+bool Arbiter::is_held(TimePoint now, const ReplyHabits& habits) const {
+    return active_->goes_on() || holds_answer(now, habits) > Duration::zero();
 }
 
 /// Returns true if it is the answer.
@@ -200,7 +205,7 @@ void Arbiter::settle(TimePoint now) {
     if (!settings_.paced && pace_.unbound() && now < attempt.timing().sent)
         quiet_.on_answered_early(now);
     unsolicited_.on_replied(now, group.station, reply);
-    quiet_.rest_until(station.trail_until());
+    quiet_.await_until(station.trail_until());
     outbox_.on_answered(now, attempt, think, replied);
     attempt.teach(echo_memory_);
     if (attempt.answers().may_be_echo()) echo_memory_.on_suspected(now, group.station);
@@ -286,7 +291,7 @@ void Arbiter::learn_from_failure(TimePoint now, const Attempt& attempt, Verdict 
     OutstandingRequests& book = stations_.book();
     if (attempt.came_damaged()) {
         station.replies().on_damaged_reply(book, now, request, attempt.timing().sent);
-    } else {
+    } else if (!attempt.both_came()) {
         station.replies().on_unanswered(book, now, request.pdu(), attempt.timing().sent);
     }
     if (attempt.contested()) book.on_foreign_over(attempt.group().station);

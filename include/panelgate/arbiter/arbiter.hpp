@@ -140,6 +140,7 @@ class Arbiter {
     Facts facts_of_others(TimePoint now, const Claims& claims) const;
     Facts facts_of_equals(TimePoint now, const Station& station, bool early) const;
     bool takes_reply(TimePoint now, const Station& station, bool early);
+    bool is_held(TimePoint now, const ReplyHabits& habits) const;
     Duration holds_answer(TimePoint now, const ReplyHabits& habits) const;
     void learn_pace(bool early);
     bool begins_too_early() const;
@@ -163,7 +164,7 @@ class Arbiter {
     TimePoint idle_ends() const;
     void judge_idle(TimePoint now);
     void note(TimePoint now, const std::vector<modbus::Unused>& parts);
-    void note_idle(TimePoint now, const std::vector<modbus::Unused>& parts);
+    void note_idle(TimePoint now, std::vector<modbus::Unused> heard);
     void hear_again(TimePoint now, std::uint8_t station, ByteView pdu);
 
     Settings settings_;

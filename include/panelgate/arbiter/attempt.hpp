@@ -193,10 +193,13 @@ class Attempt {
     }
     /// Rejects a reply that also answers another master's request; the station was not silent.
     void reject_contested() {
-        contested_ = true;
+        both_came_ = both_came_ || (contested_ && first_contested_ != *reply_);
+        if (!std::exchange(contested_, true)) first_contested_ = *reply_;
         reject_reply();
     }
     bool contested() const { return contested_; }
+    /// True if another one came that differs: to both requests.
+    bool both_came() const { return both_came_; }
     /// True if the first frame since the request began to leave asks the same station, and the
     /// reply behind it may be the answer to that.
     bool may_answer_first_heard() const;
@@ -278,7 +281,10 @@ class Attempt {
     void judge_unsolicited(std::size_t from, const Ends& ends);
     /// Returns how many of the parts follow the reply.
     std::size_t collect();
+    void on_frame_in_front();
     void on_own_frame(bool in_front);
+    bool is_hold_over() const;
+    Verdict believe();
     bool is_stale(TimePoint now, std::size_t size) const;
     /// True if other bytes were heard: the reply may be lost, so wait only the usual time.
     bool in_doubt() const {
@@ -320,6 +326,8 @@ class Attempt {
     std::size_t came_back_ = 0;       ///< bytes, while it was leaving, which the filter let pass
     bool frames_in_front_ = false;    ///< good frames
     bool contested_ = false;
+    bool both_came_ = false;
+    Bytes first_contested_;
     bool refusal_rejected_ = false;
     Instead instead_ = Instead::nothing;
     bool refused_other_ = false;

@@ -32,6 +32,7 @@ class UnsolicitedFrames {
     /// The frame sent last: its echo may come late.
     void on_sent(TimePoint now, ByteView adu) {
         late_echo_.on_sent(now, adu);
+        frame_before_ = replied_ != 0 ? std::move(last_frame_) : Bytes{};
         last_frame_.assign(adu.begin(), adu.end());
         values_size_ = 0;
         replied_before_ = std::exchange(replied_, std::uint8_t{0});
@@ -45,15 +46,22 @@ class UnsolicitedFrames {
         values_size_ = reply.size() + modbus::kAduOverhead;
     }
     LateEcho& late_echo() { return late_echo_; }
-    const LateEcho& late_echo() const { return late_echo_; }
-    /// True if this is the frame sent last, heard right behind its reply.
+    /// True if this is the frame sent last, or before, heard right behind its reply.
     bool is_own_behind_reply(TimePoint heard_at, ByteView adu) const {
-        return replied_ != 0 && heard_at <= replied_at_ + timing::kLongestTrail &&
-               std::ranges::equal(adu, last_frame_);
+        const bool is_last = std::ranges::equal(adu, last_frame_);
+        return heard_at <= replied_at_ + timing::kLongestTrail &&
+               (is_last ? replied_ != 0 : std::ranges::equal(adu, frame_before_));
+    }
+    /// True if it is, or comes back long after it was sent: no other master's.
+    bool is_own(TimePoint heard_at, ByteView adu) const {
+        return is_own_behind_reply(heard_at, adu) || late_echo_.is_own(heard_at, adu);
     }
     /// The station that answered the frame before the one on the wire; 0: none.
     std::uint8_t replied_before() const { return replied_before_; }
-    void forget() { idle_.clear(); }
+    void forget() {
+        idle_.clear();
+        cut_.clear();
+    }
 
     /// Unsolicited bytes (MST-04): counted, never matched with a later request.
     void hear(ByteView bytes);
@@ -71,6 +79,11 @@ class UnsolicitedFrames {
     std::vector<modbus::Unused> take(std::uint8_t asked);
     /// Takes what the line has delimited, a `good` frame or none (ASCII).
     std::vector<modbus::Unused> take_delimited(std::uint8_t asked, bool good);
+
+    /// The same, but what a pause or our own request has cut in two is whole: our own frame,
+    /// another master's request, or an answer to one. Its first piece has passed as damage.
+    std::vector<modbus::Unused> joined(TimePoint now, std::vector<modbus::Unused> parts,
+                                       const Stations& stations);
 
     /// Counts, traces, and updates the stations. `idle`: no request has wholly left since the last
     /// reply, so that bytes may be its trail.
@@ -92,7 +105,9 @@ class UnsolicitedFrames {
     SerialFormat serial_;
     modbus::CrcOrders orders_;
     Bytes idle_;
+    Bytes cut_;  ///< the last damaged bytes, which may go on
     Bytes last_frame_;
+    Bytes frame_before_;  ///< if it was answered
     LateEcho late_echo_;
     std::array<std::uint8_t, 3> values_header_{};  ///< of the answer to it, if a read's
     std::size_t values_size_ = 0;                  ///< with address and CRC; 0: none

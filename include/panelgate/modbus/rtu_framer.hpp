@@ -67,6 +67,7 @@ class ReplyFramer {
 
     /// True if bytes are pending: more bytes or silence will decide.
     bool has_pending() const { return !heard_.empty(); }
+    ByteView pending() const { return heard_; }
     /// True if some of them may be the beginning of the reply.
     bool has_candidate() const { return has_start() || ends_with_address(); }
     /// True if, besides, its first bytes will give its length: silence inside is then only a gap.

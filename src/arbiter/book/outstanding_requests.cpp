@@ -290,7 +290,7 @@ void OutstandingRequests::on_foreign(TimePoint now, ByteView bytes, bool maybe) 
           kForeign);
 }
 
-void OutstandingRequests::on_foreign_answered(std::uint8_t station, ByteView reply) {
+bool OutstandingRequests::on_foreign_answered(std::uint8_t station, ByteView reply) {
     Asked* oldest = nullptr;
     for (Asked& one : at(station).asked) {
         if (one.state != State::foreign || one.followed || !modbus::answers(one.pdu, reply))
@@ -298,6 +298,7 @@ void OutstandingRequests::on_foreign_answered(std::uint8_t station, ByteView rep
         if (oldest == nullptr || one.sent < oldest->sent) oldest = &one;
     }
     if (oldest != nullptr) oldest->followed = true;
+    return oldest != nullptr;
 }
 
 void OutstandingRequests::on_foreign_over(std::uint8_t station) {

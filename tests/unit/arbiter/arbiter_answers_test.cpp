@@ -257,6 +257,75 @@ TEST_F(ArbiterAnswersTest, P1AReplyBehindAnotherMastersRequestThatCameWhileOursL
     }
 }
 
+/// A busy machine, or an adapter that passes bytes on now and then, puts a pause into it.
+TEST_F(ArbiterAnswersTest, P1AnotherMastersRequestThatCameInTwoPiecesMakesAReplyAmbiguous) {
+    know();
+    for (const bool behind : {false, true}) {
+        const Bytes other = encode_adu(17, read_at(90));
+        script.run_for(200ms);
+        if (!behind) script.submit(18, read_at(1), 1);
+        if (!behind) script.run_to_end_of_request();
+        script.hear(ByteView(other).first(5));
+        script.run_for(3ms);
+        script.hear(ByteView(other).subspan(5));
+        if (!behind) script.run_for(3ms);
+        if (!behind) script.hear_reply(18, reply_number(1));
+        const Ticket ticket = ask(40);
+        answer(script, 17, reply_number(90));
+        EXPECT_FALSE(script.answered(ticket)) << behind;
+        script.run_for(12ms);
+        script.hear_reply(17, reply_number(40));
+        ASSERT_TRUE(script.next_sent(200ms));
+        answer(script, 17, reply_number(41), 12ms);
+        EXPECT_EQ(value(ticket), reply_number(41)) << behind;
+        const std::size_t sent = script.sent.size();
+        const Ticket next = ask(42);
+        ASSERT_EQ(script.sent.size(), sent + 1) << "both were answered: nothing is outstanding";
+        answer(script, 17, reply_number(42), 12ms);
+        EXPECT_EQ(value(next), reply_number(42));
+    }
+}
+
+/// A foreign request in front is no part of the reply: that came in time.
+TEST_F(ArbiterAnswersTest, P1AReplyBehindARequestToAnotherPanelIsTaken) {
+    know();
+    const Ticket ticket = ask(40);
+    script.hear(encode_adu(18, read_at(90)));
+    script.run_to_end_of_request();
+    script.run_for(12ms);
+    script.hear_reply(17, reply_number(40));
+    EXPECT_EQ(value(ticket), reply_number(40));
+}
+
+TEST_F(ArbiterAnswersTest, P5WhenAnotherMasterHasItsAnswerTheLineIsFree) {
+    know();
+    script.run_for(200ms);
+    script.hear(encode_adu(18, read_at(90)));
+    const std::size_t sent = script.sent.size();
+    script.run_for(3ms);
+    script.submit(17, read_at(40), 1);
+    script.run_for(5ms);
+    EXPECT_EQ(script.sent.size(), sent);
+    script.hear_reply(18, reply_number(90));
+    const TimePoint from = script.now();
+    ASSERT_TRUE(script.next_sent(100ms));
+    EXPECT_LE(script.now() - from, settings.end_of_frame);
+}
+
+/// A converter that gives each request back behind the reply.
+TEST_F(ArbiterAnswersTest, P5NothingIsWaitedForWhereOurOwnFrameHasBegunBehindAReply) {
+    know();
+    const Ticket ticket = ask(40);
+    script.run_to_end_of_request();
+    script.run_for(12ms);
+    Bytes both = encode_adu(17, reply_number(40));
+    both.insert(both.end(), {17, 3});
+    script.hear(both);
+    EXPECT_FALSE(script.answered(ticket)) << "another answer may have begun";
+    script.hear(ByteView(encode_adu(17, read_at(40))).subspan(2));
+    EXPECT_EQ(value(ticket), reply_number(40));
+}
+
 TEST_F(ArbiterAnswersTest, P4AReplyWithoutItsFirstByteIsDamagedAndNotSilence) {
     settings.stations[0].retries = 0;
     for (const std::size_t lost : {1u, 2u, 3u}) {

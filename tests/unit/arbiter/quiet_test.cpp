@@ -53,8 +53,10 @@ TEST_F(QuietTest, RestsForTheLongestRequestedTimeAndUntilThatIsOver) {
     quiet_.rest_until(kStart + 300ms);
     quiet_.rest_until(kStart + 200ms);
     EXPECT_EQ(quiet_.free_at(kGap), kStart + 300ms);
-    quiet_.rest_is_over();
-    EXPECT_EQ(quiet_.free_at(kGap), kStart + kGap);
+    quiet_.await_until(kStart + 400ms);
+    EXPECT_EQ(quiet_.free_at({}), kStart + 400ms);
+    quiet_.has_come();
+    EXPECT_EQ(quiet_.free_at(kGap), kStart + 300ms);
 }
 
 TEST_F(QuietTest, P1AQuarantineLastsUntilItsLatestInstantUnlessItsOwnStationLiftsIt) {

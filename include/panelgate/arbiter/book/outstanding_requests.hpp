@@ -164,8 +164,8 @@ class OutstandingRequests {
     void on_refusal(std::uint8_t station, TimePoint now, ByteView reply);
     /// The bytes begin with another master's request. `maybe`: or with a reply.
     void on_foreign(TimePoint now, ByteView bytes, bool maybe);
-    /// This answered the oldest of another master's requests that it fits.
-    void on_foreign_answered(std::uint8_t station, ByteView reply);
+    /// This answered the oldest of another master's requests that it fits. False: there is none.
+    bool on_foreign_answered(std::uint8_t station, ByteView reply);
     /// What they have asked of it so far is over.
     void on_foreign_over(std::uint8_t station);
     void on_broadcast(TimePoint sent, const Bytes& pdu);
