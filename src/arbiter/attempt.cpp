@@ -341,7 +341,7 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
     const Duration wait = in_doubt() ? timing_.usual : timing_.patience;
     if (now < timing_.sent + wait) return Verdict::open;
     if (instead_ == Instead::unrelated) return Verdict::wrong;
-    const bool damaged = (framer_.was_damaged() && !own) || echo_.mismatch() || contested_;
+    const bool damaged = (framer_.was_damaged() && !own) || echo_.mismatch() || contested();
     return damaged ? Verdict::damaged : Verdict::silent;
 }
 

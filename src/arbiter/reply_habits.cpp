@@ -126,6 +126,8 @@ void ReplyHabits::on_damaged_reply(OutstandingRequests& book, TimePoint now,
 void ReplyHabits::on_answered(OutstandingRequests& book, TimePoint now, const Attempt& attempt,
                               Duration waited) {
     const Group& group = attempt.group();
+    if (teaches_echo_of_writes(group.request) && !modbus::exception_of(attempt.reply()))
+        confirmation_ = attempt.reply();
     proof_unanswered_ = false;
     late_.on_timely();
     reconnect_.on_replied(2 * waited <= late_.timeout());
@@ -193,6 +195,7 @@ ReplyHabits::Heard ReplyHabits::on_unsolicited(OutstandingRequests& book, TimePo
     const bool may_repeat =
         now < std::exchange(again_until_, TimePoint{}) || book.given(id_, now, pdu) != TimePoint{};
     if (modbus::exception_of(pdu)) book.on_refusal(id_, now, pdu);
+    if (asked && std::ranges::equal(pdu, confirmation_)) repeated_at_ = now;
     // Right behind the last reply and answering the same: one of the two is surplus.
     const Asked* const last = book.last_reply(id_);
     if ((done == Done::second || done == Done::disorder) && last != nullptr &&

@@ -54,7 +54,7 @@ std::vector<Unused> UnsolicitedFrames::joined(TimePoint now, std::vector<Unused>
         const bool first = whole.empty();
         whole.insert(whole.end(), part.bytes.begin(), part.bytes.end());
         const bool good = modbus::crc_ok(whole, orders_);
-        const Facts wanted = fact::own_frame | fact::request | fact::other_master;
+        const Facts wanted = fact::own_frame | fact::request | fact::other_master | fact::repeats;
         if ((facts_of(now, whole, !good, stations) & wanted) != 0) {
             if (!first) part = modbus::classify_frame(whole, part.station, good);
         } else if (whole.size() < modbus::kMaxRtuAdu) {

@@ -101,7 +101,9 @@ Facts Arbiter::facts_of_equals(TimePoint now, const Station& station, bool early
     const bool like_broadcast =
         !modbus::exception_of(reply) && group.doubted.empty() && !group.request.is_read() &&
         station.replies().may_answer_broadcast(stations_.book().behind_broadcast(now, reply));
-    return when(attempt.may_be_its_echo(now, too_quick, echo_memory_), fact::like_echo) |
+    const bool like_echo = attempt.may_be_its_echo(now, too_quick, echo_memory_) ||
+                           station.replies().may_repeat_confirmation(now, reply);
+    return when(like_echo, fact::like_echo) |
            when(like_broadcast, fact::like_broadcast) |
            when(attempt.precedes_echo(), fact::before_echo);
 }
@@ -221,17 +223,19 @@ void Arbiter::settle(TimePoint now) {
         outbox_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
 }
 
-/// P8: a reply came that may have been the write's echo, or an answer to a broadcast, and a read
-/// has now shown what the station holds. Where that is not what was written, or cannot be read,
-/// only a line on which writes do not come back leaves no doubt: an adapter need not echo reads.
+/// P8: a reply came that may have been the write's echo, an answer to a broadcast, or the last
+/// confirmation once more, and a read has now shown what the station holds. Where that cannot be
+/// read only a line on which writes do not come back leaves no doubt: an adapter need not echo
+/// reads.
 void Arbiter::confirm(TimePoint now, const Group& group, ByteView reply, bool echoed) {
     const auto broadcast = stations_.book().behind_broadcast(group.doubted_at, group.confirms);
     const bool holds = holds_written(group.written, reply);
-    const bool is_answer =
-        echo_memory_.comes_again(now, group.station)
-            ? holds
-            : !echoed && (holds || (echo_memory_.echoes_no_writes() && !broadcast));
     ReplyHabits& habits = stations_.of(group.station).replies();
+    const bool told = read_back(group.written) && !modbus::exception_of(reply);
+    const bool holds_decides = echo_memory_.comes_again(now, group.station) ||
+                               habits.may_repeat_confirmation(now, group.confirms);
+    const bool is_left = !told && echo_memory_.echoes_no_writes() && !broadcast;
+    const bool is_answer = holds_decides ? holds : !echoed && (holds || is_left);
     if (broadcast && holds) habits.on_broadcast_unanswered();
     if (broadcast && !holds && !modbus::exception_of(reply))
         habits.on_broadcast_answered(*broadcast, false);

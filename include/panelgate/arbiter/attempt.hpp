@@ -193,11 +193,11 @@ class Attempt {
     }
     /// Rejects a reply that also answers another master's request; the station was not silent.
     void reject_contested() {
-        both_came_ = both_came_ || (contested_ && first_contested_ != *reply_);
-        if (!std::exchange(contested_, true)) first_contested_ = *reply_;
+        both_came_ = both_came_ || (contested() && contested_ != reply());
+        contested_ = reply();
         reject_reply();
     }
-    bool contested() const { return contested_; }
+    bool contested() const { return !contested_.empty(); }
     /// True if another one came that differs: to both requests.
     bool both_came() const { return both_came_; }
     /// True if the first frame since the request began to leave asks the same station, and the
@@ -325,9 +325,8 @@ class Attempt {
     std::size_t noise_in_front_ = 0;  ///< bytes
     std::size_t came_back_ = 0;       ///< bytes, while it was leaving, which the filter let pass
     bool frames_in_front_ = false;    ///< good frames
-    bool contested_ = false;
+    Bytes contested_;                 ///< the last reply that was
     bool both_came_ = false;
-    Bytes first_contested_;
     bool refusal_rejected_ = false;
     Instead instead_ = Instead::nothing;
     bool refused_other_ = false;

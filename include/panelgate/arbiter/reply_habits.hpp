@@ -118,11 +118,12 @@ class DuplicateHabit {
     /// follow that, and not the time: a guess again, until several in a row have come so.
     void on_copy(TimePoint now, TimePoint given, TimePoint last) {
         const Duration behind = std::max(now - last, timing::kReadingSlack);
-        if (given == last || behind > timing::kReceiveMargin) return learn(now, now - given);
+        if (given == last || behind > timing::kShortestWait) return learn(now, now - given);
         const bool is_usual = known() && behind <= settle_time();
         learn(now, behind);
         if (is_usual) return;
-        guessed_ = std::max(guessed_, now - given);
+        // A copy must still be known as one behind the rest that this brings.
+        guessed_ = std::min(std::max(guessed_, now - given), timing::kLatestRepetition / 2);
         sooner_ = 0;
     }
     /// The frame repeats a recent reply, or is an outstanding one with the same values: it is
@@ -347,6 +348,12 @@ class ReplyHabits {
     /// is no duplicate.
     bool may_be_duplicate(TimePoint now, const Attempt& attempt, const Claims& claims, bool early,
                           bool quicker) const;
+    /// True if this confirmation may be the last one once more, said instead of its own: the
+    /// station has done that with one that fitted no other write.
+    bool may_repeat_confirmation(TimePoint now, ByteView reply) const {
+        return repeated_at_ && now <= *repeated_at_ + timing::kForgetHabit &&
+               std::ranges::equal(reply, confirmation_);
+    }
     /// Time of the latest request that this reply proves to have reached the station: an attempt
     /// started at `started`, or the first outstanding one that the reply fits.
     TimePoint surely_answered(const OutstandingRequests& book, TimePoint started,
@@ -443,9 +450,11 @@ class ReplyHabits {
         bool refused = false;
         bool none = false;  ///< one had no answer
     } broadcast_;
-    TimePoint not_before_{};   ///< duplicates may come, or the line was just opened
-    TimePoint until_{};        ///< outstanding replies may come; {}: none are
-    TimePoint again_until_{};  ///< it may resend the damaged reply until then
+    Bytes confirmation_;                    ///< the last, of a write that is longer
+    std::optional<TimePoint> repeated_at_;  ///< when that came instead of another write's
+    TimePoint not_before_{};                ///< duplicates may come, or the line was just opened
+    TimePoint until_{};                     ///< outstanding replies may come; {}: none are
+    TimePoint again_until_{};               ///< it may resend the damaged reply until then
     /// When it last answered a request after a later one: order closes nothing, and proves nothing,
     /// for timing::kForgetHabit after that.
     std::optional<TimePoint> disordered_at_;

@@ -293,5 +293,38 @@ TEST_F(ArbiterBehindABroadcast, AStationThatHasAnsweredOneIsWaitedForAsForAnyOut
     EXPECT_EQ(sent(bus, 17, kToOne, left + 1900ms), left + 2 * settings.unlisted.response_timeout);
 }
 
+/// A panel that says its last confirmation once more instead of doing the next write.
+TEST_F(ArbiterTest, P8WhereConfirmationsComeAgainOneThatRepeatsTheLastIsReadBack) {
+    const auto write_to = [](unsigned at, unsigned value) {
+        return Writer().u8(16).u16(at).u16(1).u8(2).u16(value).take();
+    };
+    const auto said = [](unsigned at) { return Writer().u8(16).u16(at).u16(1).take(); };
+    const auto write = [&](unsigned at, unsigned value) {
+        bus.run_for(1s);
+        const Ticket ticket = bus.submit(17, write_to(at, value));
+        return ticket;
+    };
+    for (unsigned i = 0; i < 20; ++i) {
+        bus.run_for(50ms);
+        bus.submit(17, read_at(i));
+        answer(bus, 17, reply_number(i), 12ms);
+    }
+    write(1, 7);
+    answer(bus, 17, said(1), 12ms);
+    write(2, 8);
+    answer(bus, 17, said(1), 12ms);
+    bus.run_for(2s);
+    for (const unsigned held : {9u, 0u}) {
+        const Ticket ticket = write(1, 9);
+        answer(bus, 17, said(1), 12ms);
+        EXPECT_FALSE(bus.answered(ticket));
+        ASSERT_TRUE(bus.next_sent(200ms));
+        EXPECT_EQ(bus.sent.back().adu, modbus::encode_adu(17, "03 00 01 00 01"_hex));
+        answer(bus, 17, Writer().u8(3).u8(2).u16(held).take(), 12ms);
+        ASSERT_TRUE(bus.answered(ticket));
+        EXPECT_EQ(bus.answer(ticket).pdu.has_value(), held == 9);
+    }
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter::arbiter_writes_test
