@@ -394,7 +394,7 @@ void Arbiter::start(TimePoint now, Group group) {
         timing.allow_hole(station.reply_hole());
         timing.wake_latency = wake_latency_.early();
         timing.drift = station.clock_drift();
-        timing.echoes = echo_memory_.expects_one();
+        timing.echoes = echo_memory_.expects_one() && !echo_memory_.comes_late(now);
         timing.as_asked = station.answers_as_asked() && echo_memory_.known();
     }
     if (!group.request.is_read()) memory_.on_write(now, group.station, group.request);
@@ -402,7 +402,7 @@ void Arbiter::start(TimePoint now, Group group) {
     const Reason why = reason_of(now, group, schedule_.backlog().queue());
     quiet_.on_sent(timing.sent, group.station);
     unsolicited_.on_sent(now, adu);
-    EchoFilter echo(adu, echo_memory_.expect(group.request));
+    EchoFilter echo(adu, echo_memory_.expect(now, group.request));
     active_.emplace(std::move(group), timing, std::move(echo), orders_);
     outbox_.transmit(now, *active_, std::move(adu), std::move(wire), why);
 }

@@ -303,7 +303,10 @@ void Attempt::on_own_frame(bool in_front) {
     begins_anew_ = true;  // the reply, behind it
     if (!timing_.echoes) return;
     own_.behind = true;
-    if (const auto candidate = answers_.drop_candidate()) add_unsolicited(*candidate);
+    if (const auto candidate = answers_.drop_candidate()) {
+        own_.before = group_.request.is_read();
+        add_unsolicited(*candidate);
+    }
 }
 
 std::vector<Unused> Attempt::take_unsolicited() { return std::exchange(unsolicited_, {}); }

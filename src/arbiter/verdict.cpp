@@ -103,8 +103,7 @@ Facts Arbiter::facts_of_equals(TimePoint now, const Station& station, bool early
         station.replies().may_answer_broadcast(stations_.book().behind_broadcast(now, reply));
     const bool like_echo = attempt.may_be_its_echo(now, too_quick, echo_memory_) ||
                            station.replies().may_repeat_confirmation(now, reply);
-    return when(like_echo, fact::like_echo) |
-           when(like_broadcast, fact::like_broadcast) |
+    return when(like_echo, fact::like_echo) | when(like_broadcast, fact::like_broadcast) |
            when(attempt.precedes_echo(), fact::before_echo);
 }
 
@@ -299,6 +298,9 @@ void Arbiter::learn_from_failure(TimePoint now, const Attempt& attempt, Verdict 
         station.replies().on_unanswered(book, now, request.pdu(), attempt.timing().sent);
     }
     if (attempt.contested()) book.on_foreign_over(attempt.group().station);
+    if (attempt.answered_before_echo() &&
+        echo_memory_.on_answered_before(now, request, attempt.group().station))
+        outbox_.on_echoed_again(attempt.group().station);
     if (settings_.learns_holes && verdict == Verdict::damaged && attempt.was_cut_off())
         station.on_broken_reply(now, std::max(attempt.longest_pause(), attempt.timing().hole));
     if (verdict == Verdict::silent && attempt.echoed()) echo_memory_.on_unanswered(request);

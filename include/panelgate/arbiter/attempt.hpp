@@ -212,6 +212,8 @@ class Attempt {
     const EchoFilter& echo() const { return echo_; }
     /// True if the whole echo came back, and no byte of it was needed to complete the reply.
     bool echoed() const { return echo_.complete() && !own_.borrowed; }
+    /// True if a candidate came before our own frame, and was dropped for that.
+    bool answered_before_echo() const { return own_.before; }
     /// True if our own frame came back, wherever the filter did not take it out.
     bool heard_itself() const { return own_.came_back; }
     /// True if it did so once more, behind the echo or the reply.

@@ -117,7 +117,8 @@ void EchoMemory::forget() {
     had_none_ = mode_ == EchoMode::off;
     writes_echo_.reset();
     again_at_.reset();
-    only_ = habit_ = 0;
+    only_ = habit_ = before_of_ = 0;
+    before_ = 0;
     several_ = false;
     missed_by_it_ = missed_by_others_ = 0;
     begin();
@@ -138,8 +139,8 @@ void EchoMemory::begin() {
     std::abort();
 }
 
-EchoFilter::Expect EchoMemory::expect(const modbus::Request& request) const {
-    if (state_ == EchoState::present) return EchoFilter::Expect::certainly;
+EchoFilter::Expect EchoMemory::expect(TimePoint now, const modbus::Request& request) const {
+    if (state_ == EchoState::present && !comes_late(now)) return EchoFilter::Expect::certainly;
     // Reads keep looking for an echo: an adapter without one, as configured or learned, may have
     // one.
     if (state_ == EchoState::absent && !teaches_echo(request)) return EchoFilter::Expect::nothing;
@@ -178,6 +179,7 @@ void EchoMemory::on_missed_by(std::uint8_t station) {
 
 bool EchoMemory::on_echo(const modbus::Request& request, bool expected, std::uint8_t station) {
     if (!teaches_echo(request)) return false;
+    if (station == before_of_ && before_ < kNow) before_ = 0;
     on_heard_of(station);
     if (habit_ != 0 && (!expected || repeats(station))) return false;
     if (had_none_ && !expected && state_ != EchoState::present && ++echoes_ < kNow) {

@@ -72,7 +72,7 @@ TEST_F(EchoMemoryTest, LearnsOnlyFromRequestsWhoseAnswerCannotBeTheirEcho) {
     EXPECT_EQ(memory.state(), EchoState::unknown);
     EXPECT_TRUE(memory.on_echo(request_of(kRead)));
     EXPECT_FALSE(memory.on_echo(request_of(kRead))) << "no news";
-    EXPECT_EQ(memory.expect(request_of(kWrite)), Expect::certainly);
+    EXPECT_EQ(memory.expect(TimePoint{}, request_of(kWrite)), Expect::certainly);
     memory.forget();
     EXPECT_TRUE(must_be_learned());
 }
@@ -162,6 +162,22 @@ TEST(LateEcho, ComesAfterTheSameTimeEachTime) {
         EXPECT_FALSE(line.is_own(now + 40ms, "11 03 00 00 00 02"_hex));
         EXPECT_FALSE(line.is_own(now + 2s, read));
     }
+}
+
+/// A repeater that needs 5 ms: a quick panel has answered by then, another one has not.
+TEST(EchoMemory, WhereAPanelsAnswersComeBeforeTheEchoThatIsExpectedBehindThem) {
+    EchoMemory memory(EchoMode::on);
+    const modbus::Request read = request_of(kRead);
+    const TimePoint now{100s};
+    for (int i = 0; i < 2; ++i) EXPECT_FALSE(memory.on_answered_before(now, read, 18));
+    memory.on_echo(read, false, 18);
+    for (int i = 0; i < 2; ++i) EXPECT_FALSE(memory.on_answered_before(now, read, 18));
+    EXPECT_FALSE(memory.on_answered_before(now, read, 19)) << "three of one in a row";
+    EXPECT_EQ(memory.expect(now, read), Expect::certainly);
+    for (int i = 0; i < 2; ++i) memory.on_answered_before(now, read, 19);
+    EXPECT_TRUE(memory.comes_late(now));
+    EXPECT_TRUE(memory.comes_again(now, 17)) << "what equals a write is read back";
+    EXPECT_EQ(memory.expect(now, read), Expect::perhaps);
 }
 
 }  // namespace

@@ -74,6 +74,7 @@ struct OwnFrame {
     bool seen = false;       ///< after other bytes, where only its echo was expected
     bool fragment = false;   ///< a part of it came damaged
     bool behind = false;     ///< after another frame
+    bool before = false;     ///< ... which was a candidate
     bool came_back = false;  ///< as a frame that is no answer
     bool borrowed = false;   ///< its last byte was lost, and the reply's first taken for it
     bool again = false;      ///< once more, behind its echo or the reply
@@ -114,7 +115,7 @@ class EchoMemory {
     bool known() const { return state_ == EchoState::present || state_ == EchoState::absent; }
     /// The device was reopened: it may be another one.
     void forget();
-    EchoFilter::Expect expect(const modbus::Request& request) const;
+    EchoFilter::Expect expect(TimePoint now, const modbus::Request& request) const;
     /// True if this request could be confirmed by its own echo while the echo is unknown. `tried`:
     /// a read was already sent for it; if that was inconclusive, the request goes all the same.
     bool must_be_learned_before(const modbus::Request& request, bool tried) const;
@@ -143,6 +144,15 @@ class EchoMemory {
     bool comes_again(TimePoint now, std::uint8_t station) const {
         return repeats(station) || (again_at_ && now <= *again_at_ + timing::kForgetHabit);
     }
+    /// A read was answered before it came back, and not behind that. Three of one station in a row
+    /// show an echo that comes late. True if that tells.
+    bool on_answered_before(TimePoint now, const modbus::Request& read, std::uint8_t station) {
+        before_ = station == before_of_ ? before_ + 1 : 1;
+        before_of_ = station;
+        return before_ >= kNow && on_again(now, read.pdu());
+    }
+    /// True if a reply may come before its echo, which then follows.
+    bool comes_late(TimePoint now) const { return before_ >= kNow && comes_again(now, 0); }
     /// The read that was to detect the echo was inconclusive.
     void on_unclear();
     /// Its echo was heard, but no answer: where both are equal, it may have been the answer, and
@@ -184,6 +194,8 @@ class EchoMemory {
     int missed_by_others_ = 0;  ///< replies, since it is only_
     std::uint8_t habit_ = 0;    ///< this station repeats requests, the line has no echo
     std::optional<bool> writes_echo_;  ///< empty: no write has shown it since the device was opened
+    std::uint8_t before_of_ = 0;       ///< the station that has answered before its echo
+    int before_ = 0;                   ///< ... so often in a row
     std::optional<TimePoint> again_at_;  ///< when a request came back once more
 };
 
