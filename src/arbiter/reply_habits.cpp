@@ -181,7 +181,7 @@ void ReplyHabits::settle(OutstandingRequests& book, TimePoint now, const Attempt
         close(book, attempt.reply(), true);
         book.on_unanswered(id_, sent, group.request.pdu());
         rest(book, now);
-    } else if (now < again_until_ && late_.worst() > Duration::zero()) {
+    } else if (now < again_until_ && late_.ever()) {
         // It may be the damaged reply resent, and the reply to this attempt is late.
         on_unanswered(book, now, group.request.pdu(), sent);
     } else {

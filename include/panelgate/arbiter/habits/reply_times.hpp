@@ -34,6 +34,7 @@ class LateWindow {
     /// A reply came this long after the timeout of its request.
     void on_late(Duration lateness) {
         worst_ = std::max(worst_, lateness);
+        ever_ = true;
         ++late_;
         window_ = std::clamp(lateness * 3 / 2, window_, std::max(window_, 8 * timeout_));
         timely_ = 0;
@@ -46,6 +47,8 @@ class LateWindow {
         timely_ = 0;
         window_ = std::max(timeout_, window_ * 2 / 3);
     }
+    /// True if one was late, however long ago.
+    bool ever() const { return ever_; }
     /// Longest recent lateness; 0: the station is not late regularly.
     Duration worst() const { return late_ < 2 ? Duration::zero() : worst_; }
 
@@ -58,6 +61,7 @@ class LateWindow {
     Duration worst_{};
     int timely_ = 0;
     int late_ = 0;  ///< recent late replies
+    bool ever_ = false;
 };
 
 // When replies end, learned from reading at the expected end. One read in kLooks is meant to come
