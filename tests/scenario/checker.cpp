@@ -156,6 +156,9 @@ void Checker::check_reply(TimePoint now, const Open& open, const arbiter::Finish
     const Bytes& reply = *finish.pdu;
     if (modbus::exception_of(reply)) {
         const Bytes& asked = open.job.request.pdu();
+        constexpr std::uint8_t kBusy = 6;
+        if (reply[1] == kBusy)
+            announced_[{open.job.station, form_of(asked_[open.job.station])}] = owed_until();
         const bool said = truth_.refused(open.job.station, asked, open.submitted);
         if (!said && !is_luck(heard_for(open, reply)))
             fail("P1: an exception that the station did not send to this request");

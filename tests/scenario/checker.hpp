@@ -124,6 +124,7 @@ class Checker : public Witness {
     void check_again(std::uint8_t station, ByteView pdu, FrameKind what);
     void check_crc(const Bytes& adu);
     TimePoint behind_broadcasts(const Open& open) const;
+    TimePoint behind_announced(arbiter::Ticket ticket, const Open& open) const;
     std::optional<TimePoint> good_work_since(TimePoint since) const;
     bool waits_in_order(TimePoint since, arbiter::Ticket ticket, const Open& open) const;
     bool is_noisy(TimePoint now) const;
@@ -174,6 +175,9 @@ class Checker : public Witness {
     std::map<std::uint8_t, Bytes> asked_;             ///< what each station was asked last
     std::map<Bytes, TimePoint> spread_;  ///< when broadcasts had left, by what would answer them
     std::map<std::uint8_t, TimePoint> excused_from_;  ///< see on_copy()
+    /// Until when the reply may come that a refusal for being busy has announced, by the station
+    /// and its read's form.
+    std::map<std::pair<std::uint8_t, Bytes>, TimePoint> announced_;
     std::uint64_t first_copies_ = 0;
     std::uint64_t excused_ = 0;
     TimePoint garbled_{};

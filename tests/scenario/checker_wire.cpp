@@ -248,8 +248,8 @@ std::optional<TimePoint> Checker::good_work_since(TimePoint since) const {
                           !watch_.is_silent(station) && watch_.is_good(station, since) &&
                           !(o.write && echoes_) && !waits_in_order(since, ticket, o);
         if (!good) continue;
-        const TimePoint from =
-            std::max({since, o.submitted, watch_.rests_until(station), behind_broadcasts(o)});
+        const TimePoint from = std::max({since, o.submitted, watch_.rests_until(station),
+                                         behind_broadcasts(o), behind_announced(ticket, o)});
         if (!first || from < *first) first = from;
     }
     return first;
@@ -266,6 +266,21 @@ TimePoint Checker::behind_broadcasts(const Open& open) const {
     const Duration timeout = settings_.unlisted.response_timeout;
     return found->second + (answers ? timeout + settings_.unlisted.late_window.value_or(8 * timeout)
                                     : 2 * watch_.own_slowest(open.job.station) + 50ms);
+}
+
+/// P1: until when the reply that was announced could be taken for that to this request, or to one
+/// of its client that goes before it.
+TimePoint Checker::behind_announced(arbiter::Ticket ticket, const Open& open) const {
+    TimePoint over{};
+    for (const auto& [older, o] : open_) {
+        if (older > ticket) break;
+        if (o.sent || o.gone || o.job.client != open.job.client ||
+            o.job.station != open.job.station)
+            continue;
+        const auto found = announced_.find({o.job.station, form_of(o.job.request.pdu())});
+        if (found != announced_.end()) over = std::max(over, found->second);
+    }
+    return over;
 }
 
 /// Its client's broadcast goes before it, and behind a request to a station that is silent.

@@ -165,6 +165,10 @@ constexpr BrokenOnce kBrokenOnce[] = {
     {Kind::dead, 10030},
     // Behind a refusal for being busy nobody waited for its copy.
     {Kind::wild, 10053},
+    // A damaged reply was said again, and taken for that to the retry, which came late.
+    {Kind::wild, 30004},
+    // What had been refused for being busy was still owed.
+    {Kind::loss, 20166},
 };
 
 TEST(Scenario, SeedsThatOnceBrokeAPromiseKeepThemAll) {
