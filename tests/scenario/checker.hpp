@@ -125,6 +125,7 @@ class Checker : public Witness {
     void check_crc(const Bytes& adu);
     TimePoint behind_broadcasts(const Open& open) const;
     TimePoint behind_announced(arbiter::Ticket ticket, const Open& open) const;
+    TimePoint behind_copies(std::uint8_t station) const;
     std::optional<TimePoint> good_work_since(TimePoint since) const;
     bool waits_in_order(TimePoint since, arbiter::Ticket ticket, const Open& open) const;
     bool is_noisy(TimePoint now) const;
@@ -170,6 +171,7 @@ class Checker : public Witness {
     std::map<std::string, arbiter::Ticket> open_writes_;
     std::unordered_set<std::uint8_t> repeat_writes_;  ///< stations that allow it
     std::unordered_set<std::uint8_t> doublers_;       ///< that were heard to say a reply twice
+    std::map<std::uint8_t, TimePoint> replied_;       ///< each station, the last time
     std::unordered_set<std::uint8_t> overtakers_;     ///< that were heard to answer out of order
     std::unordered_set<std::uint8_t> retried_;        ///< whose last request was a retry
     std::map<std::uint8_t, Bytes> asked_;             ///< what each station was asked last

@@ -50,7 +50,8 @@ void Checker::on_answered(TimePoint now, std::uint8_t station) {
     on_heard(now, 1);
     if (attempt_.answered || attempt_.station != station) return;
     attempt_.answered = true;
-    silent_before_[attempt_.station] = false;
+    silent_before_[station] = false;
+    replied_[station] = now;
     attempt_.first = !watch_.has_answered(attempt_.station);
     const bool is_first = watch_.on_answered(now, attempt_.station, now - attempt_.sent);
     // What the way held back may have reached the station only now.
@@ -248,8 +249,9 @@ std::optional<TimePoint> Checker::good_work_since(TimePoint since) const {
                           !watch_.is_silent(station) && watch_.is_good(station, since) &&
                           !(o.write && echoes_) && !waits_in_order(since, ticket, o);
         if (!good) continue;
-        const TimePoint from = std::max({since, o.submitted, watch_.rests_until(station),
-                                         behind_broadcasts(o), behind_announced(ticket, o)});
+        const TimePoint from =
+            std::max({since, o.submitted, watch_.rests_until(station), behind_broadcasts(o),
+                      behind_announced(ticket, o), behind_copies(station)});
         if (!first || from < *first) first = from;
     }
     return first;
@@ -266,6 +268,16 @@ TimePoint Checker::behind_broadcasts(const Open& open) const {
     const Duration timeout = settings_.unlisted.response_timeout;
     return found->second + (answers ? timeout + settings_.unlisted.late_window.value_or(8 * timeout)
                                     : 2 * watch_.own_slowest(open.job.station) + 50ms);
+}
+
+/// P1: until when the copy of its last reply may come. A copy may have been that of any equal reply
+/// of the last half second, and may then be half as late again.
+TimePoint Checker::behind_copies(std::uint8_t station) const {
+    constexpr Duration kLatest = 500ms;
+    const auto found = replied_.find(station);
+    return found == replied_.end() || !doublers_.contains(station)
+               ? TimePoint{}
+               : found->second + kLatest * 3 / 2;
 }
 
 /// P1: until when the reply that was announced could be taken for that to this request, or to one

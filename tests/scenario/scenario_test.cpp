@@ -169,6 +169,8 @@ constexpr BrokenOnce kBrokenOnce[] = {
     {Kind::wild, 30004},
     // What had been refused for being busy was still owed.
     {Kind::loss, 20166},
+    // A panel that says replies twice rests as long as its latest copy may have taken.
+    {Kind::adaptive, 20169},
 };
 
 TEST(Scenario, SeedsThatOnceBrokeAPromiseKeepThemAll) {
