@@ -210,7 +210,9 @@ ReplyHabits::Heard ReplyHabits::on_unsolicited(OutstandingRequests& book, TimePo
 /// Neither requested nor outstanding.
 void ReplyHabits::on_unasked(OutstandingRequests& book, TimePoint now, Done done, ByteView pdu) {
     if (const TimePoint given = book.given(id_, now, pdu); given != TimePoint{}) {
-        duplicates_.on_copy(now, given, book.last_reply(id_)->replied);
+        // Asked twice, answered twice: values that rarely change make no copy of the second.
+        if (!book.take_first_of_two(id_, pdu, now - kClosedMemory * late_.timeout()))
+            duplicates_.on_copy(now, given, book.last_reply(id_)->replied);
     } else if (done == Done::second && book.on_followed(id_)) {
         duplicates_.learn(now, now - book.last_reply(id_)->replied);
     }

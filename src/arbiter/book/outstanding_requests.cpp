@@ -346,6 +346,23 @@ Asked OutstandingRequests::take_closed(std::uint8_t station, ByteView reply, Tim
     return taken;
 }
 
+bool OutstandingRequests::take_first_of_two(std::uint8_t station, ByteView reply, TimePoint open) {
+    PoolVector<Asked>& all = at(station).asked;
+    const auto is_twin_of = [](const Asked& first) {
+        return [&first](const Asked& one) {
+            return one.state == State::answered && first.sent < one.replied && one.pdu == first.pdu;
+        };
+    };
+    const auto found =
+        std::ranges::find_if(all, [&, closed = closed_for(reply, open)](const Asked& first) {
+            const auto twin = std::ranges::find_if(all, is_twin_of(first));
+            return closed(first) && twin != all.end() && std::ranges::equal(twin->reply, reply);
+        });
+    if (found == all.end()) return false;
+    all.erase(found);
+    return true;
+}
+
 void OutstandingRequests::lapse(std::uint8_t station, TimePoint before) {
     if (any(station)) close(at(station), State::lapsed, TimePoint::min(), before);
 }

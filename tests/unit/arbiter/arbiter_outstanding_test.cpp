@@ -46,6 +46,29 @@ TEST_F(ArbiterTest, P1ALateReplyOfTheSameShapeAnswersNoRequestAndEndsTheRest) {
     expect_no_answer_by_a_late_reply(settings);
 }
 
+/// Registers rarely change: the late reply to the first attempt says what the retry's has said.
+TEST_F(ArbiterTest, P5OfTwoAttemptsBothAnsweredAlikeTheSecondReplyIsNoCopy) {
+    const Bytes other = "03 00 00 00 01"_hex;
+    for (const bool is_copy : {false, true}) {
+        BusScript script{settings};
+        const Ticket read = script.submit(17, kRead);
+        if (!is_copy) ASSERT_TRUE(script.next_sent());  // the retry
+        answer(script, 17, kReply, 5ms);
+        ASSERT_TRUE(script.answered(read));
+        script.submit(17, other);
+        answer(script, 17, "03 02 00 07"_hex, 5ms);
+        script.run_for(100ms);
+        script.hear_reply(17, kReply);
+        script.run_for(1s);
+        script.submit(17, other);
+        answer(script, 17, "03 02 00 07"_hex, 5ms);
+        const TimePoint free = script.now();
+        script.submit(17, "03 00 00 00 02"_hex);
+        EXPECT_EQ(script.sent.back().at - free > 50ms || script.next_sent()->at - free > 50ms,
+                  is_copy);
+    }
+}
+
 TEST_F(ArbiterTest, P1BytesBeforeAReplyCouldHaveBegunAreStaleOnARealLine) {
     settings.paced = true;
     BusScript script{settings};

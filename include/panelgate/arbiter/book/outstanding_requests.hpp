@@ -183,6 +183,9 @@ class OutstandingRequests {
     /// Takes out the first that has passed or lapsed, left later than `open` and may be answered by
     /// this; there must be one.
     Asked take_closed(std::uint8_t station, ByteView reply, TimePoint open);
+    /// True if a request that left later than `open` has passed or lapsed, and the very same was
+    /// then answered with this: it may be the first one's reply. Takes that out.
+    bool take_first_of_two(std::uint8_t station, ByteView reply, TimePoint open);
     /// Takes out the oldest outstanding.
     void take_first(std::uint8_t station) { take_first(at(station)); }
     /// No reply can come any more to what left before this, as far as is known.
