@@ -138,7 +138,7 @@ void Matcher::answer(Piece piece, bool in_doubt) {
     made.request = request;
     made.reply = copy_of(reply);
     made.end = End::answered;
-    made.doubtful = doubted || overdue;
+    made.doubtful = doubted || overdue || is_last_again(piece, request);
     made.asked = asked.begin;
     made.sent = asked.end;
     made.replied = piece.begin;
@@ -194,6 +194,18 @@ bool Matcher::is_duplicate(const Piece& piece, const Bytes& request,
     if (!repeated || piece.end - *repeated >= settings_.surplus_memory) return false;
     return claimed.repeats_other ||
            (repeats_last(piece) && request != book_.last_reply(station)->pdu);
+}
+
+/// True if it may be the last reply once more, in the place of the true one.
+bool Matcher::is_last_again(const Piece& piece, const Bytes& request) {
+    const std::uint8_t station = piece.bytes.front();
+    const ByteView reply = pdu_of(piece);
+    if (!modbus::is_pure_read(request) || reply[0] != request[0]) return false;
+    std::optional<Places::Reply> last;
+    if (const arbiter::Asked* const known = book_.last_reply(station))
+        last = Places::Reply{known->pdu, known->reply};
+    Places& places = places_.try_emplace(station, settings_.surplus_memory).first->second;
+    return places.answered(piece.end, {request, reply}, last);
 }
 
 /// Enters it in the book. A panel answers in order: after a reply that no other request can have

@@ -12,6 +12,7 @@
 #include "panelgate/tap/cutter.hpp"
 #include "panelgate/tap/habits.hpp"
 #include "panelgate/tap/heard.hpp"
+#include "panelgate/tap/places.hpp"
 #include "panelgate/tap/settings.hpp"
 
 namespace panelgate::tap {
@@ -63,6 +64,7 @@ class Matcher {
     bool may_answer_broadcast(const Piece& piece, bool asked);
     bool is_duplicate(const Piece& piece, const Bytes& request,
                       const arbiter::Claims& claimed) const;
+    bool is_last_again(const Piece& piece, const Bytes& request);
     void hold(Transaction made);
     void tell_held();
     bool is_second_answer(const Piece& piece) const;
@@ -95,6 +97,7 @@ class Matcher {
     std::optional<Transaction> held_;  ///< believed, if no second answer comes
     TimePoint held_until_{};
     std::map<std::uint8_t, Habits> habits_;
+    std::map<std::uint8_t, Places> places_;
     arbiter::OutstandingRequests book_;  ///< what the line's master has asked, seen from it
     GiveUp give_up_;                     ///< of the whole line
     std::optional<TimePoint> copied_;    ///< when a request was last heard twice at once
