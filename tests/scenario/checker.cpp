@@ -44,7 +44,8 @@ void Checker::on_accepted(TimePoint now, arbiter::Ticket ticket, const arbiter::
                     .served = truth_.served(job.station),
                     .turn = turns_,
                     .write = !job.request.is_read(),
-                    .sent = joins};
+                    .sent = joins,
+                    .span = test::read_span(job.station, job.request.pdu())};
     open_.insert_or_assign(ticket, open);
     displaced_ = false;
     Client& client = clients_[job.client];

@@ -102,6 +102,7 @@ class Checker : public Witness {
         /// It was not answered with the frame that it was taken to be in: that was a part of a
         /// joined read, which goes alone, or the joined read itself, and has failed.
         bool again = false;
+        std::optional<arbiter::ReadSpan> span{};  ///< of a read of a table
     };
     struct Client {
         std::map<std::uint8_t, TimePoint> own_write;  ///< executed and confirmed, by station

@@ -20,7 +20,7 @@ void Checker::mark_sent(std::uint8_t station, ByteView pdu, FrameKind what) {
     for (auto& [ticket, open] : open_) {
         const bool concerned = open.job.station == station || open.job.station == kBroadcast;
         if (open.gone || !concerned) continue;
-        const auto own = test::read_span(open.job.station, open.job.request.pdu());
+        const auto& own = open.span;
         const bool goes = span && own ? span->contains(*own)
                                       : open.job.station == station &&
                                             std::ranges::equal(open.job.request.pdu(), pdu);
@@ -53,31 +53,41 @@ bool Checker::joins_attempt(TimePoint now, const arbiter::Job& job) const {
     });
 }
 
+namespace {
+
+/// Sorts by table, where it begins, and the wider ones first.
+std::uint64_t rank_of(const arbiter::ReadSpan& span) {
+    constexpr std::uint64_t kMost = 0xFFFF;
+    const auto table = static_cast<std::uint64_t>(span.items.table);
+    return std::uint64_t{span.station} << 40 | table << 32 | std::uint64_t{span.items.first} << 16 |
+           (kMost - span.items.count);
+}
+
+}  // namespace
+
 /// Of reads that one transaction answers in any case only one counts: one that another contains
 /// rides. Those that only touch are joined as far as a panel is known to take the length, which is
 /// not known here: they count.
 std::size_t Checker::waiting() const {
     std::size_t waiting = 0;
-    std::map<std::pair<unsigned, modbus::Table>, std::vector<arbiter::ReadSpan>> reads;
+    std::vector<std::uint64_t> reads;
+    reads.reserve(open_.size());
     for (const auto& [ticket, open] : open_) {
         if ((open.sent && !open.again) || open.gone) continue;
-        const auto span = test::read_span(open.job.station, open.job.request.pdu());
-        if (!span || !settings_.share_reads) {
+        if (!open.span || !settings_.share_reads) {
             ++waiting;
         } else {
-            reads[{span->station, span->items.table}].push_back(*span);
+            reads.push_back(rank_of(*open.span));
         }
     }
-    for (auto& [table, spans] : reads) {
-        std::ranges::sort(spans, [](const arbiter::ReadSpan& a, const arbiter::ReadSpan& b) {
-            return std::tuple(a.items.first, b.items.count) <
-                   std::tuple(b.items.first, a.items.count);
-        });
-        std::uint32_t end = 0;
-        for (const arbiter::ReadSpan& span : spans) {
-            if (span.items.end() > end) ++waiting;
-            end = std::max(end, span.items.end());
-        }
+    std::ranges::sort(reads);
+    std::uint64_t table = 0;
+    std::uint64_t end = 0;
+    for (const std::uint64_t read : reads) {
+        if (std::exchange(table, read >> 32) != read >> 32) end = 0;
+        const std::uint64_t own = (read >> 16 & 0xFFFF) + 0xFFFF - (read & 0xFFFF);
+        if (own > end) ++waiting;
+        end = std::max(end, own);
     }
     return waiting;
 }

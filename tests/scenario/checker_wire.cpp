@@ -328,7 +328,7 @@ void Checker::check_again(std::uint8_t station, ByteView pdu, FrameKind what) {
     const bool wanted = std::ranges::any_of(open_, [&](const auto& entry) {
         const Open& o = entry.second;
         if (o.gone || o.job.station != station) return false;
-        const auto own = test::read_span(station, o.job.request.pdu());
+        const auto& own = o.span;
         return span && own ? span->contains(*own) : std::ranges::equal(o.job.request.pdu(), pdu);
     });
     if (!wanted) fail("P4: a request went out again for nobody");
