@@ -46,20 +46,14 @@ double LoadMeter::percent(TimePoint now) const {
 
 namespace {
 
-void add(Histogram& all, const Histogram& one) {
-    for (std::size_t i = 0; i < all.counts.size(); ++i) all.counts[i] += one.counts[i];
-    all.sum += one.sum;
-}
-
 std::uint64_t count_of(const Histogram& all) {
     return std::accumulate(all.counts.begin(), all.counts.end(), std::uint64_t{0});
 }
 
-/// Returns milliseconds; nullopt if nothing was observed in between.
-std::optional<double> mean(const Histogram& before, const Histogram& now) {
-    const std::uint64_t count = count_of(now) - count_of(before);
+/// Returns milliseconds; nullopt if nothing was observed.
+std::optional<double> mean(double seconds, std::uint64_t count) {
     if (count == 0) return std::nullopt;
-    return std::max(0.0, now.sum - before.sum) * 1000 / static_cast<double>(count);
+    return std::max(0.0, seconds) * 1000 / static_cast<double>(count);
 }
 
 bool is_error(Outcome outcome) {
@@ -81,35 +75,57 @@ LineHistory::LineHistory(Duration width)
       wire_(load_),
       queue_(load_) {}
 
-LineHistory::Totals LineHistory::totals_of(TimePoint now, const LineReport& report) {
-    Totals totals;
-    totals.at = now;
-    totals.busy = report.wire.busy;
-    for (const StationReport& station : report.stations) {
-        for (const auto& [function, counts] : station.requests) {
-            for (const Outcome outcome : kAllOutcomes) {
-                totals.requests += counts[outcome];
-                if (is_error(outcome)) totals.errors += counts[outcome];
-            }
+LineHistory::Counts LineHistory::counts_of(const StationReport& station) {
+    Counts counts;
+    for (const auto& [function, outcomes] : station.requests) {
+        for (const Outcome outcome : kAllOutcomes) {
+            counts.requests += outcomes[outcome];
+            if (is_error(outcome)) counts.errors += outcomes[outcome];
         }
-        add(totals.latency, station.request_duration);
-        add(totals.wire, station.wire.bus_transaction);
     }
-    return totals;
+    counts.answers = count_of(station.request_duration);
+    counts.latency = station.request_duration.sum;
+    counts.transactions = count_of(station.wire.bus_transaction);
+    counts.wire = station.wire.bus_transaction.sum;
+    return counts;
+}
+
+void LineHistory::add_difference(const Counts& now, const Counts& before, Counts& sum) {
+    const bool is_new = now.requests < before.requests || now.errors < before.errors ||
+                        now.answers < before.answers || now.transactions < before.transactions;
+    const Counts from = is_new ? Counts() : before;
+    sum.requests += now.requests - from.requests;
+    sum.errors += now.errors - from.errors;
+    sum.answers += now.answers - from.answers;
+    sum.latency += now.latency - from.latency;
+    sum.transactions += now.transactions - from.transactions;
+    sum.wire += now.wire - from.wire;
+}
+
+LineHistory::Counts LineHistory::take(const LineReport& report) {
+    Counts sum;
+    const auto before = std::exchange(stations_, {});
+    for (const StationReport& station : report.stations) {
+        const Counts now = counts_of(station);
+        const auto known = before.find(station.station);
+        add_difference(now, known == before.end() ? Counts() : known->second, sum);
+        stations_.emplace(station.station, now);
+    }
+    return sum;
 }
 
 void LineHistory::record(TimePoint now, const LineReport& report) {
-    const Totals totals = totals_of(now, report);
-    const std::optional<Totals> before = std::exchange(before_, totals);
-    if (!before || now <= before->at) return;
-    const TimePoint at = before->at;
-    const double share = to_seconds(totals.busy - before->busy) / to_seconds(now - at);
-    if (report.up) load_.put(at, std::clamp(share * 100, 0.0, 100.0));
-    requests_.put(at, static_cast<double>(totals.requests - before->requests));
-    errors_.put(at, static_cast<double>(totals.errors - before->errors));
-    put(latency_, at, mean(before->latency, totals.latency));
-    put(wire_, at, mean(before->wire, totals.wire));
-    queue_.put(at, static_cast<double>(report.queue_depth));
+    const Counts counts = take(report);
+    const Duration busy = report.wire.busy - std::exchange(busy_, report.wire.busy);
+    const std::optional<TimePoint> before = std::exchange(at_, now);
+    if (!before || now <= *before) return;
+    const double share = to_seconds(busy) / to_seconds(now - *before);
+    if (report.up) load_.put(*before, std::clamp(share * 100, 0.0, 100.0));
+    requests_.put(*before, static_cast<double>(counts.requests));
+    errors_.put(*before, static_cast<double>(counts.errors));
+    put(latency_, *before, mean(counts.latency, counts.answers));
+    put(wire_, *before, mean(counts.wire, counts.transactions));
+    queue_.put(*before, static_cast<double>(report.queue_depth));
 }
 
 std::vector<LineSample> LineHistory::samples(TimePoint now) const {

@@ -69,6 +69,22 @@ void add(const Sample& sample, Figures& into) {
     if (outcome != sample.labels.end() && is_error(outcome->second)) into.errors += sample.value;
 }
 
+void add(const Figures& one, Figures& into) {
+    into.requests += one.requests;
+    into.errors += one.errors;
+    into.transactions += one.transactions;
+    into.seconds += one.seconds;
+}
+
+/// A station whose counters have begun anew counts from zero.
+Figures minus(const Figures& now, const Figures& before) {
+    const bool is_new = now.requests < before.requests || now.errors < before.errors ||
+                        now.transactions < before.transactions || now.seconds < before.seconds;
+    if (is_new) return now;
+    return {now.requests - before.requests, now.errors - before.errors,
+            now.transactions - before.transactions, now.seconds - before.seconds};
+}
+
 }  // namespace
 
 AllFigures figures_of(std::string_view metrics) {
@@ -88,16 +104,13 @@ AllFigures figures_of(std::string_view metrics) {
 }
 
 AllFigures difference(const AllFigures& now, const AllFigures& before) {
-    AllFigures all = now;
-    for (auto& [key, figures] : all) {
-        const auto found = before.find(key);
-        if (found == before.end()) continue;
-        const Figures& old = found->second;
-        if (old.requests > figures.requests || old.transactions > figures.transactions) continue;
-        figures.requests -= old.requests;
-        figures.errors -= old.errors;
-        figures.transactions -= old.transactions;
-        figures.seconds -= old.seconds;
+    AllFigures all;
+    for (const auto& [place, figures] : now) {
+        if (place.second.empty()) continue;  // a line's are the sum of its stations'
+        const auto found = before.find(place);
+        const Figures since = found == before.end() ? figures : minus(figures, found->second);
+        add(since, all[place]);
+        add(since, all[{place.first, ""}]);
     }
     return all;
 }

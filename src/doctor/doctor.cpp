@@ -39,7 +39,28 @@ Symptoms each(Symptoms a, const Symptoms& b, Combine combine) {
     return a;
 }
 
+/// True if a count of `later` is smaller: its counter has begun anew, and so have all beside it.
+bool began_anew(const Symptoms& later, const Symptoms& earlier) {
+    bool smaller = false;
+    each(later, earlier, [&](std::uint64_t a, std::uint64_t b) {
+        smaller = smaller || a < b;
+        return a;
+    });
+    return smaller;
+}
+
+bool began_anew(const line::UartErrors& later, const line::UartErrors& earlier) {
+    return later.framing < earlier.framing || later.parity < earlier.parity ||
+           later.overruns < earlier.overruns || later.breaks < earlier.breaks;
+}
+
+Symptoms minus(const Symptoms& a, const Symptoms& b) {
+    if (began_anew(a, b)) return a;
+    return each(a, b, [](std::uint64_t x, std::uint64_t y) { return x - y; });
+}
+
 line::UartErrors minus(const line::UartErrors& a, const line::UartErrors& b) {
+    if (began_anew(a, b)) return a;
     return {a.framing - b.framing, a.parity - b.parity, a.overruns - b.overruns,
             a.breaks - b.breaks};
 }
@@ -66,10 +87,8 @@ Sample difference(const Sample& later, const Sample& earlier) {
     Sample window;
     for (const auto& [id, symptoms] : later.stations) {
         const auto before = earlier.stations.find(id);
-        window.stations[id] = before == earlier.stations.end()
-                                  ? symptoms
-                                  : each(symptoms, before->second,
-                                         [](std::uint64_t a, std::uint64_t b) { return a - b; });
+        window.stations[id] =
+            before == earlier.stations.end() ? symptoms : minus(symptoms, before->second);
     }
     window.broadcasts = later.broadcasts - earlier.broadcasts;
     if (later.uart) window.uart = minus(*later.uart, earlier.uart.value_or(line::UartErrors{}));
@@ -96,6 +115,16 @@ std::vector<Finding> without(const std::vector<Finding>& list, const std::vector
 
 Doctor::Doctor(Settings settings, LineFacts facts)
     : settings_(settings), facts_(std::move(facts)) {}
+
+/// A station that was left out counts from zero when it is back, however much that is by then.
+void Doctor::apply(LineFacts facts) {
+    facts_ = std::move(facts);
+    for (Mark& mark : marks_) {
+        std::erase_if(mark.counted.stations, [&](const auto& station) {
+            return station.first != 0 && !facts_.names.contains(station.first);
+        });
+    }
+}
 
 void Doctor::begin(TimePoint now, Sample counted) {
     if (!marks_.empty()) {

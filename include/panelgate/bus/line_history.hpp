@@ -3,7 +3,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "panelgate/base/series.hpp"
@@ -51,7 +54,7 @@ struct LineSample {
 };
 
 /// A line's figures for the last hour. Memory is fixed: kColumns values of eight bytes per time
-/// slot, 34 kB with slots of 5 s. Pure.
+/// slot, 34 kB with slots of 5 s, and the last counts of each station. Pure.
 class LineHistory {
   public:
     static constexpr Duration kSpan = 1h;
@@ -61,26 +64,31 @@ class LineHistory {
     explicit LineHistory(Duration width);
 
     /// Call once per slot: records what happened since the last call. The first call only sets the
-    /// start.
+    /// start. A station that is new, or whose counters have begun anew, counts from zero.
     void record(TimePoint now, const LineReport& report);
     /// Returns the slots, oldest first.
     std::vector<LineSample> samples(TimePoint now) const;
     Duration width() const { return width_; }
 
   private:
-    /// Cumulative counters.
-    struct Totals {
-        TimePoint at;
-        Duration busy{};
+    /// Counted so far, or between two times.
+    struct Counts {
         std::uint64_t requests = 0;
         std::uint64_t errors = 0;
-        Histogram latency;
-        Histogram wire;
+        std::uint64_t answers = 0;  ///< with a latency
+        double latency = 0;         ///< their sum, in seconds
+        std::uint64_t transactions = 0;
+        double wire = 0;  ///< their sum, in seconds
     };
-    static Totals totals_of(TimePoint now, const LineReport& report);
+    static Counts counts_of(const StationReport& station);
+    static void add_difference(const Counts& now, const Counts& before, Counts& sum);
+    /// The counts of all stations since the last call.
+    Counts take(const LineReport& report);
 
+    std::optional<TimePoint> at_;  ///< of the last call
+    Duration busy_{};
+    std::map<std::string, Counts, std::less<>> stations_;
     Duration width_;
-    std::optional<Totals> before_;
     SlotRing load_, requests_, errors_, latency_, wire_, queue_;
 };
 

@@ -22,8 +22,8 @@ using AllFigures = std::map<std::pair<std::string, std::string>, Figures>;
 
 /// Takes the figures out of a text of /metrics.
 AllFigures figures_of(std::string_view metrics);
-/// The figures of the time between two texts; those of `now` where `before` has none, or more: the
-/// gateway was started anew.
+/// The figures of the time between two texts; those of `now` where `before` has none of a station,
+/// or more: the gateway was started anew, or the station was left out for a while.
 AllFigures difference(const AllFigures& now, const AllFigures& before);
 
 /// What a running gateway tells of itself.

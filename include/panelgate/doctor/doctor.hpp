@@ -43,7 +43,8 @@ struct Sample {
 };
 
 /// Returns what was counted between two times on one line. Values that are no counters
-/// (mute_in_a_row, worst_lateness) are those of `later`.
+/// (mute_in_a_row, worst_lateness) are those of `later`. Counters that have begun anew, so that one
+/// is smaller than before, count from zero.
 Sample difference(const Sample& later, const Sample& earlier);
 
 /// Returns the findings of a window, the likeliest cause first: in the order of Cause, and by
@@ -63,8 +64,9 @@ class Doctor {
 
     Doctor(Settings settings, LineFacts facts);
 
-    /// Applies new facts; findings stay until the next look.
-    void apply(LineFacts facts) { facts_ = std::move(facts); }
+    /// Applies new facts, and forgets the counts of stations that they do not list. Findings stay
+    /// until the next look.
+    void apply(LineFacts facts);
     /// The line was opened: earlier counts say nothing about it, unless only damage has come since
     /// the window began. Findings stay until there is new evidence.
     void begin(TimePoint now, Sample counted);

@@ -86,6 +86,8 @@ class LineHistoryTest : public testing::Test {
     LineHistoryTest() {
         report.up = true;
         report.stations.resize(2);
+        report.stations[0].station = "press";
+        report.stations[1].station = "oven";
         history.record(now, report);
     }
     /// Counts a request to the first or second station, with its duration.
@@ -128,6 +130,33 @@ TEST_F(LineHistoryTest, HasTheFiguresOfEachSlotAndNotTheTotals) {
     EXPECT_EQ(second.errors, 1u);
     EXPECT_NEAR(*second.latency_ms, 4, 1e-9);
     EXPECT_EQ(history.samples(now).size(), 2u);
+}
+
+TEST_F(LineHistoryTest, AStationThatIsLeftOutAndComesBackCountsFromZero) {
+    const auto ask = [&](std::size_t station, int times) {
+        for (int i = 0; i < times; ++i) {
+            request(station, Outcome::timeout, 100ms);
+            report.stations[station].wire.bus_transaction.observe(50ms);
+        }
+    };
+    ask(0, 5);
+    ask(1, 3);
+    next();
+    report.stations.erase(report.stations.begin());
+    ask(0, 1);
+    LineSample last = next();
+    EXPECT_EQ(last.requests, 1u);
+    EXPECT_EQ(last.errors, 1u);
+    EXPECT_NEAR(*last.latency_ms, 100, 1e-9);
+    report.stations.emplace_back().station = "press";
+    ask(1, 2);
+    last = next();
+    EXPECT_EQ(last.requests, 2u);
+    EXPECT_NEAR(*last.wire_ms, 50, 1e-9);
+    report.stations.back() = {};  // away and back between two calls
+    report.stations.back().station = "press";
+    ask(1, 1);
+    EXPECT_EQ(next().errors, 1u);
 }
 
 TEST_F(LineHistoryTest, P10WhatNobodyHasMeasuredIsAbsent) {

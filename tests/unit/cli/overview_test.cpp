@@ -68,6 +68,7 @@ TEST(Difference, IsOfTheTimeBetweenUnlessTheGatewayBeganAnew) {
     EXPECT_EQ(made.at({"l", "a"}).requests, 5);
     EXPECT_EQ(made.at({"l", "a"}).transactions, 4);
     EXPECT_EQ(made.at({"l", "b"}).requests, 2);
+    EXPECT_EQ(made.at({"l", ""}).requests, 7) << "the line's are its stations'";
 }
 
 TEST(StatusText, IsTwoTablesAndAVerdict) {

@@ -61,6 +61,17 @@ TEST(Sample, ADriverThatBeganToCountCountsFromZero) {
     EXPECT_FALSE(difference(before, after).uart) << "and one that stopped tells nothing";
 }
 
+TEST(Sample, CountersThatBeganAnewCountFromZero) {
+    Sample before, after;
+    before.stations[1] = Mix().answered(20, 0).silent(5);
+    after.stations[1] = Mix().answered(30, 0).silent(1);
+    before.uart = line::UartErrors{4, 3, 2, 1};
+    after.uart = line::UartErrors{5, 0, 2, 1};
+    const Sample window = difference(after, before);
+    EXPECT_EQ(window.stations.at(1), after.stations.at(1));
+    EXPECT_EQ(window.uart, after.uart);
+}
+
 /// Two stations; the test sets the clock and the counts.
 class DoctorTest : public testing::Test {
   protected:
@@ -68,8 +79,11 @@ class DoctorTest : public testing::Test {
 
     Doctor::Change look_after(Duration pause) {
         now += pause;
+        return doctor.look(now, sample());
+    }
+    Sample sample() {
         counted.stations[1] = one;
-        return doctor.look(now, counted);
+        return counted;
     }
     /// Five seconds with 20 requests, `damaged` of them unanswered.
     Doctor::Change pass(std::uint64_t damaged) {
@@ -139,6 +153,28 @@ TEST_F(DoctorTest, ANewLineForgetsTheCountsAndKeepsTheFindingUntilItIsUsed) {
     doctor.begin(now, counted);
     EXPECT_EQ(doctor.findings().size(), 1u);
     EXPECT_EQ(causes(pass(0).gone), "noise ");
+}
+
+TEST_F(DoctorTest, AStationThatWasLeftOutAndIsBackBeginsAnew) {
+    LineFacts with, without;
+    with.names = {{1, "press"}, {2, "oven"}};
+    without.names = {{2, "oven"}};
+    doctor.apply(with);
+    pass(3);
+    doctor.begin(now, counted);
+    doctor.apply(without);
+    counted.stations.erase(1);
+    doctor.apply(with);
+    one = Mix();
+    EXPECT_TRUE(pass(0).appeared.empty());
+    doctor.apply(with);
+    EXPECT_EQ(causes(pass(3).appeared), "noise ") << "its counts go on where it stays";
+    doctor.begin(now, counted);
+    doctor.apply(without);
+    doctor.apply(with);
+    one = Mix().answered(200).damaged(9);  // more than before already
+    EXPECT_THAT(doctor.look(now += 5s, sample()).appeared, testing::IsEmpty());
+    EXPECT_THAT(doctor.findings().at(0).evidence, testing::HasSubstr("9 of 209"));
 }
 
 TEST_F(DoctorTest, DamageAlonePersistsAcrossOpeningsAndIsNamed) {
