@@ -1,5 +1,6 @@
 #include "hearing.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "panelgate/modbus/ascii.hpp"
@@ -53,7 +54,10 @@ using Length = modbus::ReplyLength;
 
 }  // namespace
 
+/// Bytes that announce the rest of a request may go on behind the silence, which is then one of the
+/// adapter. Others are over: what comes now begins a frame.
 void RtuHearing::feed(TimePoint, ByteView bytes) {
+    if (silent_ && missing() < modbus::kReadRequestAdu) to_silence_ = heard_.size();
     silent_ = false;
     heard_.feed(bytes);
 }
@@ -110,18 +114,20 @@ void RtuHearing::on_silence() {
     if (!knows_length()) skip_to_last_frame();
 }
 
-/// Judges by the header. Exceptions are excluded: they are too short to contain a request, and
-/// glitches look like them.
-bool RtuHearing::knows_length() const {
+/// Bytes that the header announces beyond those that are here; 0 if it tells no length. Exceptions
+/// are excluded: they are too short to contain a request, and glitches look like them.
+std::size_t RtuHearing::missing() const {
     const ByteView all = heard_.view();
-    if (all.empty()) return false;
-    const auto goes_on = [&](const Length& length) {
-        return length.kind == Length::Kind::known && length.length > all.size() &&
-               length.length <= modbus::kMaxLongRtuAdu;
+    if (all.empty()) return 0;
+    const auto rest = [&](const Length& length) -> std::size_t {
+        const bool goes_on = length.kind == Length::Kind::known && length.length > all.size() &&
+                             length.length <= modbus::kMaxLongRtuAdu;
+        return goes_on ? length.length - all.size() : 0;
     };
-    if (goes_on(modbus::request_length(all))) return true;
+    const std::size_t request = rest(modbus::request_length(all));
     const bool exception = all.size() > 1 && (all[1] & modbus::kExceptionBit) != 0;
-    return !exception && !is_for_us(all[0]) && goes_on(modbus::reply_length(all));
+    if (exception || is_for_us(all[0])) return request;
+    return std::max(request, rest(modbus::reply_length(all)));
 }
 
 /// Skips an incomplete start in favour of a good frame that ends with the last byte received.
@@ -153,7 +159,8 @@ void RtuHearing::step_over(std::size_t count) {
 
 void RtuHearing::consume(std::size_t count) {
     heard_.take(count);
-    since_lost_ += count;
+    since_lost_ = count == to_silence_ ? 0 : since_lost_ + count;
+    to_silence_ -= std::min(to_silence_, count);
 }
 
 void RtuHearing::drop_pending() {

@@ -48,8 +48,10 @@ std::unique_ptr<Hearing> make_hearing(const Settings& settings, const Units& ser
 /// may be a request or a reply, whichever is valid, so that its data is not searched for requests.
 /// After noise, a request to a served unit or a broadcast is valid only if a silence follows: its
 /// master waits for the reply, while a lookalike inside other data is followed by more bytes.
-/// Anything but a pure read is accepted there only after up to three bytes, a glitch: it may be the
-/// tail of a damaged write, and a master repeats a lost one. Buffers at most 260 bytes.
+/// Anything but a pure read is accepted there only after up to three bytes, a glitch, or after a
+/// silence that has ended the noise: else it may be the tail of a damaged write, and a master
+/// repeats a lost one. Noise that announces a longer frame is ended by no silence: an adapter makes
+/// such ones inside a frame. Buffers at most 260 bytes.
 class RtuHearing final : public Hearing {
   public:
     explicit RtuHearing(const Units& served) : served_(served) {}
@@ -59,7 +61,7 @@ class RtuHearing final : public Hearing {
     void on_silence() override;
     void drop_pending() override;
     std::size_t pending() const override { return heard_.size(); }
-    bool knows_length() const override;
+    bool knows_length() const override { return missing() > 0; }
     std::size_t take_faults() override;
     void serve(const Units& served) override { served_ = served; }
 
@@ -74,6 +76,7 @@ class RtuHearing final : public Hearing {
     bool is_acceptable(std::size_t size) const;
     Judgement judge(ByteView start, bool aligned) const;
     Judgement check_length(modbus::ReplyLength length, ByteView start, bool aligned) const;
+    std::size_t missing() const;
     bool skip_to_last_frame();
     modbus::SerialAdu take(std::size_t size);
     void step_over(std::size_t count);
@@ -85,7 +88,8 @@ class RtuHearing final : public Hearing {
     ByteQueue heard_;
     bool aligned_ = true;         ///< the front is a frame boundary
     bool trusted_ = true;         ///< ... and cannot be inside a damaged frame
-    std::size_t since_lost_ = 0;  ///< bytes since trust was lost
+    std::size_t since_lost_ = 0;  ///< bytes since trust was lost, or since the silence behind that
+    std::size_t to_silence_ = 0;  ///< bytes before the last silence that ended them; 0: none
     bool silent_ = false;         ///< a silence followed the last byte
     std::size_t faults_ = 0;
 };

@@ -15,6 +15,7 @@ namespace panelgate::serial_server::test::rtu_hearing_test {
 namespace {
 
 using modbus::encode_adu;
+using testing::AnyOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::IsEmpty;
@@ -113,6 +114,44 @@ TEST(RtuHearing, P2TakesNoWriteOutOfADamagedOne) {
             EXPECT_THAT(heard(hearing, write), ElementsAre(kOurs)) << "it is said again";
         }
     }
+}
+
+TEST(RtuHearing, P3AWriteBehindNoiseThatASilenceHasEndedIsWhole) {
+    std::mt19937 random(5);
+    int taken = 0;
+    for (int i = 0; i < 1000; ++i) {
+        Bytes noise;
+        for (unsigned n = 1 + random() % 11; n > 0; --n)
+            noise.push_back(static_cast<std::uint8_t>(random()));
+        RtuHearing hearing(Talk::served());
+        heard(hearing, noise);
+        std::vector<int> all = heard(hearing, kWriteBeef);
+        hearing.drop_pending();
+        if (all.empty()) all = heard(hearing, {});
+        EXPECT_THAT(all, AnyOf(IsEmpty(), ElementsAre(kOurs)));
+        taken += all.empty() ? 0 : 1;
+    }
+    EXPECT_GT(taken, 970) << "but for noise that looks like the beginning of a longer frame";
+    for (const Bytes& noise : {Bytes{0xC8, 0x57, 0x11, 0x90, 0x33}, Bytes{0x40, 0x06, 1, 2, 3}}) {
+        RtuHearing hearing(Talk::served());
+        EXPECT_THAT(heard(hearing, joined({noise, kWriteBeef})), IsEmpty()) << "glued to it";
+    }
+}
+
+TEST(RtuHearing, P2ASilenceEndsNoFrameThatIsToGoOn) {
+    const Bytes head{kOurs, 0x10, 1, 0, 0, 5, 10};
+    for (const Bytes& begun : {head, joined({head, {0, 7}}), Bytes{kOther, 0x03, 200, 1, 2, 3}}) {
+        RtuHearing hearing(Talk::served());
+        EXPECT_THAT(heard(hearing, begun), IsEmpty());
+        EXPECT_THAT(heard(hearing, kWriteBeef), IsEmpty());
+        EXPECT_THAT(heard(hearing, {0x12, 0x34}), IsEmpty());
+        hearing.drop_pending();
+        EXPECT_THAT(heard(hearing, {}), IsEmpty());
+        EXPECT_THAT(heard(hearing, kWriteBeef), ElementsAre(kOurs));
+    }
+    RtuHearing hearing(Talk::served());  // the silence was inside: what it begins goes on
+    heard(hearing, {0xC8, 0x57, 0x11, 0x90, 0x33});
+    EXPECT_THAT(heard(hearing, joined({kWriteBeef, {0x12, 0x34}})), IsEmpty());
 }
 
 TEST(RtuHearing, EndsVendorsFunctionsBySilence) {
