@@ -223,17 +223,16 @@ void Arbiter::settle(TimePoint now) {
 }
 
 /// P8: a reply came that may have been the write's echo, an answer to a broadcast, or the last
-/// confirmation once more, and a read has now shown what the station holds. Where that cannot be
-/// read only a line on which writes do not come back leaves no doubt: an adapter need not echo
-/// reads.
+/// confirmation once more, and a read has now shown what the station holds. Where that is not what
+/// was written (a command that resets itself), or cannot be read, only a line on which writes do
+/// not come back leaves no doubt: an adapter need not echo reads.
 void Arbiter::confirm(TimePoint now, const Group& group, ByteView reply, bool echoed) {
     const auto broadcast = stations_.book().behind_broadcast(group.doubted_at, group.confirms);
     const bool holds = holds_written(group.written, reply);
     ReplyHabits& habits = stations_.of(group.station).replies();
-    const bool told = read_back(group.written) && !modbus::exception_of(reply);
     const bool holds_decides = echo_memory_.comes_again(now, group.station) ||
                                habits.may_repeat_confirmation(now, group.confirms);
-    const bool is_left = !told && echo_memory_.echoes_no_writes() && !broadcast;
+    const bool is_left = echo_memory_.echoes_no_writes() && !broadcast;
     const bool is_answer = holds_decides ? holds : !echoed && (holds || is_left);
     if (broadcast && holds) habits.on_broadcast_unanswered();
     if (broadcast && !holds && !modbus::exception_of(reply))
