@@ -70,7 +70,9 @@ Station::Replied Station::on_reply(OutstandingRequests& book, TimePoint now, con
     result.drift = turnaround_.take_report(settings_.response_timeout);
     result.trailed = trail_.seen();
     const TimePoint came = attempt.came_at(now);
-    trail_.on_reply(came);
+    const auto& first = attempt.answers().first_came();
+    trail_.on_reply(first.value_or(came));
+    if (first) trail_.on_unsolicited(came);  // its copy
     replies_.on_answered(book, came, attempt, waited);
     result.trail = trail_.take_report();
     const bool exception = modbus::exception_of(attempt.reply()).has_value();

@@ -9,6 +9,7 @@
 #include "panelgate/base/words.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "support/attempts.hpp"
 #include "support/hex.hpp"
 
 namespace panelgate::arbiter::unsolicited_test {
@@ -144,6 +145,29 @@ TEST_F(UnsolicitedFramesTest, GathersNoMoreThanAnyFrameHas) {
     EXPECT_TRUE(unsolicited.full());
     unsolicited.forget();
     EXPECT_FALSE(unsolicited.pending());
+}
+
+TEST(StationTrail, P5WhatHasFollowedTheReplyAlreadyIsNotRestedFor) {
+    constexpr Duration kBehind = 50ms;
+    constexpr Duration kCopy = 10ms;
+    const Group read = test::group_of(17, kRead);
+    StationSettings settings;
+    settings.id = 17;
+    Station station(settings, OfflineSettings{}, true);
+    OutstandingRequests book;
+    TimePoint now{1h};
+    for (std::size_t i = 0; i <= Trail::kReplies; ++i) {
+        now += 1s;
+        station.on_reply(book, now, test::answered(now - 30ms, now, read, kReply), 30ms, 25ms);
+        if (i < Trail::kReplies) station.on_unsolicited_bytes(now + kBehind);
+    }
+    EXPECT_GE(station.trail_until(), now + kBehind);
+    now += 1s;
+    Attempt twice = test::answered(now - kCopy - 30ms, now - kCopy, read, kReply);
+    twice.keep_candidate(60ms, Answers::Kept::doubted);
+    ASSERT_EQ(twice.on_rx(now, kAnswer, [](ByteView) { return false; }), Verdict::replied);
+    station.on_reply(book, now, twice, 30ms, 25ms);
+    EXPECT_LE(station.trail_until(), now + kCopy * 5 / 4) << "of a further copy alone";
 }
 
 TEST_F(UnsolicitedFramesTest, TheTrailBelongsToTheStationThatAnsweredLast) {
