@@ -10,6 +10,7 @@ import select
 import socket
 import struct
 import tempfile
+import time
 import tty
 
 import config
@@ -26,6 +27,7 @@ ROLES = ("viewer", "operator", "engineer", "admin")
 NEAR, ALIASED, WEB, PLC = "127.0.0.2:0", "127.0.0.3:0", "127.0.0.1:0", "plc"
 POLLED = (300, 20)  # holding registers of the meter
 UNLISTED = 99
+BAUD = 38400
 # The panel of a file of its own: 04 reads the same registers as 03, and is not known to it.
 TWIN = """
 description: Acme Twin, a panel of this test
@@ -72,7 +74,9 @@ def notation(letter, address):
 
 
 def answer(frame):
-    """What each panel answers: registers hold their own address, and everything is taken."""
+    """What each panel answers: registers hold their own address, and everything is taken. No sooner than on a
+    real line: what confirms a write before that can have left may be its echo, and is read back."""
+    time.sleep(11 * len(frame) / BAUD + 0.002)
     pdu = frame[1:-2]
     function, (first, count) = pdu[0], struct.unpack(">HH", pdu[1:5].ljust(4, b"\0"))
     if function in (1, 2):
@@ -210,7 +214,7 @@ class Generator:
             letter = next(letter for letter, known in one.station.panel.letters.items() if known[0] == one.table)
             kind = "" if one.table == COILS else f", type: u{16 * one.count}"
             return f'{{name: {one.name}, at: "{notation(letter, one.first)}"{kind}, writable: true, every: 600min}}'
-        quick = {"echo": "off", "timing": "{broadcast_turnaround: 5ms}", "serial": "{baud: 38400, parity: none}"}
+        quick = {"echo": "off", "timing": "{broadcast_turnaround: 5ms}", "serial": f"{{baud: {BAUD}, parity: none}}"}
         lines = []
         for name, link in buses.items():
             own = ", ".join(station(one) for one in self.stations if one.line == name)
