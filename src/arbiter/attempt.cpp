@@ -16,6 +16,10 @@ namespace panelgate::arbiter {
 
 using modbus::Unused;
 
+namespace {
+constexpr std::size_t kHeader = 3;  // bytes of a read's reply: address, function, byte count
+}
+
 Attempt::Timing Attempt::timing_of(const Settings& line, TimePoint now, std::size_t size,
                                    Duration lead) {
     Timing timing;
@@ -195,7 +199,6 @@ Verdict Attempt::accept(std::optional<Bytes> reply) {
 
 bool Attempt::differs(const Unused& part, const Bytes& reply) const {
     if (part.kind == Unused::Kind::damaged) {
-        constexpr std::size_t kHeader = 3;
         const Bytes whole = adu_of(reply);
         const std::size_t same =
             static_cast<std::size_t>(std::ranges::mismatch(whole, part.bytes).in1 - whole.begin());
@@ -408,7 +411,6 @@ bool Attempt::may_answer_first_heard() const {
 /// An adapter that switches late lets a part of our request through: no damage where no reply can
 /// begin so. That to a write does.
 bool Attempt::is_only_own_beginning() const {
-    constexpr std::size_t kHeader = 3;  // address, function, byte count
     const ByteView own = echo_.frame();
     const auto length = group_.request.reply_length();
     if (damaged_bytes_.size() < kHeader || damaged_bytes_.size() > own.size()) return false;

@@ -8,6 +8,14 @@
 
 namespace panelgate::tap {
 
+namespace {
+
+auto is_of(ByteView request) {
+    return [request](const auto& place) { return std::ranges::equal(place.request, request); };
+}
+
+}  // namespace
+
 bool Places::answered(TimePoint now, const Reply& reply, const std::optional<Reply>& last) {
     const bool repeats = last && !std::ranges::equal(last->request, reply.request) &&
                          std::ranges::equal(last->pdu, reply.pdu);
@@ -70,14 +78,12 @@ void Places::say(Place& place, ByteView reply) {
 }
 
 const Places::Place* Places::find(ByteView request) const {
-    const auto found = std::ranges::find_if(
-        places_, [&](const Place& one) { return std::ranges::equal(one.request, request); });
+    const auto found = std::ranges::find_if(places_, is_of(request));
     return found == places_.end() ? nullptr : &*found;
 }
 
 Places::Place& Places::at(ByteView request) {
-    const auto found = std::ranges::find_if(
-        places_, [&](const Place& one) { return std::ranges::equal(one.request, request); });
+    const auto found = std::ranges::find_if(places_, is_of(request));
     if (found != places_.end()) {
         std::rotate(found, found + 1, places_.end());
         return places_.back();

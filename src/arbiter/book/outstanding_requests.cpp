@@ -348,16 +348,15 @@ Asked OutstandingRequests::take_closed(std::uint8_t station, ByteView reply, Tim
 
 bool OutstandingRequests::take_first_of_two(std::uint8_t station, ByteView reply, TimePoint open) {
     PoolVector<Asked>& all = at(station).asked;
-    const auto is_twin_of = [](const Asked& first) {
-        return [&first](const Asked& one) {
+    const auto was_answered_so = [&](const Asked& first) {
+        const auto second = std::ranges::find_if(all, [&](const Asked& one) {
             return one.state == State::answered && first.sent < one.replied && one.pdu == first.pdu;
-        };
-    };
-    const auto found =
-        std::ranges::find_if(all, [&, closed = closed_for(reply, open)](const Asked& first) {
-            const auto twin = std::ranges::find_if(all, is_twin_of(first));
-            return closed(first) && twin != all.end() && std::ranges::equal(twin->reply, reply);
         });
+        return second != all.end() && std::ranges::equal(second->reply, reply);
+    };
+    const auto is_closed = closed_for(reply, open);
+    const auto found = std::ranges::find_if(
+        all, [&](const Asked& one) { return is_closed(one) && was_answered_so(one); });
     if (found == all.end()) return false;
     all.erase(found);
     return true;
