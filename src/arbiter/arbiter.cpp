@@ -41,6 +41,14 @@ Quiet quiet_of(const Settings& settings) {
     return Quiet(frame_time(settings.serial, modbus::kMaxRtuAdu), silent_interval(settings.serial));
 }
 
+Attempt::Wire wire_of(const Settings& settings) {
+    return {.serial = settings.serial,
+            .end_of_frame = settings.end_of_frame,
+            .reply_hole = settings.reply_hole,
+            .paced = settings.paced,
+            .may_stall = settings.may_stall};
+}
+
 /// Why this group is sent now.
 Reason reason_of(TimePoint now, const Group& group, const JobQueue& queue) {
     if (group.probe) return {.kind = Reason::Kind::probe};
@@ -378,7 +386,7 @@ void Arbiter::start(TimePoint now, Group group) {
     }
     Bytes wire = ascii_ ? modbus::to_ascii(adu) : adu;
     if (ascii_) ascii_->cut();
-    Attempt::Timing timing = Attempt::timing_of(settings_, now, adu.size(), lead_);
+    Attempt::Timing timing = Attempt::timing_of(wire_of(settings_), now, adu.size(), lead_);
     timing.pause = now - quiet_.since();
     timing.confirm_end = confirm_ends_;
     timing.steady = timing.steady && (settings_.paced || pace_.kept());

@@ -3,12 +3,19 @@
 #include <cstdint>
 #include <utility>
 
-#include "panelgate/arbiter/attempt.hpp"
-#include "panelgate/arbiter/settings.hpp"
+#include "panelgate/arbiter/attempt/attempt.hpp"
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/request.hpp"
 
 namespace panelgate::test {
+
+/// A pty with the default settings.
+inline arbiter::Attempt::Wire default_wire() {
+    return {
+        .serial = {}, .end_of_frame = 20ms, .reply_hole = 60ms, .paced = false, .may_stall = false};
+}
 
 /// One job alone, sent `attempts` times with this one.
 inline arbiter::Group group_of(std::uint8_t station, const Bytes& pdu, int attempts = 1) {
@@ -24,7 +31,7 @@ inline arbiter::Group group_of(std::uint8_t station, const Bytes& pdu, int attem
 inline arbiter::Attempt answered(TimePoint sent, TimePoint now, arbiter::Group group,
                                  const Bytes& reply) {
     arbiter::Attempt::Timing timing =
-        arbiter::Attempt::timing_of(arbiter::Settings{}, sent, 0, Duration::zero());
+        arbiter::Attempt::timing_of(default_wire(), sent, 0, Duration::zero());
     timing.patience = timing.usual = 1min;
     const Bytes adu = modbus::encode_adu(group.station, reply);
     arbiter::Attempt attempt(std::move(group), timing, {});

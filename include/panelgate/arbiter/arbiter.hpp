@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "panelgate/arbiter/actions.hpp"
-#include "panelgate/arbiter/attempt.hpp"
+#include "panelgate/arbiter/attempt/attempt.hpp"
 #include "panelgate/arbiter/book/judge.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/arbiter/habits/echo.hpp"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "panelgate/arbiter/actions.hpp"
-#include "panelgate/arbiter/attempt.hpp"
+#include "panelgate/arbiter/attempt/attempt.hpp"
 #include "panelgate/arbiter/book/judge.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/arbiter/heard_before.hpp"

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "panelgate/arbiter/attempt.hpp"
+#include "panelgate/arbiter/attempt/attempt.hpp"
 #include "panelgate/arbiter/habits/echo.hpp"
 #include "panelgate/arbiter/queue/job_queue.hpp"
 #include "panelgate/arbiter/queue/read_cache.hpp"

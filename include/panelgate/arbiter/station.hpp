@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "panelgate/arbiter/attempt.hpp"
+#include "panelgate/arbiter/attempt/attempt.hpp"
 #include "panelgate/arbiter/book/judge.hpp"
 #include "panelgate/arbiter/book/outstanding_requests.hpp"
 #include "panelgate/arbiter/book/timing.hpp"

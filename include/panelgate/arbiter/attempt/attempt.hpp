@@ -8,13 +8,12 @@
 #include <utility>
 #include <vector>
 
-#include "panelgate/arbiter/answers.hpp"
-#include "panelgate/arbiter/group.hpp"
+#include "panelgate/arbiter/attempt/answers.hpp"
+#include "panelgate/arbiter/attempt/group.hpp"
 #include "panelgate/arbiter/habits/echo.hpp"
 #include "panelgate/arbiter/habits/input_pace.hpp"
 #include "panelgate/arbiter/habits/reply_times.hpp"
 #include "panelgate/arbiter/queue/job.hpp"
-#include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/pool.hpp"
 #include "panelgate/base/serial_format.hpp"
@@ -43,6 +42,14 @@ class Attempt {
   public:
     static constexpr int kRatesDiffer = 2;  ///< percent, between two devices on one line
 
+    /// What the line's settings say of each attempt (see Settings).
+    struct Wire {
+        SerialFormat serial;
+        Duration end_of_frame;
+        Duration reply_hole;
+        bool paced;
+        bool may_stall;
+    };
     struct Timing {
         TimePoint started;        ///< handed over; leaves at once or after the line's lead
         TimePoint sent;           ///< last bit out, computed
@@ -76,7 +83,7 @@ class Attempt {
 
     /// Timing of a request of `size` bytes that is handed over now and starts after `lead`; the
     /// caller adds the wait times.
-    static Timing timing_of(const Settings& line, TimePoint now, std::size_t size, Duration lead);
+    static Timing timing_of(const Wire& line, TimePoint now, std::size_t size, Duration lead);
 
     Attempt(Group group, const Timing& timing, EchoFilter echo,
             const modbus::CrcOrders& orders = {});

@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/attempt.hpp"
+#include "panelgate/arbiter/attempt/attempt.hpp"
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ const Bytes kReplyAdu = encode_adu(kStation, kReply);
 const Bytes kOtherReply = "03 06 02 2B 00 00 00 65"_hex;
 const Bytes kOfOtherShape = "03 04 00 01 00 02"_hex;
 
-Attempt::Timing timing_of(Duration usual, const Settings& line = {}) {
+Attempt::Timing timing_of(Duration usual, const Attempt::Wire& line = test::default_wire()) {
     Attempt::Timing timing = Attempt::timing_of(line, TimePoint{1h}, 8, Duration::zero());
     timing.patience = 500ms;
     timing.usual = usual;
@@ -216,7 +216,7 @@ TEST_F(AttemptPaceTest, TheReplyIsLookedAtWhenItsHeaderAndWhenAllOfItIsThere) {
     Attempt::Timing sooner = timing_of(500ms);
     sooner.wake_latency = 40us;
     for (int i = 0; i < 50; ++i) sooner.drift.on_look(whole, true);
-    Settings tcp;
+    Attempt::Wire tcp = test::default_wire();
     tcp.may_stall = true;
     struct Row {
         const char* what;
@@ -271,7 +271,7 @@ TEST_F(AttemptPaceTest, AnUnexpectedExceptionShowsNothingAboutTheEndAndWhenItBeg
 }
 
 TEST_F(AttemptPaceTest, AShortReplyIsSleptThroughAllTheSame) {
-    Settings line;
+    Attempt::Wire line = test::default_wire();
     line.serial.baud = 921600;
     Attempt::Timing timing = timing_of(500ms, line);
     timing.wake_latency = WakeLatency::kMost;
@@ -400,7 +400,7 @@ class APartOfTheEcho : public testing::TestWithParam<EchoFilter::Expect> {
     }
 
     static Attempt::Timing paced() {
-        Settings line;
+        Attempt::Wire line = test::default_wire();
         line.paced = true;
         return timing_of(100ms, line);
     }

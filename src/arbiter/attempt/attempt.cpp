@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/attempt.hpp"
+#include "panelgate/arbiter/attempt/attempt.hpp"
 
 #include <algorithm>
 #include <array>
@@ -20,7 +20,7 @@ namespace {
 constexpr std::size_t kHeader = 3;  // bytes of a read's reply: address, function, byte count
 }
 
-Attempt::Timing Attempt::timing_of(const Settings& line, TimePoint now, std::size_t size,
+Attempt::Timing Attempt::timing_of(const Wire& line, TimePoint now, std::size_t size,
                                    Duration lead) {
     Timing timing;
     timing.leaving = frame_time(line.serial, size);

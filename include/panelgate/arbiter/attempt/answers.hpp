@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "panelgate/arbiter/group.hpp"
+#include "panelgate/arbiter/attempt/group.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/pool.hpp"
 #include "panelgate/base/time.hpp"

@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/answers.hpp"
+#include "panelgate/arbiter/attempt/answers.hpp"
 
 #include <iterator>
 
