@@ -242,22 +242,26 @@ std::optional<Group> Schedule::next_retry(const Line& line) {
         return repeat_from(waiting, line.stations) <= line.now &&
                gap_is_over(line, waiting.station);
     });
-    if (group) let_others_go_first(line.now);
+    if (group) let_others_go_first(line.now, line.stations);
     return group;
 }
 
-/// Reserves turns for other stations before the next retry.
-void Schedule::let_others_go_first(TimePoint now) {
+/// Reserves turns for other stations before the next retry: for those that have ever answered, if
+/// any of these waits.
+void Schedule::let_others_go_first(TimePoint now, const Stations& stations) {
     others_.clear();
     wrote_.clear();
     turns_ = 0;
-    if (!backlog_.has_retries()) patience_ = {};
-    others_until_ = now + std::max(patience_, timing::kOthersFirst);
+    others_since_ = now;
     if (!backlog_.has_retries() || quarantine_ == Quarantine::line) return;
-    backlog_.queue().any_first([&](const Job& job) {
-        others_.insert(job.station);
-        return false;
-    });
+    for (const bool all : {false, true}) {
+        if (!others_.empty()) break;
+        backlog_.queue().any_first([&](const Job& job) {
+            const bool may_answer = all || stations.condition(job.station) != Condition::unheard;
+            if (may_answer || job.station == kBroadcast) others_.insert(job.station);
+            return false;
+        });
+    }
     turns_ = patience_ > timing::kDearRetry ? others_.size() : 1;
 }
 
@@ -277,7 +281,8 @@ void Schedule::take_turn(const Job& job) {
 }
 
 bool Schedule::others_go_first(const Line& line) const {
-    if (turns_ == 0 || line.now >= others_until_) return false;
+    const TimePoint until = others_since_ + std::max(patience_, timing::kOthersFirst);
+    if (turns_ == 0 || line.now >= until) return false;
     return backlog_.queue().any_first([&](const Job& job) {
         return has_turn(job) && may_run(line, job) && line.stations.may_spend(line.now, job);
     });
@@ -412,13 +417,14 @@ std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& 
     return std::min(rested, sent + own.response_timeout + worst * 5 / 4);
 }
 
-void Schedule::retry(TimePoint now, Group group, Duration patience) {
+void Schedule::retry(TimePoint now, Group group, Duration patience, const Stations& stations) {
     const bool begins = !backlog_.has_retries() || group.attempts > group.doubts + 1;
     const bool at_once = !group.confirms.empty();
+    if (!backlog_.has_retries()) patience_ = {};
     // A retried write has had its turn among the writes.
-    if (group.request.is_read()) patience_ = std::max(patience_, patience);
+    if (group.request.is_read()) patience_ += patience;
     backlog_.retry(std::move(group));
-    if (begins) let_others_go_first(now);
+    if (begins) let_others_go_first(now, stations);
     if (at_once) turns_ = 0;
 }
 

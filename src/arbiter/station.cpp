@@ -182,7 +182,8 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
     if (health_.offline() || missed_last() || speculative() || flaky_beside_others)
         return usual(line);
     if (urgent && slowest())
-        return std::min(response_timeout(), usual(line, !group.request.is_read()));
+        return std::min(response_timeout(), std::max(times_.share_of_few(whole),
+                                                     usual(line, !group.request.is_read())));
     // A write that is not repeated waits for the configured time: the panel may have become slower,
     // and only the reply shows whether it was executed.
     const bool repeatable = group.request.is_read() || settings_.retry_writes;

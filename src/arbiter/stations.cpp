@@ -55,8 +55,7 @@ Duration Stations::patience(TimePoint now, const Group& group) {
     const Station& station = of(group.station);
     const bool over = station.over_budget(now, group.request) && others_active(now, station);
     // Not a write: it may need longer, and its outcome is worth waiting for.
-    const bool urgent =
-        (now < urgent_until_ && station.is_slowest_known() && group.request.is_read()) || over;
+    const bool urgent = (now < urgent_until_ && group.request.is_read()) || over;
     Duration wait = station.patience(group, slowest(), urgent, flaky_beside_others(now, station));
     const Duration whole = settings(group.station).response_timeout;
     for (const Job& job : group.jobs) wait = std::max(wait, std::min(job.patience, whole));
@@ -158,8 +157,8 @@ void Stations::on_failed(TimePoint now, const Group& group, Verdict verdict, Dur
     } else if (verdict == Verdict::silent) {
         // Several stations may have failed together: for five times what this one took, the others
         // are not waited for longer than they have ever needed.
-        urgent_until_ = now + std::min<Duration>(static_cast<int>(1 / ProbeBudget::kFailing) * cost,
-                                                 timing::kUrgent);
+        const Duration urgent = static_cast<int>(1 / ProbeBudget::kFailing) * cost;
+        urgent_until_ = std::max(urgent_until_, now + std::min<Duration>(urgent, timing::kUrgent));
     }
 }
 

@@ -256,9 +256,10 @@ void Arbiter::ask_again(TimePoint now) {
     group.silent_after = group.cut_after = {};
     finish_barred(group);
     if (group.doubts <= Group::kMostDoubts && in_time(now, group) && !group.abandoned()) {
-        if (!group.request.is_read()) return schedule_.retry(now, confirming(group, station), {});
+        if (!group.request.is_read())
+            return schedule_.retry(now, confirming(group, station), {}, stations_);
         outbox_.decide(now, Decision::Kind::doubted, group.jobs.front());
-        return schedule_.retry(now, std::move(group), station.usual());
+        return schedule_.retry(now, std::move(group), station.usual(), stations_);
     }
     for (const Job& job : group.jobs)
         outbox_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
@@ -334,7 +335,9 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     const bool again = group.confirms.empty() && in_time(now, group) && affordable;
     if (again && station.may_retry(group)) {
         station.on_retry(silent);
-        schedule_.retry(now, std::move(group), stations_.patience(now, group));
+        // One never heard may be followed by others like it, and each would take as long.
+        const Duration dear = before == Condition::unheard ? cost : stations_.patience(now, group);
+        schedule_.retry(now, std::move(group), dear, stations_);
     } else if (group.confirms.empty() && group.joined()) {
         station.on_retry(silent);
         give_back(group);  // health unaffected: the panel may only not answer this length

@@ -122,10 +122,10 @@ class Schedule {
 
     Backlog& backlog() { return backlog_; }
     const Backlog& backlog() const { return backlog_; }
-    /// Queues a retry that will wait `patience` for its reply. While only its station rests, other
-    /// stations go first, for no longer than the retry may take: one request, or one per waiting
-    /// station if the retry may take long.
-    void retry(TimePoint now, Group group, Duration patience);
+    /// Queues a retry that may cost others `patience`. While only its station rests, other stations
+    /// go first, for no longer than that: one request, or one per waiting station if all retries
+    /// that wait may take long.
+    void retry(TimePoint now, Group group, Duration patience, const Stations& stations);
     /// Puts the parts of a joined read back, each alone. Returns the jobs whose client has left:
     /// they are not sent again.
     Jobs give_back(Group& group);
@@ -151,7 +151,7 @@ class Schedule {
     TimePoint repeat_from(const Group& group, const Stations& stations) const;
     bool can_prove(const OutstandingRequests& book, const Station& station) const;
     bool others_go_first(const Line& line) const;
-    void let_others_go_first(TimePoint now);
+    void let_others_go_first(TimePoint now, const Stations& stations);
     bool has_turn(const Job& job) const;
     void take_turn(const Job& job);
 
@@ -164,8 +164,8 @@ class Schedule {
     PoolSet<std::uint8_t> others_;  ///< stations that waited when a retry was due
     PoolSet<std::uint8_t> wrote_;   ///< those of them whose turn was a write
     std::size_t turns_ = 0;         ///< turns that the retry leaves to them, at most
-    Duration patience_{};           ///< time that a retry may cost them
-    TimePoint others_until_{};      ///< end of the time that the retry leaves to them
+    Duration patience_{};           ///< time that retries may cost them, since one waits
+    TimePoint others_since_{};      ///< begin of the time that the retry leaves to them
 };
 
 }  // namespace panelgate::arbiter

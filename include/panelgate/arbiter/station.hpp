@@ -207,8 +207,6 @@ class Station {
         return std::max(trail_.until(), replies_.duplicates_until(trail_.longest()));
     }
     std::optional<Duration> slowest() const { return times_.longest(); }
-    /// Enough replies have shown how long it may need.
-    bool is_slowest_known() const { return times_.is_significant(); }
 
     /// End of its last failed attempt.
     TimePoint failed() const { return failed_; }

@@ -9,6 +9,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -26,10 +27,10 @@ constexpr std::array<std::uint8_t, 4> kHealthy{1, 2, 4, 5};
 constexpr Duration kQuick = 3ms;
 const Bytes kRead = "03 00 00 00 01"_hex;
 
-Settings five_stations() {
+Settings stations_up_to(std::uint8_t last) {
     Settings settings;
     settings.serial = {38400, 8, Parity::none, 1};
-    for (std::uint8_t id = 1; id <= 5; ++id) {
+    for (std::uint8_t id = 1; id <= last; ++id) {
         StationSettings station;
         station.id = id;
         settings.stations.push_back(station);
@@ -37,13 +38,14 @@ Settings five_stations() {
     return settings;
 }
 
-/// Five panels on a line, and clients each of which asks again as soon as it is answered.
+/// Panels on a line, and clients each of which asks again as soon as it is answered.
 class Plant {
   public:
     /// Think time of station 3 for its n-th request; empty: no answer.
     using Pattern = std::function<std::optional<Duration>(int)>;
 
-    explicit Plant(Pattern pattern) : pattern_(std::move(pattern)) {}
+    explicit Plant(Pattern pattern, std::uint8_t panels = 5)
+        : bus(stations_up_to(panels)), pattern_(std::move(pattern)), panels_(panels) {}
 
     /// A client that asks these stations in turn.
     void add_client(std::vector<std::uint8_t> stations) {
@@ -73,7 +75,8 @@ class Plant {
         return to_seconds(all) / to_seconds(bus.now() - started_);
     }
 
-    BusScript bus{five_stations()};
+    BusScript bus;
+    std::set<std::uint8_t> dead;
     std::map<std::uint8_t, int> answers;
     std::map<std::uint8_t, int> faults;
     std::map<std::uint8_t, int> asked;  ///< on the wire
@@ -112,7 +115,8 @@ class Plant {
             const int number = asked[open_]++;
             const auto after = open_ == kFlaky ? pattern_(number) : std::optional<Duration>(kQuick);
             const TimePoint end = at + wire_time(bus.settings().serial, adu.size());
-            if (open_ <= 5 && after) replies_.push_back({end + *after, open_});
+            if (open_ <= panels_ && after && !dead.contains(open_))
+                replies_.push_back({end + *after, open_});
         }
         const auto due = std::ranges::find_if(
             replies_, [&](const Reply& reply) { return reply.at <= bus.now(); });
@@ -124,6 +128,7 @@ class Plant {
     }
 
     Pattern pattern_;
+    std::uint8_t panels_;
     std::vector<ClientOf> clients_;
     std::vector<Reply> replies_;
     std::size_t seen_ = 0;
@@ -196,6 +201,39 @@ TEST(Costs, P4AnIntermittentPanelThatIsAloneIsRetriedAndWaitedFor) {
     EXPECT_GT(plant.answers[kFlaky], 20);
 }
 
+int of_healthy(const std::map<std::uint8_t, int>& counts) {
+    int sum = 0;
+    for (const auto& [station, count] : counts) sum += station <= 10 ? count : 0;
+    return sum;
+}
+
+TEST(Costs, P4TenOfTwentyThatDieAtOnceSoonLeaveTheLineToTheOthers) {
+    for (const Duration lived : {300ms, 1000ms, 2000ms}) {  // little is known of each
+        Plant plant([](int) { return kQuick; }, 20);
+        for (std::uint8_t id = 1; id <= 20; ++id) plant.add_client({id});
+        plant.run_for(lived);
+        const int rate = 2 * of_healthy(plant.answers);  // of the ten, with the line for them
+        for (std::uint8_t id = 11; id <= 20; ++id) plant.dead.insert(id);
+        plant.forget();
+        plant.run_for(3s);
+        EXPECT_EQ(of_healthy(plant.faults), 0);
+        plant.forget();
+        plant.run_for(7s);
+        EXPECT_EQ(of_healthy(plant.faults), 0);
+        // All that are silent together have a fifth until they are offline.
+        EXPECT_GT(of_healthy(plant.answers) * lived, 0.8 * rate * Duration(7s));
+    }
+}
+
+TEST(Costs, P4TenOfTwentyThatWereNeverHeardLeaveTheOthersTheirTurns) {
+    Plant plant([](int) { return kQuick; }, 20);
+    for (std::uint8_t id = 11; id <= 20; ++id) plant.dead.insert(id);
+    for (std::uint8_t id = 1; id <= 20; ++id) plant.add_client({id});
+    plant.run_for(10s);
+    EXPECT_EQ(of_healthy(plant.faults), 0);
+    EXPECT_GT(plant.asked[20], 2);
+}
+
 TEST(Costs, P4UnheardIdsTakeAFifthAtFirstAndALittleInTheLongRun) {
     Plant plant([](int) { return std::nullopt; });
     for (const std::uint8_t id : kHealthy) plant.add_client({id});
@@ -217,7 +255,7 @@ TEST(Costs, P4UnheardIdsTakeAFifthAtFirstAndALittleInTheLongRun) {
 }
 
 TEST(Costs, P4BeforeADearRetryEachStationThatSomethingWaitsForHasATurn) {
-    BusScript bus{five_stations()};
+    BusScript bus{stations_up_to(5)};
     const auto answer = [&](std::uint8_t station, Duration after, std::uint16_t value) {
         ASSERT_EQ(bus.sent.back().adu[0], station);
         bus.run_to_end_of_request();

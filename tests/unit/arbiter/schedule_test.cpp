@@ -124,7 +124,7 @@ TEST_F(ScheduleTest, P4ARetryLeavesTheOthersTurnsByWhatItMayCost) {
         settings.quarantine = row.quarantine;
         rebuild();
         for (const std::uint8_t station : row.waiting) wait(station);
-        schedule.retry(now, failed(1), row.patience);
+        schedule.retry(now, failed(1), row.patience, stations);
         const auto turns = static_cast<std::size_t>(std::ranges::count(row.asked, ' ')) + 1;
         EXPECT_EQ(order(turns), row.asked);
     }
@@ -135,7 +135,7 @@ TEST_F(ScheduleTest, P4ARetriedWriteLeavesOneTurnToTheOthers) {
     wait(3);
     Group write = failed(1);
     write.request = job(1, true).request;
-    schedule.retry(now, std::move(write), kDear);
+    schedule.retry(now, std::move(write), kDear, stations);
     EXPECT_EQ(order(), "2 r1 3");
 }
 
@@ -143,29 +143,36 @@ TEST_F(ScheduleTest, P8TheReadThatConfirmsAWriteGoesBeforeTheOthers) {
     wait(2);
     Group read = failed(1);
     read.confirms = Bytes{6, 0, 1, 0, 1};
-    schedule.retry(now, std::move(read), {});
+    schedule.retry(now, std::move(read), {}, stations);
     EXPECT_EQ(order(), "r1 2") << "what they do meanwhile could change what it shows";
 }
 
 TEST_F(ScheduleTest, P4ADearRetryLeavesTheOthersNoMoreTimeThanItMayTake) {
     wait(2);
     wait(3);
-    schedule.retry(now, failed(1), kDear);
+    schedule.retry(now, failed(1), kDear, stations);
     EXPECT_EQ(order(1), "2");
     now += kDear;
     EXPECT_EQ(order(), "r1 3") << "what the others took counts";
 }
 
+TEST_F(ScheduleTest, P4RetriesThatAreDearTogetherLeaveEachOfTheOthersATurn) {
+    for (const std::uint8_t station : Bytes{2, 3, 5}) wait(station);
+    schedule.retry(now, failed(1), 150ms, stations);
+    schedule.retry(now, failed(4), 150ms, stations);
+    EXPECT_EQ(order(), "2 r1 3 5 r4");
+}
+
 TEST_F(ScheduleTest, P4BetweenTwoDearRetriesTheOthersHaveTheirTurns) {
     wait(2);
     wait(2);
-    schedule.retry(now, failed(1), kDear);
-    schedule.retry(now, failed(3), kDear);
+    schedule.retry(now, failed(1), kDear, stations);
+    schedule.retry(now, failed(3), kDear, stations);
     EXPECT_EQ(order(1), "2");
     Group silent = *next().group;
     now += kDear;
     ++silent.attempts;
-    schedule.retry(now, std::move(silent), kDear);
+    schedule.retry(now, std::move(silent), kDear, stations);
     EXPECT_EQ(order(), "2 r3 r1");
 }
 
@@ -174,7 +181,7 @@ TEST_F(ScheduleTest, P4BetweenTwoDearRetriesTheOthersHaveTheirTurns) {
 TEST_F(ScheduleTest, P9AReaderWaitsForFourWritesAlsoBesideARetry) {
     wait(2);
     for (const std::uint8_t station : Bytes{2, 3, 2, 2, 2, 2, 2}) wait(station, true);
-    schedule.retry(now, failed(1), kDear);
+    schedule.retry(now, failed(1), kDear, stations);
     int writes = 0;
     while (const auto group = next().group) {
         if (group->attempts > 0) continue;
@@ -235,7 +242,7 @@ TEST_F(ScheduleTest, P9AWriteIsNotHeldBackByAReadWhoseHostHasOtherReads) {
 TEST_F(ScheduleTest, NothingElseGoesToAStationBeforeItsRetry) {
     wait(1, true);
     wait(1);
-    schedule.retry(now, failed(1), kCheap);
+    schedule.retry(now, failed(1), kCheap, stations);
     EXPECT_EQ(order(), "r1 1 1");
 }
 

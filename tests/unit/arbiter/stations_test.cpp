@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -128,6 +129,25 @@ TEST_F(StationsTest, P4WhatOneLosesShortensTheWaitsBehindItAlsoOnceItHasAnswered
     EXPECT_LT(wait(1), whole / 2) << "where every twentieth reply is lost, ten times fewer fail";
     now_ += 10s;
     EXPECT_EQ(wait(1), whole);
+}
+
+TEST_F(StationsTest, P4OfFewRepliesTheWaitBehindAnothersSilenceIsTheLonger) {
+    for (int replies = 1; replies <= 16; ++replies) {
+        answer(1);
+        stations_.on_failed(now_, test::group_of(2, kRead), Verdict::silent, 500ms);
+        const Duration wait = stations_.patience(now_, test::group_of(1, kRead));
+        const Duration usual = stations_.of(1).usual();
+        const Duration share = Duration(500ms) / (replies + 2);
+        EXPECT_EQ(wait, replies < 16 ? std::max(usual, share) : usual) << replies;
+    }
+}
+
+TEST_F(StationsTest, P4AShortSilenceDoesNotEndTheTimeInWhichOthersAreHurried) {
+    for (int i = 0; i < 20; ++i) answer(1);
+    stations_.on_failed(now_, test::group_of(2, kRead), Verdict::silent, 500ms);
+    stations_.on_failed(now_, test::group_of(3, kRead), Verdict::silent, 30ms);
+    now_ += 2s;
+    EXPECT_EQ(stations_.patience(now_, test::group_of(1, kRead)), stations_.of(1).usual());
 }
 
 TEST_F(StationsTest, P1AProofIsAwaitedNoLongerThanItsStationHasEverNeeded) {

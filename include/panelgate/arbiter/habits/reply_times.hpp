@@ -132,6 +132,11 @@ class RecentTimes {
     }
     /// True if a longer one than longest() is an exception, or a shorter one than shortest().
     bool is_significant() const { return seen_ >= kEnough; }
+    /// Of few, all n, the next one may be longer with a chance of 1 / (n + 2): that share of
+    /// `whole`.
+    Duration share_of_few(Duration whole) const {
+        return is_significant() ? Duration{} : whole / (static_cast<int>(seen_) + 2);
+    }
     /// True if it is shorter than all by a quarter, and by more than the host may be late.
     bool is_far_below(Duration time) const {
         if (!is_significant()) return false;
