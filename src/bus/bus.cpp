@@ -96,7 +96,7 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
                      .search = request.search,
                      .who = std::move(request.who),
                      .raw = request.raw};
-    drive.tell([&](TimePoint now) {
+    drive.queue([&](TimePoint now) {
         const Result<arbiter::Ticket> ticket = arbiter.submit(now, std::move(job));
         if (!ticket) return refuse(std::move(entry), ticket.error());
         pending.emplace(*ticket, std::move(entry));

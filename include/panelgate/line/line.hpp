@@ -96,6 +96,15 @@ class Drive {
         line_->poll_input();
         hear(std::move(verb));
     }
+    /// Handles a call that sends nothing while the machine is_waiting() for a reply: what has come
+    /// of that meanwhile is read when it is due, not for each such call.
+    template <class Verb>
+    void queue(Verb verb) {
+        const TimePoint now = clock_.now();
+        if (!machine_.is_waiting() || !armed_ || now >= *armed_) return tell(std::move(verb));
+        verb(now);
+        drain();
+    }
     /// Cancels the alarm, until the next call.
     void rest() {
         line_->defer_input(false);

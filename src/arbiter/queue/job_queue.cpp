@@ -181,11 +181,10 @@ std::optional<TimePoint> JobQueue::first_expiry() const {
 
 // Lanes and accounting.
 
-JobQueue::Entry JobQueue::entry_of(Job job) {
-    std::optional<ReadSpan> span;
+std::optional<ReadSpan> JobQueue::span_of(const Job& job) {
     const auto& items = job.request.span();
-    if (items && !job.alone && job.station != 0) span = {job.station, *items};
-    return {std::move(job), span};
+    if (!items || job.alone || job.station == 0) return std::nullopt;
+    return ReadSpan{job.station, *items};
 }
 
 /// A client keeps its host while a job of it waits.
@@ -208,12 +207,12 @@ std::pair<JobQueue::Source&, JobQueue::Lane&> JobQueue::open_lane(const Job& job
     return {source, open(source.lanes, job.station)};
 }
 
-void JobQueue::put_back(Job job) { insert(entry_of(std::move(job))); }
-
 /// Inserts by ticket: at the end if it is new, further ahead if it was taken before.
-void JobQueue::insert(Entry entry) {
-    const auto [source, lane] = open_lane(entry.job);
+void JobQueue::put_back(Job&& job) {
+    const auto [source, lane] = open_lane(job);
     PoolDeque<Entry>& jobs = lane.jobs;
+    const auto span = span_of(job);
+    Entry entry{std::move(job), span};
     expiries_.insert(entry.job.start_by);
     count(entry, 1);
     auto at = jobs.end();
@@ -272,17 +271,16 @@ void JobQueue::count(const Entry& entry, int by) {
 
 // Admission to the queue, and dropping jobs for it.
 
-JobQueue::PushResult JobQueue::push(Job job) {
+JobQueue::PushResult JobQueue::push(Job& job) {
     PushResult result;
     if (waiting() >= kMost) return result;
-    Entry entry = entry_of(std::move(job));
-    if (!entry.span || !reads_.carries(*entry.span)) {
-        const Source* const source = find(entry.job.client);
+    if (const auto span = span_of(job); !span || !reads_.carries(*span)) {
+        const Source* const source = find(job.client);
         if (source != nullptr && source->counting >= settings_.per_client) return result;
-        if (size_ >= settings_.limit && !make_room(entry.job, result.shed)) return {};
+        if (size_ >= settings_.limit && !make_room(job, result.shed)) return {};
     }
     result.taken = true;
-    insert(std::move(entry));
+    put_back(std::move(job));
     return result;
 }
 

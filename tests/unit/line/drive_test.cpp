@@ -28,10 +28,12 @@ struct Machine {
     }
     std::optional<TimePoint> next_deadline() const { return deadline; }
     std::optional<TimePoint> busy_until() const { return busy; }
+    bool is_waiting() const { return waiting; }
 
     std::vector<std::variant<Send, Other>> wishes;
     std::optional<TimePoint> deadline;
     std::optional<TimePoint> busy;
+    bool waiting = false;
 };
 
 /// A device with pending input; records every event as a letter.
@@ -86,6 +88,22 @@ TEST_F(DriveTest, ReadsPendingInputBeforeACall) {
     machine.wishes = {Send{'s'}};
     drive.tell([&](TimePoint) { event_trace += 'v'; });
     EXPECT_EQ(event_trace, "pxys.v.");
+}
+
+TEST_F(DriveTest, ReadsNoInputForWhatWaitsBehindARequestUntilSomethingIsDue) {
+    const auto queue = [&] {
+        event_trace.clear();
+        drive.queue([&](TimePoint) { event_trace += 'v'; });
+        return event_trace;
+    };
+    EXPECT_EQ(queue(), "pv.") << "it may be sent";
+    machine.waiting = true;
+    EXPECT_EQ(queue(), "pv.") << "no alarm would read it";
+    machine.deadline = clock.now() + 5ms;
+    hear_nothing();
+    EXPECT_EQ(queue(), "v.");
+    clock.pass(5ms);
+    EXPECT_EQ(queue(), "pv.") << "what has come may answer in time";
 }
 
 TEST_F(DriveTest, ReadsPendingInputBeforeTheClock) {

@@ -52,10 +52,12 @@ class JobQueue {
         bool taken = false;
         Jobs shed;
     };
-    PushResult push(Job job);
+    /// A job that is refused stays as it was; one that is taken is moved from.
+    PushResult push(Job& job);
+    PushResult push(Job&& job) { return push(job); }
     /// Returns a job that was taken before: ahead of its client's younger ones for that station;
     /// never refused, never drops others.
-    void put_back(Job job);
+    void put_back(Job&& job);
 
     class Choice;
     /// The next in turn of the runnable jobs, if there is one. Valid until the next change.
@@ -93,7 +95,7 @@ class JobQueue {
 
     struct Entry {
         Job job;
-        std::optional<ReadSpan> span;  ///< of a shareable read
+        std::optional<ReadSpan> span;
     };
     struct Lane {
         PoolDeque<Entry> jobs;  ///< in order of tickets
@@ -149,10 +151,9 @@ class JobQueue {
     bool is_polls_turn(const Choice& choice, std::size_t top) const;
     void count_turn(const Choice& choice);
 
-    static Entry entry_of(Job job);
+    static std::optional<ReadSpan> span_of(const Job& job);  ///< of a shareable read
     HostKey host_of(const Job& job) const;
     std::pair<Source&, Lane&> open_lane(const Job& job);
-    void insert(Entry entry);
     void count_first(const HostKey& host, const Job& job, int by);
     Job take(const Place& place, std::size_t index = 0);
     void count(const Entry& entry, int by);

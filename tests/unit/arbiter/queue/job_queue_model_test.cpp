@@ -175,7 +175,7 @@ class JobQueueModel : public testing::Test {
     }
     void push() {
         const Job job = any_job();
-        const auto pushed = queue_.push(job);
+        const auto pushed = queue_.push(Job(job));
         model_.check_admission(job, pushed);
         for (const Job& shed : pushed.shed) model_.remove(shed.ticket);
         if (pushed.taken) model_.add(job);
@@ -229,7 +229,7 @@ class JobQueueModel : public testing::Test {
     }
     void put_back() {
         if (taken_.empty()) return;
-        queue_.put_back(taken_.back());
+        queue_.put_back(Job(taken_.back()));
         model_.add(taken_.back());
         taken_.pop_back();
     }
