@@ -76,6 +76,8 @@ const Mutant kMutants[] = {
          each_station(s, [](auto& station) { station.retry_writes = true; });
      }},
     {"SendsTwice", "P5: sent within the gap", "Silence", Flaw::sends_twice},
+    {"TakesNoSlowReplyBehindASilence", "P5: a good reply in time was not taken", "Silence",
+     Flaw::takes_no_slow_reply},
     {"TrustsALineThatStalls", "P1", "Stalls", Flaw::none,
      [](arbiter::Settings& s) { s.may_stall = false; }},
 };

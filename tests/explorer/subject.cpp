@@ -11,7 +11,13 @@ using arbiter::Finish;
 using arbiter::Transmit;
 
 void Subject::on_rx(TimePoint now, ByteView bytes) {
-    arbiter_.on_rx(now, bytes);
+    constexpr Duration kSlow = 40ms;  // twice as long as those who answer at once are waited for
+    now_ = now;
+    heard_ = true;
+    Bytes heard(bytes.begin(), bytes.end());
+    const bool is_slow = missed_ && now >= sent_ + kSlow && bytes.size() > 1;
+    if (flaw_ == Flaw::takes_no_slow_reply && is_slow) heard.back() ^= 1;
+    arbiter_.on_rx(now, heard);
     arbiter_.check_invariants();
     constexpr Duration kSilence = 10ms;  // a reply that begins before it is heard
     const bool read = last_sent_.size() > 1 && last_sent_[1] == 3 && was_asked_for_;
@@ -22,6 +28,7 @@ void Subject::on_rx(TimePoint now, ByteView bytes) {
 }
 
 void Subject::on_deadline(TimePoint now) {
+    now_ = now;
     if (repeat_at_ && now >= *repeat_at_) {
         repeat_at_.reset();
         waiting_.emplace_back(Transmit{last_sent_});
@@ -54,6 +61,8 @@ std::optional<Action> Subject::poll_arbiter() {
         if (flaw_ == Flaw::answers_twice) waiting_.emplace_back(*finish);
     } else if (const auto* transmit = std::get_if<Transmit>(&*action)) {
         last_sent_ = transmit->adu;
+        sent_ = now_;
+        missed_ = missed_ || !std::exchange(heard_, false);
         if (flaw_ == Flaw::sends_twice) waiting_.emplace_back(*transmit);
     } else if (const auto* note = std::get_if<arbiter::Note>(&*action)) {
         if (direction_of(note->kind) == FrameDirection::sent)

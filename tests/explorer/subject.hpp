@@ -24,7 +24,8 @@ enum class Flaw : std::uint8_t {
     loses_an_answer,
     ignores_who_left,
     sends_twice,
-    spins,  ///< names a deadline that has passed
+    spins,                ///< names a deadline that has passed
+    takes_no_slow_reply,  ///< behind a silence, though it is in time
 };
 
 /// An arbiter that can tell its state: times counted from `now`, without tickets and counters.
@@ -45,6 +46,7 @@ class Subject {
         : settings_(&settings), arbiter_(settings), flaw_(flaw) {}
 
     Result<arbiter::Ticket> submit(TimePoint now, arbiter::Job job) {
+        now_ = now;
         const Result<arbiter::Ticket> ticket = arbiter_.submit(now, std::move(job));
         arbiter_.check_invariants();
         if (!ticket) return ticket;
@@ -59,6 +61,7 @@ class Subject {
     void on_rx(TimePoint now, ByteView bytes);
     void on_deadline(TimePoint now);
     void on_line_up(TimePoint now) {
+        now_ = now;
         arbiter_.on_line_up(now);
         arbiter_.check_invariants();
     }
@@ -80,6 +83,10 @@ class Subject {
     std::uint64_t renamed_ = 0;  ///< tickets of arbiters before this one
     Bytes last_sent_;
     bool was_asked_for_ = true;  ///< by a client
+    TimePoint now_{};
+    TimePoint sent_{};
+    bool heard_ = true;    ///< anything since then
+    bool missed_ = false;  ///< nothing was heard of a request before
     std::optional<TimePoint> repeat_at_;
     int finished_ = 0;
 };
