@@ -26,6 +26,9 @@ Checker::Checker(const Plan& plan)
     for (const arbiter::StationSettings& station : settings_.stations) {
         if (station.retry_writes) repeat_writes_.insert(station.id);
     }
+    for (const PanelPlan& panel : plan_.panels) {
+        if (panel.overtakes) orders_.try_emplace(panel.id);
+    }
 }
 
 void Checker::fail(std::string what) {
@@ -196,13 +199,14 @@ void Checker::check_values(TimePoint now, const Open& open, const arbiter::Finis
     const Truth::Read read{open.job.station, pdu[0], now, since, open.served, finish.age};
     for (std::uint16_t i = 0; i < count; ++i) {
         const std::uint16_t value = word(reply, 2 + std::size_t{2} * i);
+        const char* fault = truth_.fault_of(read, static_cast<std::uint16_t>(first + i), value);
+        if (fault == nullptr) continue;
         // What one copy has displaced comes one late, until the next silence.
         const auto excused = excused_from_.find(open.job.station);
         if (excused != excused_from_.end() && now < excused->second + 1s) return;
         if (attempt_.imitated && attempt_.station == open.job.station) return void(++excused_);
-        const char* fault = truth_.fault_of(read, static_cast<std::uint16_t>(first + i), value);
-        if (fault != nullptr && (is_luck(heard_for(open, reply)) || is_padded(open, reply))) return;
-        if (fault != nullptr) return fail(fault);
+        if (is_luck(heard_for(open, reply)) || is_padded(open, reply)) return;
+        return fail(fault);
     }
 }
 

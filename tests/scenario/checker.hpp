@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "costs.hpp"
+#include "order.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "plan.hpp"
@@ -55,7 +56,7 @@ class Checker : public Witness {
         attempt_.imitated =
             attempt_.imitated || (!attempt_.answered && attempt_.station == station);
     }
-    void on_overtaken(ByteView adu) override;
+    void on_reply(TimePoint now, ByteView adu, bool overtaken) override;
     void on_said(TimePoint now, ByteView bytes) override { truth_.on_said(now, bytes); }
     void on_garbled(TimePoint now) override { garbled_ = now; }
     void on_collision(TimePoint now, std::uint8_t station) override;
@@ -132,6 +133,7 @@ class Checker : public Witness {
     bool is_noisy(TimePoint now) const;
     Duration least_wait() const;
     const arbiter::StationSettings& settings_of(std::uint8_t station) const;
+    Duration latest_reply(std::uint8_t station) const;
     TimePoint owed_until() const;
     // Who waits, and whose turn it is (checker_queue.cpp)
     void mark_sent(std::uint8_t station, ByteView pdu, FrameKind what);
@@ -173,7 +175,8 @@ class Checker : public Witness {
     std::unordered_set<std::uint8_t> repeat_writes_;  ///< stations that allow it
     std::unordered_set<std::uint8_t> doublers_;       ///< that were heard to say a reply twice
     std::map<std::uint8_t, TimePoint> replied_;       ///< each station, the last time
-    std::unordered_set<std::uint8_t> overtakers_;     ///< that were heard to answer out of order
+    std::map<std::uint8_t, Order> orders_;            ///< of those who do not serve in turn
+    std::unordered_set<std::uint8_t> overtakers_;     ///< of them, who have shown so
     std::unordered_set<std::uint8_t> retried_;        ///< whose last request was a retry
     std::map<std::uint8_t, Bytes> asked_;             ///< what each station was asked last
     std::map<Bytes, TimePoint> spread_;  ///< when broadcasts had left, by what would answer them

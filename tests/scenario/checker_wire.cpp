@@ -75,15 +75,18 @@ void Checker::on_copy(TimePoint now, std::uint8_t station) {
     excused_from_[station] = now;
 }
 
-/// Where it has the form of the answer to the last request, it is that for anybody, until one has
-/// come that has not.
-void Checker::on_overtaken(ByteView adu) {
+/// One that another has overtaken is the answer to the request on the wire for anybody, where order
+/// explains all that has come, and leaves no other request that it could be to. So is the one that
+/// it has displaced, and that comes one late.
+void Checker::on_reply(TimePoint now, ByteView adu, bool overtaken) {
     const std::uint8_t station = adu[0];
-    if (!modbus::answers(asked_[station], adu.subspan(1, adu.size() - 3))) {
-        overtakers_.insert(station);
-    } else if (!overtakers_.contains(station) && attempt_.station == station) {
-        attempt_.imitated = attempt_.imitated || !attempt_.answered;
-    }
+    const auto order = orders_.find(station);
+    if (order == orders_.end()) return;
+    const bool is_last =
+        order->second.on_reply(now, adu.subspan(1, adu.size() - 3), latest_reply(station));
+    const bool awaited = attempt_.station == station && !attempt_.answered;
+    if (overtaken) overtakers_.insert(station);
+    if (overtakers_.contains(station) && is_last && awaited) attempt_.imitated = true;
 }
 
 /// Bytes without a pause for longer than any frame: nobody's answer, and no reason to wait
@@ -129,6 +132,8 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     attempt_.again = what == FrameKind::retry;
     const Bytes before = std::exchange(asked_[station], Bytes(pdu.begin(), pdu.end()));
     attempt_.same = std::ranges::equal(before, pdu);
+    const auto order = orders_.find(station);
+    if (order != orders_.end()) order->second.on_asked(attempt_.sent, pdu);
     attempt_.owed = now < watch_.rests_until(station);
     last_transmit_ = now;
     const bool write = !modbus::is_pure_read(pdu);
@@ -189,14 +194,19 @@ const arbiter::StationSettings& Checker::settings_of(std::uint8_t station) const
     return listed == settings_.stations.end() ? settings_.unlisted : *listed;
 }
 
-/// P1: until when a reply to the request that was sent last may come, at most.
-TimePoint Checker::owed_until() const {
-    const arbiter::StationSettings& s = settings_of(attempt_.station);
+/// P1: how long after a request its reply may come, at most.
+Duration Checker::latest_reply(std::uint8_t station) const {
+    const arbiter::StationSettings& s = settings_of(station);
     constexpr int kMostTimeouts = 8;  // that an automatic window grows to
-    const Duration window = s.late_window.value_or(kMostTimeouts * s.response_timeout);
-    // An attempt that hears something goes on until that has ended.
-    return std::max(attempt_.sent + s.response_timeout, heard_until_ + settings_.reply_hole) +
-           window;
+    return s.response_timeout + s.late_window.value_or(kMostTimeouts * s.response_timeout);
+}
+
+/// ... to the request that was sent last: an attempt that hears something goes on until that has
+/// ended.
+TimePoint Checker::owed_until() const {
+    const Duration timeout = settings_of(attempt_.station).response_timeout;
+    const TimePoint heard = heard_until_ + settings_.reply_hole - timeout;
+    return std::max(attempt_.sent, heard) + latest_reply(attempt_.station);
 }
 
 /// P5: what the line may be silent for while a request waits that nothing keeps from going.

@@ -27,8 +27,10 @@ struct OpenViolation {
 ///   about:
 ///     to this question alone (Checker::on_imitation()). What it leaves over to the next ones comes
 ///     much sooner than the panel has ever answered, which 24 replies have shown before.
-///   - A reply that a later one has overtaken, of the form of the awaited one: stations serve in
-///     order, until one has come that fits the last request in no way (Checker::on_overtaken()).
+///   - A reply that a later one has overtaken, where it can only be the awaited one for anybody who
+///     takes stations to serve in order, and nothing has come that this does not explain: the same
+///     bytes in the same order are those of a panel that serves in turn (Order,
+///     Checker::on_reply()). So is the one that it has displaced, and that comes one late.
 inline constexpr auto kOpenViolations = std::to_array<OpenViolation>({
     // A reader's station rests in some of the turns, and its own writers have those that are left.
     {"company", "P9: five writes in a row"},

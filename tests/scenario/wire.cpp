@@ -137,13 +137,13 @@ void Wire::deliver(const FramePtr& frame, std::size_t from, std::size_t to) {
     };
     const bool ends = to == frame->bytes.size() && !frame->garbled_from;
     const auto its = [&](bool is) { return ends && is ? frame->station : std::uint8_t{0}; };
-    arrive(
-        {{part.begin(), part.end()},
-         answered ? frame->station : std::uint8_t{0},
-         frame->connection,
-         its(frame->copy),
-         its(frame->imitation),
-         answered && frame->overtaken ? understood(plan_.settings.serial, said(*frame)) : Bytes{}});
+    arrive({{part.begin(), part.end()},
+            answered ? frame->station : std::uint8_t{0},
+            frame->connection,
+            its(frame->copy),
+            its(frame->imitation),
+            answered ? understood(plan_.settings.serial, said(*frame)) : Bytes{},
+            frame->overtaken});
 }
 
 /// Something else than what was said; never a good frame by chance: that is the CRC's affair.
@@ -173,7 +173,7 @@ void Wire::arrive(Held held) {
     }
     if (held.copy_of != 0) agenda_.tell("next ends the copy of what was said before");
     if (held.copy_of != 0) witness_.on_copy(agenda_.now(), held.copy_of);
-    if (!held.overtaken.empty()) witness_.on_overtaken(held.overtaken);
+    if (!held.reply.empty()) witness_.on_reply(agenda_.now(), held.reply, held.overtaken);
     if (held.imitation_of != 0) agenda_.tell("next ends what is no answer");
     if (held.imitation_of != 0) witness_.on_imitation(held.imitation_of);
     hear_(held.bytes, held.answer_of);

@@ -81,7 +81,8 @@ class Wire {
         std::uint64_t connection = 0;
         std::uint8_t copy_of = 0;       ///< the station whose answer it repeats
         std::uint8_t imitation_of = 0;  ///< ... or imitates
-        Bytes overtaken{};              ///< an answer that another one has overtaken
+        Bytes reply{};                  ///< the answer that ends here
+        bool overtaken = false;         ///< ... and was said after that to a later request
     };
 
     FramePtr put(Said said);
