@@ -126,10 +126,12 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
     const bool impossible =
         ReplyHabits::is_impossible(attempt, claims, is_early && attempt.replied_too_early());
     const bool overdue =
-        claims.passed && attempt.begun_after(now) > station.usual(stations_.slowest());
-    const bool too_soon = first && group.attempts <= 1 && station.is_far_too_quick(first_sign);
-    const bool contradicted = attempt.is_undecided(claims.repeats_other) &&
-                              (group.doubts == 0 || !habits.answers_twice());
+        claims.passed && (station.is_slow(attempt.begun_after(now)) || habits.is_disordered());
+    const bool too_soon =
+        first && group.attempts <= 1 && station.is_far_too_quick(first_sign, claims.passed);
+    const bool other = claims.passed && !first && !attempt.answers().first_came();
+    const bool contradicted = other || (attempt.is_undecided(claims.repeats_other) &&
+                                        (group.doubts == 0 || !habits.answers_twice()));
     const bool misnumbered = refusal && group.may_doubt_refusal() &&
                              habits.may_refuse_other(book, now, claims, group.request.function());
     const bool repeats = station.may_be_duplicate(now, attempt, claims, is_early);

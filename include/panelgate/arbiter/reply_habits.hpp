@@ -87,6 +87,8 @@ class ReplyHabits {
 
     /// How long an answer is held, because the station sends two that differ; 0: it does not.
     Duration holds_answers(TimePoint now) const { return duplicates_.hold(now); }
+    /// True if it was just seen not to serve in order.
+    bool is_disordered() const { return disordered_at_.has_value(); }
     /// What this frame may be: none that answers the attempt, if there is one.
     Claims claims(const OutstandingRequests& book, TimePoint now, ByteView pdu,
                   const Attempt* attempt = nullptr) const;

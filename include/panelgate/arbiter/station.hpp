@@ -120,8 +120,10 @@ class Station {
         const auto shortest = times_.shortest();
         return shortest && first_sign < *shortest;
     }
-    /// ... by a wide margin.
-    bool is_far_too_quick(Duration first_sign) const { return times_.is_far_below(first_sign); }
+    /// ... by a wide margin. `doubted`: it may be to another request, then fewer replies show it.
+    bool is_far_too_quick(Duration first_sign, bool doubted = false) const {
+        return times_.is_far_below(first_sign, doubted);
+    }
     /// ... compared with the whole `line` if few replies of the station are known. Where few of
     /// that are, too: before the request had left, and none of them had.
     bool is_far_too_quick(Duration first_sign, const RecentTimes& line) const {
@@ -129,6 +131,8 @@ class Station {
         if (line.is_significant()) return line.is_far_below(first_sign);
         return first_sign <= Duration::zero() && line.shortest() > Duration::zero();
     }
+    /// ... later than ever, of one that may be to another request.
+    bool is_slow(Duration begun) const { return times_.is_significant(true) && begun > usual(); }
 
     // How to ask it
 

@@ -131,15 +131,16 @@ class RecentTimes {
         return std::min(older_.shortest, newer_.shortest);
     }
     /// True if a longer one than longest() is an exception, or a shorter one than shortest().
-    bool is_significant() const { return seen_ >= kEnough; }
+    /// `doubted`: it is in doubt by itself, and half as many show it.
+    bool is_significant(bool doubted = false) const { return seen_ >= kEnough / (doubted ? 2 : 1); }
     /// Of few, all n, the next one may be longer with a chance of 1 / (n + 2): that share of
     /// `whole`.
     Duration share_of_few(Duration whole) const {
         return is_significant() ? Duration{} : whole / (static_cast<int>(seen_) + 2);
     }
     /// True if it is shorter than all by a quarter, and by more than the host may be late.
-    bool is_far_below(Duration time) const {
-        if (!is_significant()) return false;
+    bool is_far_below(Duration time, bool doubted = false) const {
+        if (!is_significant(doubted)) return false;
         return time < *shortest() * 3 / 4 && *shortest() - time > timing::kReadingSlack;
     }
 
