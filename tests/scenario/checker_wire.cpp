@@ -84,9 +84,9 @@ void Checker::on_reply(TimePoint now, ByteView adu, bool overtaken) {
     if (order == orders_.end()) return;
     const bool is_last =
         order->second.on_reply(now, adu.subspan(1, adu.size() - 3), latest_reply(station));
-    const bool awaited = attempt_.station == station && !attempt_.answered;
     if (overtaken) overtakers_.insert(station);
-    if (overtakers_.contains(station) && is_last && awaited) attempt_.imitated = true;
+    if (overtakers_.contains(station) && is_last && attempt_.station == station)
+        attempt_.imitated = true;
 }
 
 /// Bytes without a pause for longer than any frame: nobody's answer, and no reason to wait

@@ -157,6 +157,11 @@ void late_panels(Plan& plan) {
     for (ClientPlan& client : plan.clients) client.stations = {plan.panels.front().id};
 }
 
+void overtaking_panels(Plan& plan) {
+    late_panels(plan);
+    for (PanelPlan& panel : plan.panels) panel.overtakes = true;
+}
+
 const Mutant kMutants[] = {
     {"AnswersTwice", "P3: answered twice", Kind::faults, tampered<AnswersTwice>()},
     {"LosesAnAnswer", "P3: request", Kind::faults, tampered<LosesAnAnswer>()},
@@ -194,6 +199,11 @@ const Mutant kMutants[] = {
          each_station(s, [](auto& station) { station.late_window = 0ms; });
      }),
      late_panels},
+    {"HasNoQuarantineForWhoAnswersOutOfOrder", "P1: a value", Kind::faults,
+     misled([](arbiter::Settings& s) {
+         each_station(s, [](auto& station) { station.late_window = 0ms; });
+     }),
+     overtaking_panels},
     {"BelievesAnEcho", "P8: a write was confirmed", Kind::echo, misled([](arbiter::Settings& s) {
          s.echo = EchoMode::off;
          s.paced = false;
