@@ -9,14 +9,6 @@ namespace panelgate::arbiter {
 
 using fact::when;
 
-namespace {
-
-constexpr std::uint8_t code_of(modbus::ExceptionCode code) {
-    return static_cast<std::uint8_t>(code);
-}
-
-}  // namespace
-
 modbus::Request ReplyHabits::proof(const OutstandingRequests& book) const {
     modbus::Request read = reads_.probe();
     if (reconnect_.only_known_reads() || !book.is_ambiguous(id_, read)) return read;
@@ -72,14 +64,8 @@ void ReplyHabits::on_asked(OutstandingRequests& book, TimePoint now, const Group
                            bool in_transit) {
     if (now >= rested() && !in_transit) book.lapse(id_);
     if (disordered_at_ && now > *disordered_at_ + timing::kForgetHabit) disordered_at_.reset();
+    announced_.forget(now);
     if (group.span && !group.distinct_length) reads_.on_wanted(group.request);
-}
-
-bool ReplyHabits::announces(ByteView reply) const {
-    const auto code = modbus::exception_of(reply);
-    return code &&
-           (*code == code_of(modbus::ExceptionCode::acknowledge) ||
-            (*code == code_of(modbus::ExceptionCode::server_device_busy) && unkept_ < kUnkept));
 }
 
 void ReplyHabits::on_unanswered(OutstandingRequests& book, TimePoint now, const Bytes& pdu,
@@ -87,14 +73,14 @@ void ReplyHabits::on_unanswered(OutstandingRequests& book, TimePoint now, const 
     book.forget_damaged(id_);
     proved_ = false;
     reconnect_.on_outstanding();
-    if (announced) ++unkept_;
+    if (announced) announced_.on_announced();
     book.on_unanswered(id_, sent, pdu, announced);
     rest(book, now);
 }
 
 void ReplyHabits::on_doubted(OutstandingRequests& book, TimePoint now, const Group& group,
                              TimePoint sent) {
-    if (group.request.is_read())
+    if (group.is_values(group.doubted))
         remember(book, group.doubted_at, group.request.pdu(), group.doubted);
     on_unanswered(book, now, group.request.pdu(), sent);
 }
@@ -138,6 +124,30 @@ void ReplyHabits::on_answered(OutstandingRequests& book, TimePoint now, const At
         reads_.on_answered(group.request, *group.span);
 }
 
+/// A reply of `at` that was doubted has been checked.
+void ReplyHabits::judge_doubted(const OutstandingRequests& book, ByteView request,
+                                const Bytes& doubted, TimePoint at, bool was_true) {
+    if (was_true) return duplicates_.on_confirmed(request, doubted);
+    const TimePoint repeated = book.given(id_, at, doubted, at);
+    // A value that only came too soon was no repetition.
+    if (repeated != TimePoint{} || modbus::exception_of(doubted))
+        duplicates_.on_denied(at, repeated);
+}
+
+/// True if this may be the reply to a request that was refused: the last one, or the one before,
+/// where the last reply may have been its reply.
+bool ReplyHabits::follows_refusal(const OutstandingRequests& book, TimePoint now,
+                                  ByteView pdu) const {
+    const auto was_refused = [&](const Asked* one) {
+        return one != nullptr && now - one->replied <= latest_reply() &&
+               AnnouncedReplies::may_be_followed(one->reply) && modbus::answers(one->pdu, pdu);
+    };
+    const Asked* const last = book.last_reply(id_);
+    return !modbus::exception_of(pdu) &&
+           (was_refused(last) ||
+            (last != nullptr && was_refused(book.last_reply(id_, last->replied))));
+}
+
 /// Learns from this reply whether the station sends duplicates.
 void ReplyHabits::learn_of_duplicates(OutstandingRequests& book, TimePoint now,
                                       const Attempt& attempt) {
@@ -152,11 +162,7 @@ void ReplyHabits::learn_of_duplicates(OutstandingRequests& book, TimePoint now,
     if (reply == group.doubted || (was_candidate && !group.is_values(reply))) {
         duplicates_.on_confirmed(group.request.pdu(), reply);
     } else if (!group.doubted.empty()) {
-        const TimePoint at = group.doubted_at;
-        const TimePoint repeated = given(at, group.doubted, at);
-        // A value that only came too soon was no repetition.
-        if (repeated != TimePoint{} || !group.is_values(group.doubted))
-            duplicates_.on_denied(at, repeated);
+        judge_doubted(book, group.request.pdu(), group.doubted, group.doubted_at, false);
     }
     if (const auto first = attempt.answers().first_came(); first && !book.any(id_))
         duplicates_.on_repeated_reply(now, *first, given(*first, reply));
@@ -173,7 +179,7 @@ void ReplyHabits::settle(OutstandingRequests& book, TimePoint now, const Attempt
     if (attempt.reply() == group.doubted && book.count(id_) <= 1) {
         book.settle(id_);  // both have come
         rest_is_over(settled);
-    } else if (announces(attempt.reply())) {
+    } else if (announced_.announces(attempt.reply())) {
         // The reply comes later. Of another request's, too: which one it refers to is unknown.
         on_unanswered(book, now, group.request.pdu(), sent, true);
     } else if (book.first(id_, attempt.reply()) != nullptr) {
@@ -196,6 +202,12 @@ ReplyHabits::Heard ReplyHabits::on_unsolicited(OutstandingRequests& book, TimePo
         now < std::exchange(again_until_, TimePoint{}) || book.given(id_, now, pdu) != TimePoint{};
     if (modbus::exception_of(pdu)) book.on_refusal(id_, now, pdu);
     if (asked && std::ranges::equal(pdu, confirmation_)) repeated_at_ = now;
+    const bool is_surplus =
+        done == Done::unasked || done == Done::second || done == Done::duplicate;
+    if (is_surplus && follows_refusal(book, now, pdu)) {
+        announced_.on_followed(now);
+        return {};
+    }
     // Right behind the last reply and answering the same: one of the two is surplus.
     const Asked* const last = book.last_reply(id_);
     if ((done == Done::second || done == Done::disorder) && last != nullptr &&
@@ -225,7 +237,7 @@ ReplyHabits::Heard ReplyHabits::on_late(OutstandingRequests& book, TimePoint now
     // The oldest one whose reply could still come: an older one would overstate the lateness.
     const Asked answered = *book.first(id_, pdu, now - latest_reply());
     const TimePoint due = answered.sent + late_.timeout();
-    if (answered.announced) unkept_ = 0;
+    if (answered.announced) announced_.on_kept();
     const bool may_be_meant = asked && modbus::exception_of(pdu);  // for the request on the wire
     // After a shortened wait it shows how long the panel needs; a reply delayed beyond the whole
     // timeout does not.
@@ -235,7 +247,7 @@ ReplyHabits::Heard ReplyHabits::on_late(OutstandingRequests& book, TimePoint now
     // A repetition of the previous reply may be a duplicate, and the outstanding reply still comes.
     if (may_repeat) {
         duplicates_.on_ambiguous(now, book.given(id_, now, pdu));
-    } else if (announces(pdu)) {
+    } else if (announced_.announces(pdu)) {
         book.announce(id_, pdu);
     } else {
         close(book, pdu, may_be_meant);

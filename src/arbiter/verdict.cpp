@@ -169,7 +169,7 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     if (done == Done::suspect_echo) keep(Answers::Kept::echo);
     if (done == Done::hold)
         attempt.keep_candidate(holds_answer(now, station.replies()), Answers::Kept::held);
-    if (done != Done::accept && (facts & fact::before_end) != 0) attempt.answers().mark_early();
+    if (done != Done::accept && (facts & fact::before_end) != 0) attempt.mark_early();
     attempt.group().odd_pace =
         early && !settings_.paced && !pace_.unbound() && attempt.group().attempts <= 1;
     return done == Done::accept;
@@ -229,6 +229,7 @@ void Arbiter::settle(TimePoint now) {
 /// was written (a command that resets itself), or cannot be read, only a line on which writes do
 /// not come back leaves no doubt: an adapter need not echo reads.
 void Arbiter::confirm(TimePoint now, const Group& group, ByteView reply, bool echoed) {
+    if (modbus::returns_values(group.written)) return confirm_values(group, reply);
     const auto broadcast = stations_.book().behind_broadcast(group.doubted_at, group.confirms);
     const bool holds = holds_written(group.written, reply);
     ReplyHabits& habits = stations_.of(group.station).replies();
@@ -240,6 +241,17 @@ void Arbiter::confirm(TimePoint now, const Group& group, ByteView reply, bool ec
     if (broadcast && !holds && !modbus::exception_of(reply))
         habits.on_broadcast_answered(*broadcast, false);
     const Result<Bytes> outcome = is_answer ? Result<Bytes>(group.confirms) : Fault::timeout;
+    for (const Job& job : group.jobs) outbox_.finish(job, outcome);
+}
+
+/// P1: values came that may be an earlier reply's, of a request that is not repeated (17h), and a
+/// read has now shown what the station holds. Where it is refused nothing can tell.
+void Arbiter::confirm_values(const Group& group, ByteView reply) {
+    const bool refused = modbus::exception_of(reply).has_value();
+    const bool equal = std::ranges::equal(reply.subspan(1), ByteView(group.confirms).subspan(1));
+    if (!refused)
+        stations_.of(group.station).replies().on_values_checked(stations_.book(), group, equal);
+    const Result<Bytes> outcome = refused || equal ? Result<Bytes>(group.confirms) : Fault::timeout;
     for (const Job& job : group.jobs) outbox_.finish(job, outcome);
 }
 

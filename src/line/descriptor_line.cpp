@@ -150,7 +150,8 @@ void DescriptorLine::open_failed(const std::string& why) {
 void DescriptorLine::opened() {
     if (openings_++ > 0) ++counters_.reopens;
     last_error_.clear();
-    has_received_ = false;
+    has_received_ = has_sent_ = false;
+    opened_at_ = clock_.now();
     events_->on_up();
 }
 
@@ -218,7 +219,8 @@ void DescriptorLine::read_all() {
         if (n > 0) {
             budget_.spend(now, static_cast<std::size_t>(n));
             counters_.bytes_received += static_cast<std::uint64_t>(n);
-            if (!std::exchange(has_received_, true)) reopen_.succeeded();
+            const bool is_answer = has_sent_ || now >= opened_at_ + settings_.reopen_max;
+            if (is_answer && !std::exchange(has_received_, true)) reopen_.succeeded();
             events_->on_bytes(ByteView(buffer).first(static_cast<std::size_t>(n)));
             if (events_ == nullptr || !is_open()) return;
             if (static_cast<std::size_t>(n) < buffer.size()) return;
@@ -244,6 +246,7 @@ void DescriptorLine::write(ByteView bytes) {
     if (undelivered()) return reset(blocked_reason());
     counters_.bytes_sent += bytes.size();
     budget_.on_sent();
+    has_sent_ = true;
     unsent_.assign(bytes.begin(), bytes.end());
     flush();
 }

@@ -165,7 +165,11 @@ class DescriptorLine : public Line {
     Counters counters_;  ///< the driver's part is read on demand
     Bytes unsent_;       ///< not yet taken by the driver; at most one frame
     std::uint64_t openings_ = 0;
-    bool has_received_ = false;  ///< this opening has received a byte
+    /// This opening has received an answer: bytes behind what was sent, or, where nothing is, later
+    /// than any greeting of a server that closes at once.
+    bool has_received_ = false;
+    bool has_sent_ = false;  ///< in this opening
+    TimePoint opened_at_{};
     std::string last_error_;
     TimePoint next_try_{};  ///< open_soon() waits until then
 };

@@ -188,6 +188,10 @@ bool is_pure_read(ByteView pdu) {
     return pdu.size() >= 2 && pdu[1] == kMeiDeviceIdentification;
 }
 
+bool returns_values(ByteView pdu) {
+    return is_pure_read(pdu) || (!pdu.empty() && pdu[0] == kReadWriteMultipleRegisters);
+}
+
 bool is_never_answered(ByteView pdu) {
     return pdu.size() >= 3 && pdu[0] == kDiagnostics && field(pdu, 1) == kListenOnly;
 }

@@ -66,11 +66,13 @@ bool is_fifo_reply(ByteView reply) {
 }
 
 /// 2B: the MEI type is echoed; with 0E also the code, in a header of 7 bytes. The objects are not
-/// parsed: panels miscount them (FRM-10).
+/// parsed: panels miscount them (FRM-10). With code 04 there is one, the one that was asked for.
 bool answers_encapsulated(ByteView request, ByteView reply) {
     if (request.size() < 2 || reply.size() < 2 || reply[1] != request[1]) return false;
     if (request[1] != kMeiDeviceIdentification) return true;
-    return reply.size() >= 7 && request.size() >= 3 && reply[2] == request[2];
+    if (reply.size() < 7 || request.size() < 4 || reply[2] != request[2]) return false;
+    const bool is_individual = request[2] == 4 && reply.size() > 7;
+    return !is_individual || reply[7] == request[3];
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "panelgate/arbiter/book/judge.hpp"
 #include "panelgate/arbiter/book/outstanding_requests.hpp"
 #include "panelgate/arbiter/book/timing.hpp"
+#include "panelgate/arbiter/habits/announced_replies.hpp"
 #include "panelgate/arbiter/habits/duplicates.hpp"
 #include "panelgate/arbiter/habits/known_reads.hpp"
 #include "panelgate/arbiter/habits/reply_times.hpp"
@@ -142,6 +143,10 @@ class ReplyHabits {
     void on_doubted(OutstandingRequests& book, TimePoint now, const Group& group, TimePoint sent);
     /// True if all requests that it was asked again had two answers that differ.
     bool answers_twice() const { return duplicates_.answers_twice(); }
+    /// A read has shown whether values were true that a request gave which is not repeated.
+    void on_values_checked(const OutstandingRequests& book, const Group& check, bool were_true) {
+        judge_doubted(book, check.written, check.confirms, check.doubted_at, were_true);
+    }
     /// Two answers came that differ; the request is asked again. `again`: not the first time.
     void on_contradicted(TimePoint now, bool again) { duplicates_.on_contradicted(now, again); }
     /// ... but its reply came damaged. Some panels resend it: until that would be over only the
@@ -194,13 +199,14 @@ class ReplyHabits {
     Heard on_disorder(OutstandingRequests& book, TimePoint now, ByteView pdu);
     void on_unasked(OutstandingRequests& book, TimePoint now, Done done, ByteView pdu);
     void close(OutstandingRequests& book, ByteView reply, bool asked);
+    void judge_doubted(const OutstandingRequests& book, ByteView request, const Bytes& doubted,
+                       TimePoint at, bool was_true);
     void learn_of_duplicates(OutstandingRequests& book, TimePoint now, const Attempt& attempt);
     void remember(OutstandingRequests& book, TimePoint now, const Bytes& pdu, ByteView reply) {
         duplicates_.on_reply(now);
         book.on_reply(id_, now, pdu, reply);
     }
-    /// True if after this exception the reply itself may come.
-    bool announces(ByteView reply) const;
+    bool follows_refusal(const OutstandingRequests& book, TimePoint now, ByteView pdu) const;
     void settle(OutstandingRequests& book, TimePoint now, const Attempt& attempt);
 
     std::uint8_t id_;
@@ -223,10 +229,7 @@ class ReplyHabits {
     std::optional<TimePoint> disordered_at_;
     TimePoint drained_at_{};  ///< nothing is sent before, behind a disorder: answers are one behind
     bool proof_unanswered_ = false;  ///< since it was last heard
-    /// A busy panel usually does nothing: after so many exceptions 06 that no reply followed, none
-    /// is waited for.
-    static constexpr int kUnkept = 3;
-    int unkept_ = 0;
+    AnnouncedReplies announced_;
     bool proved_ = false;  ///< no outstanding request is in transit
 };
 

@@ -35,6 +35,8 @@ Access access_of(ByteView pdu);
 std::optional<Span> read_span(ByteView pdu);
 /// True if repeating it cannot change anything (RTY-02): the reads, and 2B/0E.
 bool is_pure_read(ByteView pdu);
+/// True if its normal reply holds values: the pure reads, and 17h, which writes first.
+bool returns_values(ByteView pdu);
 /// True for 08/0004 Force Listen Only Mode: a unicast request that gets no reply (DIA-01).
 bool is_never_answered(ByteView pdu);
 

@@ -319,7 +319,10 @@ TimePoint Attempt::deadline() const {
     const TimePoint over = give_up();
     if (!is_hearing()) return in_doubt() ? std::min(over, timing_.sent + timing_.usual) : over;
     // The bytes that the echo filter buffers begin like the reply, too.
-    const bool hole = echo_.pending() || (framer_.has_candidate() && framer_.knows_length());
+    // So does what has no known length, as long as it is no frame.
+    const bool hole = echo_.pending() ||
+                      (framer_.has_candidate() &&
+                       (framer_.knows_length() || !modbus::crc_ok(framer_.pending(), orders_)));
     Duration silence = hole ? timing_.hole : timing_.end_of_frame;
     if (framer_.is_inside()) silence = silent_interval(timing_.serial);
     const TimePoint silent = std::max(timing_.sent, last_byte_) + silence;

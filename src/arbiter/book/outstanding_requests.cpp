@@ -54,7 +54,7 @@ void add_closed(Claims& claims, const Asked& one, ByteView reply,
 /// A reply that was given before.
 void add_reply(Claims& claims, const Asked& one, TimePoint now, ByteView reply, bool is_same) {
     if (!std::ranges::equal(one.reply, reply)) return;
-    const bool values = modbus::is_pure_read(one.pdu) && reply[0] == one.pdu[0];
+    const bool values = modbus::returns_values(one.pdu) && reply[0] == one.pdu[0];
     const bool recent = is_recent_reply(one, now);
     if (!recent && !(values && now - one.replied <= timing::kLatestCopy)) return;
     claims.repeats_other = claims.repeats_other || !is_same;
@@ -150,10 +150,11 @@ TimePoint OutstandingRequests::given(std::uint8_t station, TimePoint now, ByteVi
     return given;
 }
 
-const Asked* OutstandingRequests::last_reply(std::uint8_t station) const {
+const Asked* OutstandingRequests::last_reply(std::uint8_t station, TimePoint before) const {
     const Asked* last = nullptr;
     for (const Asked& one : of(station).asked) {
-        if (one.state == State::answered && (last == nullptr || one.replied >= last->replied))
+        if (one.state == State::answered && one.replied < before &&
+            (last == nullptr || one.replied >= last->replied))
             last = &one;
     }
     return last;

@@ -12,10 +12,12 @@ namespace panelgate::arbiter {
 
 namespace {
 
-/// True if its normal reply can never equal it.
+/// True if its normal reply can never equal it. The reply to a read has its byte count where the
+/// request has the address.
 bool differs_from_reply(ByteView pdu) {
     const auto reply = modbus::reply_length_from_request(pdu);
-    return reply && *reply != pdu.size() + modbus::kAduOverhead;
+    if (!reply || *reply != pdu.size() + modbus::kAduOverhead) return reply.has_value();
+    return modbus::read_span(pdu) && pdu[1] != pdu.size() - 2;
 }
 
 constexpr std::size_t kSingleWrite = 5;  // bytes: function, address, value
@@ -37,11 +39,16 @@ bool teaches_echo_of_writes(const modbus::Request& request) {
 std::optional<modbus::Request> read_back(ByteView write) {
     if (write.size() < kSingleWrite) return std::nullopt;
     const std::uint32_t first = word_at(write, 1);
-    const std::uint32_t count = write[0] == modbus::kWriteMultipleRegisters ? word_at(write, 3) : 1;
-    if (write[0] == modbus::kWriteSingleCoil)
-        return modbus::Request::read({modbus::Table::coils, first, 1});
+    const bool is_several =
+        write[0] == modbus::kWriteMultipleRegisters || write[0] == modbus::kWriteMultipleCoils;
+    const std::uint32_t count = is_several ? word_at(write, 3) : 1;
+    if (write[0] == modbus::kWriteSingleCoil || write[0] == modbus::kWriteMultipleCoils)
+        return modbus::Request::read({modbus::Table::coils, first, count});
     if (write[0] == modbus::kWriteSingleRegister || write[0] == modbus::kWriteMultipleRegisters)
         return modbus::Request::read({modbus::Table::holding_registers, first, count});
+    const auto read = modbus::access_of(write).read;  // of a write that also reads
+    if (read && read->count > 0 && read->end() <= modbus::kTableItems)
+        return modbus::Request::read(*read);
     return std::nullopt;
 }
 
@@ -49,6 +56,11 @@ bool holds_written(ByteView write, ByteView reply) {
     const auto read = read_back(write);
     if (!read || !modbus::answers(read->pdu(), reply) || modbus::exception_of(reply)) return false;
     if (write[0] == modbus::kWriteSingleCoil) return (reply[2] & 1) == (write[3] != 0 ? 1 : 0);
+    if (write[0] == modbus::kWriteMultipleCoils) {
+        const std::size_t count = word_at(write, 3);  // panels need not clear the unused bits
+        // From its byte count on it is like the reply to the read.
+        return modbus::bits_of(reply, count) == modbus::bits_of(write.subspan(4), count);
+    }
     const std::size_t values = write[0] == modbus::kWriteSingleRegister ? 3 : kSingleWrite + 1;
     return std::ranges::equal(write.subspan(values), reply.subspan(2));
 }

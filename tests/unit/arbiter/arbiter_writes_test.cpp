@@ -326,5 +326,18 @@ TEST_F(ArbiterTest, P8WhereConfirmationsComeAgainOneThatRepeatsTheLastIsReadBack
     }
 }
 
+/// Reading back what a write has written.
+TEST(ReadBack, P8CoilsAreComparedWithoutTheBitsThatNobodyWrote) {
+    const Bytes twenty = "0F 00 64 00 14 03 CD 6B 05"_hex;
+    ASSERT_TRUE(read_back(twenty));
+    EXPECT_EQ(read_back(twenty)->pdu(), "01 00 64 00 14"_hex);
+    EXPECT_TRUE(teaches_echo(*read_back(twenty))) << "03 is no address here";
+    EXPECT_TRUE(holds_written(twenty, "01 03 CD 6B 05"_hex));
+    EXPECT_TRUE(holds_written(twenty, "01 03 CD 6B F5"_hex)) << "padding";
+    EXPECT_FALSE(holds_written(twenty, "01 03 CD 6B 0D"_hex));
+    EXPECT_FALSE(holds_written(twenty, "81 02"_hex));
+    EXPECT_FALSE(teaches_echo(test::request_of("01 03 64 00 14"_hex)));
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter::arbiter_writes_test

@@ -265,9 +265,23 @@ TEST(Reopening, StartsAnewWhenAByteHasCome) {
     Opened it(10s);
     for (int i = 0; i < 4; ++i) it.pause_after_reset();
     EXPECT_EQ(it.pause_after_reset(), 160ms);
+    it.line.write(Bytes{1, 2, 3});
     it.line.bring();
     EXPECT_EQ(it.pause_after_reset(), Duration::zero()) << "at once";
     EXPECT_EQ(it.pause_after_reset(), 20ms) << "short pauses again";
+}
+
+TEST(Reopening, P7AServerThatGreetsAndHangsUpIsNotAskedInATightLoop) {
+    Opened it;
+    for (const Duration expected : {10ms, 20ms, 40ms, 75ms}) {
+        it.line.bring();  // "port in use", before anything was asked
+        it.line.lose();
+        EXPECT_EQ(it.pause(), expected);
+    }
+    it.clock.advance(it.settings.reopen_max);
+    it.line.bring();  // a line that is only listened to
+    it.line.lose();
+    EXPECT_LT(it.pause(), Duration(75ms));
 }
 
 TEST(Reopening, P7AServerThatAcceptsAndHangsUpIsNotAskedInATightLoop) {

@@ -129,7 +129,8 @@ class Attempt {
     /// The whole reply PDU.
     const Bytes& reply() const { return answers_.reply(); }
     const Answers& answers() const { return answers_; }
-    Answers& answers() { return answers_; }
+    /// The candidate began before the request had left.
+    void mark_early() { answers_.mark_early(); }
     /// True if its first byte came before the computed end of the request. Noise in front of it
     /// makes that unknown.
     bool replied_early() const { return first_byte_ < timing_.sent && noise_in_front_ == 0; }

@@ -65,9 +65,9 @@ struct Group {
     bool may_doubt_refusal() const {
         return request.is_read() && doubted.empty() && !jobs.empty() && confirms.empty();
     }
-    /// True if the reply holds values: the request is a read, and it was not refused.
+    /// True if the reply holds values: the request asks for some, and it was not refused.
     bool is_values(ByteView reply) const {
-        return request.is_read() && reply[0] == request.function();
+        return modbus::returns_values(request.pdu()) && reply[0] == request.function();
     }
     /// True if an earlier attempt had these values, too, among others.
     bool was_said(ByteView reply) const {

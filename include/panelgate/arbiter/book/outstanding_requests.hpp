@@ -97,8 +97,8 @@ class OutstandingRequests {
     /// not.
     TimePoint given(std::uint8_t station, TimePoint now, ByteView reply,
                     TimePoint before = TimePoint::max()) const;
-    /// The last reply; null: none is known.
-    const Asked* last_reply(std::uint8_t station) const;
+    /// The last reply that came before `before`; null: none is known.
+    const Asked* last_reply(std::uint8_t station, TimePoint before = TimePoint::max()) const;
     /// Returns a recent reply that occurs again, as a good frame, inside damaged bytes; or nullptr.
     const Bytes* given_in(TimePoint now, std::uint8_t station, ByteView bytes,
                           modbus::CrcOrder order) const;

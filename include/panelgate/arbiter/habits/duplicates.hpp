@@ -9,6 +9,7 @@
 #include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/request.hpp"
 
 namespace panelgate::arbiter {
 
@@ -158,7 +159,7 @@ class DuplicateHabit {
     /// Values are trusted separately: two writes to one address have equal answers, and so do many
     /// exceptions.
     static std::size_t kind_of(ByteView request, ByteView reply) {
-        return request[0] <= 4 && reply[0] == request[0] ? 0 : 1;
+        return modbus::returns_values(request) && reply[0] == request[0] ? 0 : 1;
     }
 
     std::array<EqualAnswers, 2> confirmed_;  ///< by kind_of()

@@ -90,7 +90,8 @@ bool teaches_echo_of_writes(const modbus::Request& request);
 /// True if this reply to read_back() of the write holds what it wrote. False if that cannot be
 /// told.
 bool holds_written(ByteView write, ByteView reply);
-/// The read of what this write names, for holds_written(); empty: none tells.
+/// The read of what this write names, for holds_written(), or of what it reads (17h); empty: none
+/// tells.
 std::optional<modbus::Request> read_back(ByteView write);
 
 /// True if the bytes begin with another master's request: not our own frame, which an adapter

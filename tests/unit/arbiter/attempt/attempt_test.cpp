@@ -168,6 +168,16 @@ TEST_F(AttemptTest, P6NoReadJoinsARepeatedOne) {
     EXPECT_FALSE(retry.can_join(leaving, job));
 }
 
+TEST_F(AttemptTest, FRM11AReplyOfUnknownLengthEndsWithItsCrcOrAHole) {
+    const Bytes reply = encode_adu(kStation, "41 01 02 03 04 05"_hex);
+    attempt_ = Attempt(group_of(kStation, "41 01"_hex), timing_of(100ms), {});
+    hear(10ms, Bytes(reply.begin(), reply.begin() + 4));
+    EXPECT_EQ(attempt_.deadline() - attempt_.timing().sent, Duration(70ms)) << "a hole";
+    hear(40ms, Bytes(reply.begin() + 4, reply.end()));
+    EXPECT_EQ(attempt_.deadline() - attempt_.timing().sent, Duration(60ms)) << "the frame's end";
+    EXPECT_EQ(run_to_verdict(), Verdict::replied);
+}
+
 const Duration kCharacter = character_time(SerialFormat{});
 
 /// Which bytes must be read at once and which need not, while a reply of 11 bytes comes.
