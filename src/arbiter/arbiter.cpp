@@ -397,6 +397,7 @@ void Arbiter::start(TimePoint now, Group group) {
         if (group.attempts == 1)
             group.first_silence = !station.missed_last() && !station.health().offline() &&
                                   !stations_.flaky_beside_others(now, station);
+        timing.is_last = group.request.is_read() && !station.may_retry(group);
         timing.patience = stations_.patience(now, group) + latency_;
         timing.usual = std::min(station.usual(stations_.slowest()) + latency_, timing.patience);
         timing.allow_hole(station.reply_hole());

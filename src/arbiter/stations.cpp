@@ -143,7 +143,8 @@ Duration Stations::response_timeout(std::uint8_t id) const {
     return found == nullptr ? settings(id).response_timeout : found->response_timeout();
 }
 
-void Stations::on_failed(TimePoint now, const Group& group, Verdict verdict, Duration cost) {
+void Stations::on_failed(TimePoint now, const Group& group, Verdict verdict, Duration cost,
+                         bool disturbed) {
     Station& station = of(group.station);
     station.on_failed(now, verdict, cost, group.request.is_read() ? nullptr : &group.request);
     if (station.speculative()) {
@@ -154,9 +155,9 @@ void Stations::on_failed(TimePoint now, const Group& group, Verdict verdict, Dur
         alone_.spend(now, cost);
     } else if (station.missed_last()) {
         newly_silent_.spend(now, cost);
-    } else if (verdict == Verdict::silent) {
+    } else if (verdict == Verdict::silent && !disturbed) {
         // Several stations may have failed together: for five times what this one took, the others
-        // are not waited for longer than they have ever needed.
+        // are not waited for longer than they have ever needed. Who was disturbed had not.
         const Duration urgent = static_cast<int>(1 / ProbeBudget::kFailing) * cost;
         urgent_until_ = std::max(urgent_until_, now + std::min<Duration>(urgent, timing::kUrgent));
     }

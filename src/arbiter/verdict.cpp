@@ -333,7 +333,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     const bool cut_off = verdict == Verdict::damaged && attempt.was_cut_off();
     const bool affordable = stations_.affords_retry(now, station);
     const Condition before = station.condition();
-    stations_.on_failed(now, group, verdict, cost);
+    stations_.on_failed(now, group, verdict, cost, attempt.disturbed());
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
         quiet_.quarantine(now, group.station, *until);
         station.on_line_rests(now, *until - now);

@@ -383,23 +383,41 @@ Unused classify_frame(ByteView bytes, std::uint8_t own_station, bool good) {
     return part;
 }
 
+namespace {
+
+bool is_valid(ByteView bytes, std::size_t size, const CrcOrders& orders) {
+    return size >= kMinAdu && size <= bytes.size() && size <= kMaxLongRtuAdu &&
+           crc_ok(bytes.first(size), orders);
+}
+
+/// Bytes in front of the first valid frame that begins behind the first byte; without one all. A
+/// request in front keeps the reply that follows it.
+std::size_t size_of_damage(ByteView bytes, const CrcOrders& orders) {
+    std::size_t size = request_adu_length(bytes);
+    if (!is_valid(bytes, size, orders)) size = 1;
+    const ByteView behind = bytes.subspan(size);
+    const std::size_t reply = known_reply_length(behind);
+    if (size > 1 && is_valid(behind, reply, orders)) return size + reply;
+    for (; size + kMinAdu <= bytes.size(); ++size) {
+        const ByteView rest = bytes.subspan(size);
+        if (is_valid(rest, known_reply_length(rest), orders) ||
+            is_valid(rest, request_adu_length(rest), orders))
+            return size;
+    }
+    return bytes.size();
+}
+
+}  // namespace
+
 std::vector<Unused> classify_heard(ByteView bytes, std::uint8_t own_station,
                                    const CrcOrders& orders) {
     std::vector<Unused> parts;
     while (!bytes.empty()) {
-        const std::size_t length = known_reply_length(bytes);
-        const bool whole =
-            length >= kMinAdu && length <= bytes.size() && crc_ok(bytes.first(length), orders);
-        const bool rest_is_frame = !whole && bytes.size() >= kMinAdu &&
-                                   bytes.size() <= kMaxLongRtuAdu && crc_ok(bytes, orders);
-        const std::size_t size = whole ? length : bytes.size();
-        Unused part;
-        part.bytes.assign(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
-        if (whole || rest_is_frame) {
-            part.station = bytes[0];
-            part.kind = bytes[0] == own_station ? Unused::Kind::own : Unused::Kind::foreign;
-        }
-        parts.push_back(std::move(part));
+        std::size_t size = known_reply_length(bytes);
+        if (!is_valid(bytes, size, orders)) size = bytes.size();
+        const bool good = is_valid(bytes, size, orders);
+        if (!good) size = size_of_damage(bytes, orders);
+        parts.push_back(classify_frame(bytes.first(size), own_station, good));
         bytes = bytes.subspan(size);
     }
     return parts;

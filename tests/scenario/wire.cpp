@@ -104,7 +104,8 @@ void Wire::echo(const FramePtr& frame) {
     // As they are sent, or all of them from a buffer when the driver is switched off.
     if (random_.chance(0.3)) return deliver_in_chunks(part);
     const Duration later = random_.between(0us, 1ms);
-    agenda_.at(frame->end + later, [this, part] { deliver(part, 0, part->bytes.size()); });
+    buffered_ = part;
+    agenda_.at(frame->end + later, [this] { empty_buffer(); });
 }
 
 /// Bytes reach the gateway in the pieces of a receive FIFO, each when its last byte is there; what
@@ -126,7 +127,14 @@ void Wire::deliver_in_chunks(const FramePtr& frame) {
     }
 }
 
+/// A buffer gives back what it holds in order.
+void Wire::empty_buffer() {
+    if (const FramePtr part = std::exchange(buffered_, nullptr))
+        deliver(part, 0, part->bytes.size());
+}
+
 void Wire::deliver(const FramePtr& frame, std::size_t from, std::size_t to) {
+    empty_buffer();
     if (frame->garbled_from) garble(*frame, from, to);
     const std::size_t end = frame->answer_to;
     const bool answered = end > from && end <= to && !frame->garbled_from;

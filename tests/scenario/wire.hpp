@@ -90,6 +90,7 @@ class Wire {
     void echo(const FramePtr& frame);
     void deliver_in_chunks(const FramePtr& frame);
     void deliver(const FramePtr& frame, std::size_t from, std::size_t to);
+    void empty_buffer();
     void garble(Frame& frame, std::size_t from, std::size_t to);
     void arrive(Held held);
     void release();
@@ -103,6 +104,7 @@ class Wire {
     std::list<FramePtr> air_;
     TimePoint spoken_until_{};
     TimePoint stalled_until_{};
+    FramePtr buffered_;  ///< a part of our own frame that an adapter has not handed over yet
     std::vector<Held> held_in_;
     std::vector<Held> held_out_;
     std::uint64_t connection_ = 1;

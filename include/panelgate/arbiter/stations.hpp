@@ -110,8 +110,9 @@ class Stations {
     /// Time until which a failing station waits for its share because others use the line, even if
     /// none of their requests waits now (a client that asks one by one).
     TimePoint throttled_until(std::uint8_t id) const;
-    /// An attempt that occupied the line for `cost` failed.
-    void on_failed(TimePoint now, const Group& group, Verdict verdict, Duration cost);
+    /// An attempt that occupied the line for `cost` failed. `disturbed`: other bytes were heard.
+    void on_failed(TimePoint now, const Group& group, Verdict verdict, Duration cost,
+                   bool disturbed = false);
 
     /// Returns the listed station, offline or not answering writes, whose probe is most overdue;
     /// empty if none is due.

@@ -134,7 +134,11 @@ ByteView Attempt::drop_stale(TimePoint now, TimePoint before, ByteView bytes, st
     std::size_t stale = given_back > 0 && is_stale(before, given_back) ? given_back : 0;
     if (fresh > 0 && is_stale(now, fresh)) {
         disturbed_ = true;
-        stale = bytes.size();
+        // The reply may have begun behind what continues our own frame.
+        const auto own = std::ranges::mismatch(bytes, echo_.frame()).in1 - bytes.begin();
+        const std::size_t behind =
+            given_back > 0 ? bytes.size() - static_cast<std::size_t>(own) : 0;
+        stale = bytes.size() - (behind > 0 && !is_stale(now, behind) ? behind : 0);
     }
     stale_.insert(stale_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(stale));
     return bytes.subspan(stale);
@@ -409,6 +413,12 @@ bool Attempt::may_answer_first_heard() const {
            first_heard_[0] == group_.station &&
            heard_size_ >= size + reply().size() + modbus::kAduOverhead &&
            modbus::answers(modbus::pdu_of(ByteView(first_heard_).first(size)), reply());
+}
+
+bool Attempt::in_doubt() const {
+    if (echo_.mismatch() || answers_.has_candidate()) return true;
+    const bool damaged = framer_.was_damaged() && !is_only_own_beginning();
+    return timing_.is_last ? damaged && damaged_bytes_.size() >= kHeader : damaged || disturbed_;
 }
 
 /// An adapter that switches late lets a part of our request through: no damage where no reply can

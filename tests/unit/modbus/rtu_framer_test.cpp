@@ -317,6 +317,33 @@ TEST_F(RtuFramer, WhatBeginsBehindTheReplyLikeAnotherOneIsKeptForItsRest) {
     EXPECT_FALSE(framer.has_pending()) << "noise";
 }
 
+/// P4: a reply that has begun is not damaged by who speaks in its pause, and a request heard there
+/// keeps its reply.
+TEST(Framer, AFrameBehindTheBeginningOfAnotherIsFound) {
+    Bytes heard{5, 3};
+    const Bytes other = encode_adu(9, kReplyPdu);
+    heard.insert(heard.end(), other.begin(), other.end());
+    heard.push_back(0);
+    const auto parts = classify_heard(heard, 5);
+    ASSERT_EQ(parts.size(), 3u);
+    EXPECT_EQ(parts[0].kind, Unused::Kind::damaged);
+    EXPECT_EQ(parts[1].kind, Unused::Kind::foreign);
+    EXPECT_EQ(parts[2].kind, Unused::Kind::damaged);
+
+    ReplyFramer framer(5, kRequest);
+    EXPECT_EQ(framer.feed(heard), std::nullopt);
+    EXPECT_EQ(framer.on_silence(), std::nullopt);
+    EXPECT_FALSE(framer.was_damaged_whole());
+
+    const Bytes asked = encode_adu(9, kRequest);
+    Bytes both{5, 3};
+    both.insert(both.end(), asked.begin(), asked.end());
+    both.insert(both.end(), other.begin(), other.end());
+    const auto kept = classify_heard(both, 5);
+    ASSERT_EQ(kept.size(), 2u);
+    EXPECT_EQ(kept[1].bytes.size(), asked.size() + other.size());
+}
+
 TEST_F(FramerOfBothOrders, TheWrongOrderIsDamage) {
     const auto parts = classify_heard(encode_adu(5, kReplyPdu), 6, orders);
     ASSERT_EQ(parts.size(), 1u);

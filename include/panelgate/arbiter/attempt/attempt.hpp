@@ -69,6 +69,7 @@ class Attempt {
         bool as_asked = false;     ///< the station usually answers as asked
         bool echoes = false;       ///< the line usually echoes what is sent
         bool confirm_end = false;  ///< the driver will report when the last bit has left
+        bool is_last = false;      ///< if nothing comes nobody asks again
 
         /// The station is known to pause for so long inside its replies.
         void allow_hole(Duration longer) {
@@ -296,11 +297,9 @@ class Attempt {
     bool is_hold_over() const;
     Verdict believe();
     bool is_stale(TimePoint now, std::size_t size) const;
-    /// True if other bytes were heard: the reply may be lost, so wait only the usual time.
-    bool in_doubt() const {
-        return (framer_.was_damaged() && !is_only_own_beginning()) || echo_.mismatch() ||
-               disturbed_;
-    }
+    /// True if other bytes were heard: the reply may be lost, so wait only the usual time. If
+    /// nobody asks again, only if they may have been the reply.
+    bool in_doubt() const;
     /// True if the damaged bytes are the beginning of our own frame, and of no reply.
     bool is_only_own_beginning() const;
     bool is_hearing() const { return framer_.has_pending() || echo_.pending(); }
