@@ -149,6 +149,8 @@ class Checker : public Witness {
     bool is_luck(ByteView heard);
     void check_write(TimePoint now, const Open& open, const Bytes& reply);
     void check_fault(TimePoint now, const Open& open, Fault fault);
+    bool may_be_echo(std::uint8_t station) const;
+    bool is_overdue(TimePoint now, std::uint8_t station) const;
     void check_in_time(TimePoint now, const Open& open, const arbiter::Finish& finish);
     Duration gap() const;
 

@@ -134,7 +134,10 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     attempt_.same = std::ranges::equal(before, pdu);
     const auto order = orders_.find(station);
     if (order != orders_.end()) order->second.on_asked(attempt_.sent, pdu);
-    attempt_.owed = now < watch_.rests_until(station);
+    // Where an answer was not believed its own may still come, and the retry's fits both (P1).
+    attempt_.owed = now < watch_.rests_until(station) ||
+                    (what == FrameKind::retry && !watch_.is_failing(station));
+    attempt_.needed = watch_.slowest(station).value_or(Duration{});
     last_transmit_ = now;
     const bool write = !modbus::is_pure_read(pdu);
     if (what != FrameKind::retry || !write) check_turn(now, write);
@@ -211,9 +214,10 @@ TimePoint Checker::owed_until() const {
 
 /// P5: what the line may be silent for while a request waits that nothing keeps from going.
 void Checker::check_idling(TimePoint now) {
-    // Gaps that were lengthened for what follows replies: at slow rates that takes its own time.
+    // Gaps that were lengthened for what follows replies: a copy ends 60 ms and a usual frame
+    // behind its reply at most, and is waited for a quarter longer than it has taken.
     constexpr std::size_t kReply = 45;
-    const Duration slack = 100ms + frame_time(settings_.serial, kReply);
+    const Duration slack = 25ms + (60ms + frame_time(settings_.serial, kReply)) * 5 / 4;
     // An answer that repeats another one may be held back for as long as its station needs: it
     // could be a copy of that, with its own still to come (P1). Values are not handed on then, but
     // asked for once more. So may a station's very first that
