@@ -332,6 +332,15 @@ bool ReplyFramer::is_own_reply(ByteView damaged) const {
            damaged[1] == request_[0] && damaged[2] == count && request_[1] != count;
 }
 
+/// Bytes of the beginning of our own frame, which no reply to the read has.
+std::size_t ReplyFramer::own_beginning(ByteView damaged) const {
+    if (!is_read(request_[0]) || !expected_ || request_[1] == *expected_ - kReadReplyOverhead)
+        return 0;
+    const Bytes own = encode_adu(station_, request_, orders_.of(station_));
+    const auto same = std::ranges::mismatch(damaged, own).in1 - damaged.begin();
+    return std::cmp_less(same, kHeader) ? 0 : static_cast<std::size_t>(same);
+}
+
 bool ReplyFramer::ends_beheaded(ByteView damaged) const {
     if (ends_ == Ends::told || !expected_) return false;
     const bool writes = is_broadcastable(request_[0]);
@@ -360,9 +369,10 @@ void ReplyFramer::classify(ByteView bytes) {
 }
 
 void ReplyFramer::step_over(Unused part) {
-    if (part.kind == Unused::Kind::damaged && holds_start(part.bytes)) {
+    const ByteView not_own = ByteView(part.bytes).subspan(own_beginning(part.bytes));
+    if (part.kind == Unused::Kind::damaged && holds_start(not_own)) {
         damaged_ = true;
-        damaged_whole_ = damaged_whole_ || part.bytes.size() >= expected_.value_or(0);
+        damaged_whole_ = damaged_whole_ || not_own.size() >= expected_.value_or(0);
         own_header_ = own_header_ || is_own_reply(part.bytes);
     }
     constexpr std::size_t kKept = 64;  // parts; further bytes go to the last one

@@ -170,8 +170,10 @@ void Checker::check_fault(TimePoint now, const Open& open, Fault fault) {
         return fail("P5: nothing was sent while a request waited until its end");
     if (polite)
         return fail("P9: a polite client's request was answered: " + std::string(label(fault)));
-    // What refuses it may refuse what is still owed: nobody's answer (P1).
-    const bool refused = truth_.refused(station, open.job.request.pdu(), open.submitted) &&
+    // What refuses it, or the read that it rides in, may refuse what is still owed: nobody's answer
+    // (P1).
+    const bool refused = (truth_.refused(station, open.job.request.pdu(), open.submitted) ||
+                          truth_.refused(station, asked_[station], open.submitted)) &&
                          watch_.rests_until(station) > open.submitted;
     const bool failed =
         was_heard(fault) || fault == Fault::offline || (fault == Fault::timeout && !at_deadline);

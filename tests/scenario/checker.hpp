@@ -177,6 +177,7 @@ class Checker : public Witness {
     std::unordered_set<std::uint8_t> repeat_writes_;  ///< stations that allow it
     std::unordered_set<std::uint8_t> doublers_;       ///< that were heard to say a reply twice
     std::map<std::uint8_t, TimePoint> replied_;       ///< each station, the last time
+    std::map<std::uint8_t, Duration> begun_after_;    ///< a request: the latest begin of a reply
     std::map<std::uint8_t, Order> orders_;            ///< of those who do not serve in turn
     std::unordered_set<std::uint8_t> overtakers_;     ///< of them, who have shown so
     std::unordered_set<std::uint8_t> retried_;        ///< whose last request was a retry

@@ -52,6 +52,9 @@ void Checker::on_answered(TimePoint now, std::uint8_t station) {
     attempt_.answered = true;
     silent_before_[station] = false;
     replied_[station] = now;
+    const auto size = modbus::reply_length_from_request(asked_[station]).value_or(0);
+    Duration& latest = begun_after_[station];
+    latest = std::max(latest, now - attempt_.sent - frame_time(settings_.serial, size));
     attempt_.first = !watch_.has_answered(attempt_.station);
     const bool is_first = watch_.on_answered(now, attempt_.station, now - attempt_.sent);
     // What the way held back may have reached the station only now.
@@ -137,7 +140,7 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     // Where an answer was not believed its own may still come, and the retry's fits both (P1).
     attempt_.owed = now < watch_.rests_until(station) ||
                     (what == FrameKind::retry && !watch_.is_failing(station));
-    attempt_.needed = watch_.slowest(station).value_or(Duration{});
+    attempt_.needed = begun_after_[station];
     last_transmit_ = now;
     const bool write = !modbus::is_pure_read(pdu);
     if (what != FrameKind::retry || !write) check_turn(now, write);

@@ -24,7 +24,7 @@ struct Attempt {
     bool again = false;     ///< it was on the wire before
     bool same = false;      ///< its station was asked the very same before
     bool owed = false;      ///< an earlier one may still be answered
-    Duration needed{};      ///< by its station so far, at most
+    Duration needed{};      ///< by its station so far to begin its reply, at most
     bool imitated = false;  ///< what had the form of its answer, and was none, came before that
     std::optional<arbiter::ReadSpan> span;
 };

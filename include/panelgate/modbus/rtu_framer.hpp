@@ -118,6 +118,7 @@ class ReplyFramer {
     bool is_start(std::uint8_t address, std::uint8_t function) const;
     bool holds_start(ByteView bytes) const;
     bool is_own_reply(ByteView damaged) const;
+    std::size_t own_beginning(ByteView damaged) const;
     void collect_starts();
     void find_start_at_head();
     std::optional<Bytes> accept(std::size_t start, Bytes pdu);
