@@ -31,16 +31,25 @@ struct OpenViolation {
 ///     takes stations to serve in order, and nothing has come that this does not explain: the same
 ///     bytes in the same order are those of a panel that serves in turn (Order,
 ///     Checker::on_reply()). So is the one that it has displaced, and that comes one late.
+///   - A reply that begins later than any of its panel, where another or it has just been silent,
+///   or
+///     an earlier one of its form is owed: to wait for it is to wait for all who may have died with
+///     that one, to believe it is to believe the one that is owed (Checker::is_overdue()).
+///   - An answer that equals its request and comes when nobody waits for it any more, or between
+///     bytes that nobody says: it may be our own frame (Checker::may_be_echo()).
 inline constexpr auto kOpenViolations = std::to_array<OpenViolation>({
-    // A reader's station rests in some of the turns, and its own writers have those that are left.
-    {"company", "P9: five writes in a row"},
-    {"receiver", "P9: five writes in a row"},
-    // A panel that is sound by itself fails where others' frames are taken for its damaged reply
-    // and nothing is asked again, or where it becomes slower than ever while another falls silent.
-    {"voices", "P4: a sound"},
+    // One in some hundred seeds: others' bytes in front of the reply, or a copy that nobody knew of
+    // while it is not waited for long.
+    {"voices", "P4: a sound panel's request failed: timeout"},
+    {"voices", "P4: a sound panel's request failed: damaged"},
     {"receiver", "P4: a sound"},
     {"company", "P4: a sound"},
-    {"*", "P4: a good station was refused"},
+    // Its late reply lies in what was heard of others, or was cut by them.
+    {"company", "P4: a good station was refused"},
+    {"voices", "P4: a good station was refused"},
+    {"receiver", "P4: a good station was refused"},
+    {"stall", "P4: a good station was refused"},
+    {"wild", "P4: a good station was refused"},
     // Budgets and rests under several faults at once.
     {"wild", "P4: a sound"},
     // What is held back because it repeats another answer, and the silence behind copies.
