@@ -14,8 +14,7 @@ COPY deploy/manual deploy/manual
 COPY docs docs
 COPY include include
 COPY src src
-RUN cmake --preset release -DPANELGATE_TESTS=OFF -DPANELGATE_UNITY=ON \
-        -DPANELGATE_PROFILE=src/hot_path.profdata && cmake --build --preset release --target panelgate
+RUN cmake --preset release -DPANELGATE_TESTS=OFF -DPANELGATE_UNITY=ON && cmake --build --preset release --target panelgate
 RUN DESTDIR=/image cmake --install build/release --prefix /usr --strip && \
     install -D -m 0644 LICENSE /image/usr/share/doc/panelgate/copyright && \
     mkdir -p /image/usr/share/panelgate && \

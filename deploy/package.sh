@@ -92,7 +92,6 @@ configure() {
         -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS_RELEASE=-O2 -DCMAKE_INSTALL_PREFIX=/usr -DCMAKE_SKIP_RPATH=ON \
         -DPANELGATE_TRIPLE="$triple" -DPANELGATE_SYSROOT="$sysroot" -DPANELGATE_EMULATOR="$emulator" \
         -DPANELGATE_MACHINE_FLAGS="$flags" -DPANELGATE_TESTS="$1" -DPANELGATE_PACKAGE=ON -DPANELGATE_UNITY=ON -DPANELGATE_WERROR=OFF \
-        -DPANELGATE_PROFILE=src/hot_path.profdata \
         -DPANELGATE_ARCHITECTURE="$architecture" -DPANELGATE_DOCUMENTS="$build/documents" \
         -DPANELGATE_DEPENDS="${2-}" >"$build.log" 2>&1 || { tail -n 20 "$build.log" >&2; exit 1; }
 }

@@ -52,8 +52,8 @@ Attempt::Wire wire_of(const Settings& settings) {
 /// Why this group is sent now.
 Reason reason_of(TimePoint now, const Group& group, const JobQueue& queue) {
     if (group.probe) return {.kind = Reason::Kind::probe};
-    if (group.learns_for != 0 || !group.confirms.empty())
-        return {.kind = Reason::Kind::learns_echo};
+    if (!group.confirms.empty()) return {.kind = Reason::Kind::confirms};
+    if (group.learns_for != 0) return {.kind = Reason::Kind::learns_echo};
     const Job& leader = group.jobs.front();
     return {.kind = group.attempts > 1 ? Reason::Kind::again : Reason::Kind::turn,
             .priority = leader.priority,

@@ -69,6 +69,8 @@ std::string text_of(const Reason& reason, const ClientName& client) {
             return "";
         case Reason::Kind::learns_echo:
             return "a write is next and it is unknown whether this line has an echo";
+        case Reason::Kind::confirms:
+            return "the answer to a write may be none, and this shows what the station holds";
         case Reason::Kind::probe:
             return "the station is offline and its probe is due";
         case Reason::Kind::again:

@@ -4,8 +4,7 @@ with PANELGATE_PROFILE=generate; OUTPUT is what the next build is given:
 
     cmake --preset release -B build/profile -DPANELGATE_UNITY=ON -DPANELGATE_PROFILE=generate
     cmake --build build/profile --target panelgate zoo_bus
-    ZOO_BUS=build/profile/zoo_bus tests/bench/hot_path.py build/profile/panelgate build/hot.profdata
-    cmake --preset release -DPANELGATE_UNITY=ON -DPANELGATE_PROFILE=build/hot.profdata
+    ZOO_BUS=build/profile/zoo_bus tests/bench/hot_path.py build/profile/panelgate src/hot_path.profdata
 
 The way of a transaction at three rates, unpaced and over TCP, mostly reads. Needs Debian's llvm-19."""
 import asyncio

@@ -21,6 +21,7 @@ struct Reason {
     enum class Kind : std::uint8_t {
         none,         ///< explain is off, or the frame is not ours
         learns_echo,  ///< a read that detects the line's echo before a write
+        confirms,     ///< a read that shows whether the answer to a write is its own
         probe,
         again,  ///< a retry
         turn,   ///< next in turn
