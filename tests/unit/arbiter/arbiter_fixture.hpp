@@ -91,4 +91,42 @@ class ArbiterTest : public testing::Test {
     Duration gap = silent_interval(settings.serial);
 };
 
+/// Two panels that need 12 ms, heard often enough.
+class ArbiterAnswersTest : public ArbiterTest {
+  protected:
+    void know(std::uint8_t station = 17) {
+        for (unsigned i = 1; i <= RecentTimes::kEnough; ++i) read(station, i);
+    }
+    void read(std::uint8_t station, unsigned number) {
+        script.run_for(10ms);
+        script.submit(station, read_at(number), 1);
+        answer(script, station, reply_number(number), 12ms);
+    }
+    Ticket ask(unsigned number) {
+        script.run_for(10ms);
+        return script.submit(17, read_at(number), 1);
+    }
+    /// Behind the first answer a second one comes, 4 ms later.
+    void answer_twice(unsigned first, unsigned second) {
+        answer(script, 17, reply_number(first), 12ms);
+        script.run_for(4ms);
+        script.hear_reply(17, reply_number(second));
+    }
+    /// Answers that nobody asked for have come behind those that were.
+    void knows_surplus() {
+        for (const unsigned i : {1u, 20u}) {
+            read(17, i);
+            script.run_for(4ms);
+            script.hear_reply(17, reply_number(500 + i));
+            for (unsigned k = 1; k < 10; ++k) read(17, i + k);
+        }
+    }
+    Bytes value(Ticket ticket) {
+        const bool good = script.answered(ticket) && script.answer(ticket).pdu.has_value();
+        return good ? script.answer(ticket).pdu.value() : Bytes{};
+    }
+
+    BusScript script{settings};
+};
+
 }  // namespace panelgate::arbiter
