@@ -326,7 +326,7 @@ bool ReplyFramer::holds_start(ByteView bytes) const {
 
 /// True for our damaged reply, and not for our own frame, which may begin like it.
 bool ReplyFramer::is_own_reply(ByteView damaged) const {
-    if (!is_read(request_[0]) || !expected_) return false;
+    if (!is_read(request_[0]) || request_.size() < 2 || !expected_) return false;
     const auto count = static_cast<std::uint8_t>(*expected_ - kReadReplyOverhead);
     return damaged.size() >= std::min(*expected_, kReadRequestAdu + 1) && damaged[0] == station_ &&
            damaged[1] == request_[0] && damaged[2] == count && request_[1] != count;
@@ -334,7 +334,8 @@ bool ReplyFramer::is_own_reply(ByteView damaged) const {
 
 /// Bytes of the beginning of our own frame, which no reply to the read has.
 std::size_t ReplyFramer::own_beginning(ByteView damaged) const {
-    if (!is_read(request_[0]) || !expected_ || request_[1] == *expected_ - kReadReplyOverhead)
+    if (!is_read(request_[0]) || request_.size() < 2 || !expected_ ||
+        request_[1] == *expected_ - kReadReplyOverhead)
         return 0;
     const Bytes own = encode_adu(station_, request_, orders_.of(station_));
     const auto same = std::ranges::mismatch(damaged, own).in1 - damaged.begin();
@@ -369,11 +370,12 @@ void ReplyFramer::classify(ByteView bytes) {
 }
 
 void ReplyFramer::step_over(Unused part) {
-    const ByteView not_own = ByteView(part.bytes).subspan(own_beginning(part.bytes));
-    if (part.kind == Unused::Kind::damaged && holds_start(not_own)) {
-        damaged_ = true;
-        damaged_whole_ = damaged_whole_ || not_own.size() >= expected_.value_or(0);
-        own_header_ = own_header_ || is_own_reply(part.bytes);
+    if (part.kind == Unused::Kind::damaged) {
+        const ByteView not_own = ByteView(part.bytes).subspan(own_beginning(part.bytes));
+        const bool started = holds_start(not_own);
+        damaged_ = damaged_ || started;
+        damaged_whole_ = damaged_whole_ || (started && not_own.size() >= expected_.value_or(0));
+        own_header_ = own_header_ || (started && is_own_reply(part.bytes));
     }
     constexpr std::size_t kKept = 64;  // parts; further bytes go to the last one
     if (unused_.size() < kKept) {

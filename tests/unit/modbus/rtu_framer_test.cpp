@@ -351,5 +351,14 @@ TEST_F(FramerOfBothOrders, TheWrongOrderIsDamage) {
     EXPECT_EQ(classify_heard(old_reply, 6, orders)[0].kind, Unused::Kind::foreign);
 }
 
+/// Function 07 is a request of one byte: it has no address with which a reply could be compared.
+TEST(DamagedReply, OfARequestWithoutAnAddressIsNotOurOwnFrame) {
+    ReplyFramer framer(0x11, "07"_hex);
+    EXPECT_EQ(framer.feed("11 07 00 12 34"_hex), std::nullopt);
+    framer.drop_pending();
+    EXPECT_TRUE(framer.was_damaged());
+    EXPECT_FALSE(ReplyFramer(0x11, "07"_hex).was_damaged());
+}
+
 }  // namespace
 }  // namespace panelgate::modbus::rtu_framer_test
