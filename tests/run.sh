@@ -59,7 +59,8 @@ build() {
 # compute. Joined below; a run that ends before takes it along.
 build_asan_meanwhile() {
     set -m  # a process group of its own
-    { chrt --idle -p 0 $BASHPID && build asan "$@"; } >"$logs/asan-meanwhile.log" 2>&1 &
+    { chrt --idle -p 0 $BASHPID || renice -n 19 $BASHPID || true; build asan "$@"; } \
+        >"$logs/asan-meanwhile.log" 2>&1 &
     set +m
     asan=$!
     trap 'kill -- -$asan' EXIT
