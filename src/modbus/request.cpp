@@ -254,6 +254,13 @@ std::optional<std::size_t> reply_length_from_request(ByteView pdu) {
     }
 }
 
+std::optional<std::uint8_t> distinct_byte_count(ByteView request) {
+    const auto length = reply_length_from_request(request);
+    if (!length || request.size() < 2 || !is_read(request[0])) return std::nullopt;
+    const auto count = static_cast<std::uint8_t>(*length - kReadReplyOverhead);
+    return request[1] == count ? std::nullopt : std::optional(count);
+}
+
 Bytes encode_read(Table table, std::uint16_t address, std::uint16_t count) {
     Writer out;
     out.u8(read_function(table)).u16(address).u16(count);

@@ -326,17 +326,14 @@ bool ReplyFramer::holds_start(ByteView bytes) const {
 
 /// True for our damaged reply, and not for our own frame, which may begin like it.
 bool ReplyFramer::is_own_reply(ByteView damaged) const {
-    if (!is_read(request_[0]) || request_.size() < 2 || !expected_) return false;
-    const auto count = static_cast<std::uint8_t>(*expected_ - kReadReplyOverhead);
-    return damaged.size() >= std::min(*expected_, kReadRequestAdu + 1) && damaged[0] == station_ &&
-           damaged[1] == request_[0] && damaged[2] == count && request_[1] != count;
+    const auto count = distinct_byte_count(request_);
+    return count && damaged.size() >= std::min(*expected_, kReadRequestAdu + 1) &&
+           damaged[0] == station_ && damaged[1] == request_[0] && damaged[2] == *count;
 }
 
 /// Bytes of the beginning of our own frame, which no reply to the read has.
 std::size_t ReplyFramer::own_beginning(ByteView damaged) const {
-    if (!is_read(request_[0]) || request_.size() < 2 || !expected_ ||
-        request_[1] == *expected_ - kReadReplyOverhead)
-        return 0;
+    if (!distinct_byte_count(request_)) return 0;
     const Bytes own = encode_adu(station_, request_, orders_.of(station_));
     const auto same = std::ranges::mismatch(damaged, own).in1 - damaged.begin();
     return std::cmp_less(same, kHeader) ? 0 : static_cast<std::size_t>(same);
@@ -426,9 +423,11 @@ std::vector<Unused> classify_heard(ByteView bytes, std::uint8_t own_station,
     std::vector<Unused> parts;
     while (!bytes.empty()) {
         std::size_t size = known_reply_length(bytes);
-        if (!is_valid(bytes, size, orders)) size = bytes.size();
-        const bool good = is_valid(bytes, size, orders);
-        if (!good) size = size_of_damage(bytes, orders);
+        bool good = is_valid(bytes, size, orders);
+        if (!good) {
+            good = is_valid(bytes, bytes.size(), orders);
+            size = good ? bytes.size() : size_of_damage(bytes, orders);
+        }
         parts.push_back(classify_frame(bytes.first(size), own_station, good));
         bytes = bytes.subspan(size);
     }

@@ -24,17 +24,15 @@ struct OpenViolation {
 ///     late one to an earlier request of that length, or the answer to the present one
 ///     (Checker::is_padded(), looks_late()).
 ///   - A frame that nobody asked for, of the form of the awaited reply, while that is thought
-///   about:
-///     to this question alone (Checker::on_imitation()). What it leaves over to the next ones comes
-///     much sooner than the panel has ever answered, which 24 replies have shown before.
+///     about: to this question alone (Checker::on_imitation()). What it leaves over to the next
+///     ones comes much sooner than the panel has ever answered, which 24 replies have shown before.
 ///   - A reply that a later one has overtaken, where it can only be the awaited one for anybody who
 ///     takes stations to serve in order, and nothing has come that this does not explain: the same
 ///     bytes in the same order are those of a panel that serves in turn (Order,
 ///     Checker::on_reply()). So is the one that it has displaced, and that comes one late.
 ///   - A reply that begins later than any of its panel, where another or it has just been silent,
-///   or
-///     an earlier one of its form is owed: to wait for it is to wait for all who may have died with
-///     that one, to believe it is to believe the one that is owed (Checker::is_overdue()).
+///     or an earlier one of its form is owed: to wait for it is to wait for all who may have died
+///     with that one, to believe it is to believe the one that is owed (Checker::is_overdue()).
 ///   - An answer that equals its request and comes when nobody waits for it any more, or between
 ///     bytes that nobody says: it may be our own frame (Checker::may_be_echo()).
 inline constexpr auto kOpenViolations = std::to_array<OpenViolation>({

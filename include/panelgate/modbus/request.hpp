@@ -82,6 +82,10 @@ std::size_t request_adu_length(ByteView heard);
 /// std::nullopt if only the reply determines it.
 std::optional<std::size_t> reply_length_from_request(ByteView pdu);
 
+/// The byte count of the normal reply to this read, where the request has another byte in that
+/// place: by it one frame's beginning is told from the other's. Empty: it tells nothing.
+std::optional<std::uint8_t> distinct_byte_count(ByteView request);
+
 Bytes encode_read(Table table, std::uint16_t address, std::uint16_t count);
 /// `span` must be a valid result of read_span().
 Bytes encode_read(const Span& span);

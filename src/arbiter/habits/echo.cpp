@@ -12,19 +12,14 @@ namespace panelgate::arbiter {
 
 namespace {
 
-/// True if its normal reply can never equal it. The reply to a read has its byte count where the
-/// request has the address.
+/// True if its normal reply can never equal it.
 bool differs_from_reply(ByteView pdu) {
     const auto reply = modbus::reply_length_from_request(pdu);
-    if (!reply || *reply != pdu.size() + modbus::kAduOverhead) return reply.has_value();
-    return modbus::read_span(pdu) && pdu[1] != pdu.size() - 2;
+    return reply && (*reply != pdu.size() + modbus::kAduOverhead ||
+                     modbus::distinct_byte_count(pdu).has_value());
 }
 
 constexpr std::size_t kSingleWrite = 5;  // bytes: function, address, value
-
-std::uint16_t word_at(ByteView bytes, std::size_t at) {
-    return static_cast<std::uint16_t>(bytes[at] << 8 | bytes[at + 1]);
-}
 
 }  // namespace
 
@@ -38,18 +33,11 @@ bool teaches_echo_of_writes(const modbus::Request& request) {
 
 std::optional<modbus::Request> read_back(ByteView write) {
     if (write.size() < kSingleWrite) return std::nullopt;
-    const std::uint32_t first = word_at(write, 1);
-    const bool is_several =
-        write[0] == modbus::kWriteMultipleRegisters || write[0] == modbus::kWriteMultipleCoils;
-    const std::uint32_t count = is_several ? word_at(write, 3) : 1;
-    if (write[0] == modbus::kWriteSingleCoil || write[0] == modbus::kWriteMultipleCoils)
-        return modbus::Request::read({modbus::Table::coils, first, count});
-    if (write[0] == modbus::kWriteSingleRegister || write[0] == modbus::kWriteMultipleRegisters)
-        return modbus::Request::read({modbus::Table::holding_registers, first, count});
-    const auto read = modbus::access_of(write).read;  // of a write that also reads
-    if (read && read->count > 0 && read->end() <= modbus::kTableItems)
-        return modbus::Request::read(*read);
-    return std::nullopt;
+    const modbus::Access items = modbus::access_of(write);
+    // A mask write (16h) names items, too, but not what they hold then.
+    const auto& span = modbus::is_broadcastable(write[0]) ? items.write : items.read;
+    if (!span || span->count == 0 || span->end() > modbus::kTableItems) return std::nullopt;
+    return modbus::Request::read(*span);
 }
 
 bool holds_written(ByteView write, ByteView reply) {
@@ -57,7 +45,7 @@ bool holds_written(ByteView write, ByteView reply) {
     if (!read || !modbus::answers(read->pdu(), reply) || modbus::exception_of(reply)) return false;
     if (write[0] == modbus::kWriteSingleCoil) return (reply[2] & 1) == (write[3] != 0 ? 1 : 0);
     if (write[0] == modbus::kWriteMultipleCoils) {
-        const std::size_t count = word_at(write, 3);  // panels need not clear the unused bits
+        const std::size_t count = read->span()->count;  // panels need not clear the unused bits
         // From its byte count on it is like the reply to the read.
         return modbus::bits_of(reply, count) == modbus::bits_of(write.subspan(4), count);
     }

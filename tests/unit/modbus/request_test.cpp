@@ -242,5 +242,13 @@ TEST(RequestAduLength, IsThatOfFunctionAndByteCountOrUnknown) {
         EXPECT_EQ(request_adu_length(heard), length) << to_hex(heard);
 }
 
+TEST(DistinctByteCount, IsOfAReadWhoseAddressIsAnotherByte) {
+    EXPECT_EQ(distinct_byte_count("03 00 64 00 03"_hex), 6);
+    EXPECT_EQ(distinct_byte_count("01 04 64 00 14"_hex), 3);
+    for (const Bytes& pdu :
+         {"01 03 64 00 14"_hex, "06 00 01 00 02"_hex, "07"_hex, "0B"_hex, Bytes()})
+        EXPECT_EQ(distinct_byte_count(pdu), std::nullopt) << to_hex(pdu);
+}
+
 }  // namespace
 }  // namespace panelgate::modbus::request_test
