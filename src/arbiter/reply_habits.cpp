@@ -60,6 +60,15 @@ bool ReplyHabits::may_be_duplicate(TimePoint now, const Attempt& attempt, const 
            (attempt.may_have_collided() && claims.repeats && !group.is_values(attempt.reply()));
 }
 
+const Asked* ReplyHabits::earlier_write(const OutstandingRequests& book, TimePoint now,
+                                        ByteView write, ByteView confirmation) const {
+    if (modbus::exception_of(confirmation) || modbus::returns_values(write)) return nullptr;
+    const TimePoint given = book.given(id_, now, confirmation, now);
+    if (given == TimePoint{}) return nullptr;
+    const Asked* const earlier = book.last_reply(id_, given + Duration{1});
+    return std::ranges::equal(earlier->pdu, write) ? nullptr : earlier;
+}
+
 void ReplyHabits::on_asked(OutstandingRequests& book, TimePoint now, const Group& group,
                            bool in_transit) {
     if (now >= rested() && !in_transit) book.lapse(id_);

@@ -136,7 +136,9 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
                              habits.may_refuse_other(book, now, claims, group.request.function());
     const bool repeats = station.may_be_duplicate(now, attempt, claims, is_early);
     const bool may_ask = group.may_doubt(reply) ||
-                         (refusal && group.may_doubt_refusal() && attempt.may_have_collided());
+                         (refusal && group.may_doubt_refusal() && attempt.may_have_collided()) ||
+                         (repeats && !group.jobs.empty() &&
+                          habits.earlier_write(book, now, group.request.pdu(), reply) != nullptr);
     return fact::answers | facts_of_others(now, claims) | when(refuses_other, fact::refuses_other) |
            when(impossible, fact::impossible) | when(overdue, fact::overdue) |
            facts_of_equals(now, station, is_early) | when(misnumbered, fact::misnumbered) |
@@ -225,34 +227,45 @@ void Arbiter::settle(TimePoint now) {
 }
 
 /// P8: a reply came that may have been the write's echo, an answer to a broadcast, or the last
-/// confirmation once more, and a read has now shown what the station holds. Where that is not what
-/// was written (a command that resets itself), or cannot be read, only a line on which writes do
-/// not come back leaves no doubt: an adapter need not echo reads.
+/// confirmation once more, and a read has now shown what the station holds.
 void Arbiter::confirm(TimePoint now, const Group& group, ByteView reply, bool echoed) {
-    if (modbus::returns_values(group.written)) return confirm_values(group, reply);
-    const auto broadcast = stations_.book().behind_broadcast(group.doubted_at, group.confirms);
-    const bool holds = holds_written(group.written, reply);
-    ReplyHabits& habits = stations_.of(group.station).replies();
-    const bool holds_decides = echo_memory_.comes_again(now, group.station) ||
-                               habits.may_repeat_confirmation(now, group.confirms);
-    const bool is_left = echo_memory_.echoes_no_writes() && !broadcast;
-    const bool is_answer = holds_decides ? holds : !echoed && (holds || is_left);
-    if (broadcast && holds) habits.on_broadcast_unanswered();
-    if (broadcast && !holds && !modbus::exception_of(reply))
-        habits.on_broadcast_answered(*broadcast, false);
+    const bool is_answer = modbus::returns_values(group.written)
+                               ? has_values(group, reply)
+                               : is_confirmed(now, group, reply, echoed);
     const Result<Bytes> outcome = is_answer ? Result<Bytes>(group.confirms) : Fault::timeout;
     for (const Job& job : group.jobs) outbox_.finish(job, outcome);
 }
 
+/// Where the place does not hold what was written (a command that resets itself), or cannot be
+/// read, only a line on which writes do not come back leaves no doubt: an adapter need not echo
+/// reads. A confirmation that repeats one was none where the place still holds what that confirmed.
+bool Arbiter::is_confirmed(TimePoint now, const Group& group, ByteView reply, bool echoed) {
+    const OutstandingRequests& book = stations_.book();
+    const auto broadcast = book.behind_broadcast(group.doubted_at, group.confirms);
+    const bool holds = holds_written(group.written, reply);
+    ReplyHabits& habits = stations_.of(group.station).replies();
+    if (broadcast && holds) habits.on_broadcast_unanswered();
+    if (broadcast && !holds && !modbus::exception_of(reply))
+        habits.on_broadcast_answered(*broadcast, false);
+    if (echo_memory_.comes_again(now, group.station) ||
+        habits.may_repeat_confirmation(now, group.confirms))
+        return holds;
+    const Asked* const earlier =
+        habits.earlier_write(book, group.doubted_at, group.written, group.confirms);
+    if (broadcast || earlier == nullptr)
+        return !echoed && (holds || (echo_memory_.echoes_no_writes() && !broadcast));
+    const bool is_true = holds || !holds_written(earlier->pdu, reply);
+    habits.on_checked(book, group, is_true);
+    return is_true;
+}
+
 /// P1: values came that may be an earlier reply's, of a request that is not repeated (17h), and a
 /// read has now shown what the station holds. Where it is refused nothing can tell.
-void Arbiter::confirm_values(const Group& group, ByteView reply) {
-    const bool refused = modbus::exception_of(reply).has_value();
+bool Arbiter::has_values(const Group& group, ByteView reply) {
+    if (modbus::exception_of(reply)) return true;
     const bool equal = std::ranges::equal(reply.subspan(1), ByteView(group.confirms).subspan(1));
-    if (!refused)
-        stations_.of(group.station).replies().on_values_checked(stations_.book(), group, equal);
-    const Result<Bytes> outcome = refused || equal ? Result<Bytes>(group.confirms) : Fault::timeout;
-    for (const Job& job : group.jobs) outbox_.finish(job, outcome);
+    stations_.of(group.station).replies().on_checked(stations_.book(), group, equal);
+    return equal;
 }
 
 /// The reply may be a duplicate of an earlier one, and the real one may still come. The station's

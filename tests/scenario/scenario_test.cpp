@@ -173,6 +173,8 @@ constexpr BrokenOnce kBrokenOnce[] = {
     {Kind::adaptive, 20169},
     // Another's good frame in the pause of a reply that had begun made it a damaged one.
     {Kind::company, 35},
+    // A confirmation came twice, and the second time the write behind it was lost.
+    {Kind::company, 378},
     {Kind::receiver, 32},
     // A silence behind somebody else's bytes made others be waited for less long.
     {Kind::company, 84},

@@ -56,11 +56,23 @@ void Wire::whisper(Bytes bytes) {
 }
 
 void Wire::send(Bytes adu) {
+    Held held{.bytes = std::move(adu), .connection = connection_};
     if (agenda_.now() < stalled_until_) {
-        held_out_.push_back({.bytes = std::move(adu), .connection = connection_});
+        held_out_.push_back(std::move(held));
+    } else if (agenda_.now() < says_held_until_) {
+        leave_in_turn(std::move(held));
     } else {
-        leave(std::move(adu), connection_);
+        leave(std::move(held.bytes), held.connection);
     }
+}
+
+/// A device server has one buffer and one UART: nothing that it is given overtakes what it still
+/// holds.
+void Wire::leave_in_turn(Held held) {
+    const TimePoint at = std::max(agenda_.now(), says_held_until_);
+    says_held_until_ = at + time_of(held.bytes.size(), plan_.line.own_rate) +
+                       silent_interval(plan_.settings.serial) + random_.between(0us, 2ms);
+    agenda_.at(at, [this, held = std::move(held)] { leave(held.bytes, held.connection); });
 }
 
 void Wire::leave(Bytes adu, std::uint64_t connection) {
@@ -195,12 +207,9 @@ void Wire::stall(TimePoint until) {
 /// What was sent on a connection that is gone is lost, or executed with its reply unheard.
 void Wire::release() {
     for (Held& held : std::exchange(held_in_, {})) arrive(std::move(held));
-    TimePoint next = agenda_.now();
     for (Held& held : std::exchange(held_out_, {})) {
         if (held.connection != connection_ && random_.chance(0.5)) continue;
-        agenda_.at(next, [this, held] { leave(held.bytes, held.connection); });
-        next += time_of(held.bytes.size(), plan_.line.own_rate) +
-                silent_interval(plan_.settings.serial) + random_.between(0us, 2ms);
+        leave_in_turn(std::move(held));
     }
 }
 

@@ -87,6 +87,7 @@ class Wire {
 
     FramePtr put(Said said);
     void leave(Bytes adu, std::uint64_t connection);
+    void leave_in_turn(Held held);
     void echo(const FramePtr& frame);
     void deliver_in_chunks(const FramePtr& frame);
     void deliver(const FramePtr& frame, std::size_t from, std::size_t to);
@@ -104,6 +105,7 @@ class Wire {
     std::list<FramePtr> air_;
     TimePoint spoken_until_{};
     TimePoint stalled_until_{};
+    TimePoint says_held_until_{};  ///< what a stall has held back, and what came since
     FramePtr buffered_;  ///< a part of our own frame that an adapter has not handed over yet
     std::vector<Held> held_in_;
     std::vector<Held> held_out_;

@@ -147,7 +147,8 @@ class Arbiter {
     void settle(TimePoint now);
     void ask_again(TimePoint now);
     void confirm(TimePoint now, const Group& group, ByteView reply, bool echoed);
-    void confirm_values(const Group& group, ByteView reply);
+    bool is_confirmed(TimePoint now, const Group& group, ByteView reply, bool echoed);
+    bool has_values(const Group& group, ByteView reply);
     static Group confirming(Group& write, const Station& station);
     void learn_from_failure(TimePoint now, const Attempt& attempt, Verdict verdict);
     void fail(TimePoint now, Verdict verdict);

@@ -118,6 +118,10 @@ class ReplyHabits {
         return repeated_at_ && now <= *repeated_at_ + timing::kForgetHabit &&
                std::ranges::equal(reply, confirmation_);
     }
+    /// The write of other values that had this confirmation just before; null: none. A read tells
+    /// whether the place still holds those.
+    const Asked* earlier_write(const OutstandingRequests& book, TimePoint now, ByteView write,
+                               ByteView confirmation) const;
     /// Time of the latest request that this reply proves to have reached the station: an attempt
     /// started at `started`, or the first outstanding one that the reply fits.
     TimePoint surely_answered(const OutstandingRequests& book, TimePoint started,
@@ -143,9 +147,9 @@ class ReplyHabits {
     void on_doubted(OutstandingRequests& book, TimePoint now, const Group& group, TimePoint sent);
     /// True if all requests that it was asked again had two answers that differ.
     bool answers_twice() const { return duplicates_.answers_twice(); }
-    /// A read has shown whether values were true that a request gave which is not repeated.
-    void on_values_checked(const OutstandingRequests& book, const Group& check, bool were_true) {
-        judge_doubted(book, check.written, check.confirms, check.doubted_at, were_true);
+    /// A read has shown whether the reply was true to a request that is not repeated.
+    void on_checked(const OutstandingRequests& book, const Group& check, bool was_true) {
+        judge_doubted(book, check.written, check.confirms, check.doubted_at, was_true);
     }
     /// Two answers came that differ; the request is asked again. `again`: not the first time.
     void on_contradicted(TimePoint now, bool again) { duplicates_.on_contradicted(now, again); }

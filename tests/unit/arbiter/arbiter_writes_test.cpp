@@ -326,6 +326,51 @@ TEST_F(ArbiterTest, P8WhereConfirmationsComeAgainOneThatRepeatsTheLastIsReadBack
     }
 }
 
+/// The same place is written again, with other values: its confirmation may be the last one's copy,
+/// and the request lost. A place that holds neither is a command that has reset itself.
+TEST_F(ArbiterTest, P8AConfirmationLikeTheOneBeforeIsNoneWhereThePlaceHoldsWhatThatConfirmed) {
+    struct {
+        Bytes read;
+        bool is_true;
+    } const cases[] = {{"03 04 00 0A 01 02"_hex, false},
+                       {"03 04 00 0B 00 00"_hex, true},
+                       {"03 04 00 00 00 00"_hex, true},
+                       {"83 02"_hex, true}};
+    for (const auto& one : cases) {
+        BusScript script{settings};
+        script.submit(17, kToAll, 1);
+        answer(script, 17, kConfirmed, 12ms);
+        const Ticket again = script.submit(17, kToOne, 1);
+        ASSERT_TRUE(script.next_sent());
+        answer(script, 17, kConfirmed, 12ms);
+        EXPECT_FALSE(script.answered(again));
+        ASSERT_TRUE(script.next_sent(1s));
+        EXPECT_EQ(script.sent.back().adu, modbus::encode_adu(17, "03 00 64 00 02"_hex));
+        answer(script, 17, one.read, 12ms);
+        ASSERT_TRUE(script.answered(again));
+        EXPECT_EQ(script.answer(again).pdu.has_value(), one.is_true) << to_hex(one.read);
+    }
+}
+
+/// ... and nothing is read where that would tell nothing: the same values, or longer ago than
+/// copies come.
+TEST_F(ArbiterTest, P8AConfirmationLikeTheOneBeforeIsBelievedWhereAReadWouldTellNothing) {
+    const auto write_again = [&](const Bytes& second, Duration later) {
+        BusScript script{settings};
+        script.submit(17, kToAll, 1);
+        answer(script, 17, kConfirmed, 12ms);
+        script.run_for(later);
+        const Ticket again = script.submit(17, second, 1);
+        while (script.sent.size() < 2) script.run_for(1ms);
+        answer(script, 17, kConfirmed, 12ms);
+        script.run_for(1s);
+        EXPECT_EQ(script.sent.size(), 2u);
+        return script.answered(again) && script.answer(again).pdu.has_value();
+    };
+    EXPECT_TRUE(write_again(kToAll, 0ms));
+    EXPECT_TRUE(write_again(kToOne, 600ms));
+}
+
 /// Reading back what a write has written.
 TEST(ReadBack, P8CoilsAreComparedWithoutTheBitsThatNobodyWrote) {
     const Bytes twenty = "0F 00 64 00 14 03 CD 6B 05"_hex;
