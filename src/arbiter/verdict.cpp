@@ -129,7 +129,7 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
         claims.passed && (station.is_slow(attempt.begun_after(now)) || habits.is_disordered());
     const bool too_soon =
         first && group.attempts <= 1 && station.is_far_too_quick(first_sign, claims.passed);
-    const bool other = claims.passed && !first && !attempt.answers().first_came();
+    const bool other = claims.passed && attempt.answers().follows_other();
     const bool contradicted = other || (attempt.is_undecided(claims.repeats_other) &&
                                         (group.doubts == 0 || !habits.answers_twice()));
     const bool misnumbered = refusal && group.may_doubt_refusal() &&

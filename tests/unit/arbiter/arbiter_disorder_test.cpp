@@ -91,6 +91,31 @@ TEST_F(ArbiterPassedByTest, P1OfTwoAnswersNeitherIsBelievedWhereOneIsMissing) {
     EXPECT_EQ(script.answer(ticket).pdu.value(), reply_number(60));
 }
 
+/// It sends two that differ at times, so each is held for another one.
+TEST_F(ArbiterPassedByTest, P5WhatIsHeldForAnotherAnswerIsBelievedIfNoneFollows) {
+    BusScript script{settings};
+    for (const unsigned number : {1u, 2u}) {
+        script.submit(17, read_at(number), 1);
+        answer(script, 17, reply_number(number), 20ms);
+        script.run_for(10ms);
+        script.hear_reply(17, reply_number(10 + number));
+        script.run_for(100ms);
+    }
+    const Ticket missed = script.submit(17, read_at(50), 1);
+    while (!script.answered(missed)) script.run_for(1ms);
+    const Ticket longer = script.submit(17, "03 00 00 00 01"_hex, 1);
+    answer(script, 17, "03 02 00 07"_hex, 20ms);
+    while (!script.answered(longer)) script.run_for(1ms);
+    script.run_for(10ms);
+    const Ticket ticket = script.submit(17, read_at(60), 1);
+    const std::size_t sent = script.sent.size();
+    answer(script, 17, reply_number(60), 20ms);
+    EXPECT_FALSE(script.answered(ticket)) << "another one may follow";
+    script.run_for(100ms);
+    EXPECT_EQ(script.answer(ticket).pdu.value(), reply_number(60));
+    EXPECT_EQ(script.sent.size(), sent) << "it was not asked again";
+}
+
 /// An answer to an earlier request shows that the station does not serve in order: so may the next.
 TEST_F(ArbiterPassedByTest, P1WhoIsSeenToServeOutOfOrderIsBelievedNoneOfThemMeanwhile) {
     BusScript script{settings};

@@ -81,6 +81,10 @@ class Answers {
     const std::optional<Times>& in_time() const { return in_time_; }
     /// When the candidate came, if the reply repeats it.
     const std::optional<TimePoint>& first_came() const { return first_came_; }
+    /// True if one that differs from it came before the reply.
+    bool follows_other() const {
+        return had_candidate() && !first_came_ && (!in_time_ || contradicted_);
+    }
     /// True if two came that differ, before one was given.
     bool contradicted() const { return contradicted_; }
     /// ... unless just one of these came for an earlier attempt, too: the reply. `is_copy`: it has
