@@ -46,7 +46,8 @@ Facts ReplyHabits::facts(const OutstandingRequests& book, TimePoint now, ByteVie
     return when(claims.other_master, fact::other_master) | when(claims.repeats, fact::repeats) |
            when(duplicates_.known(), fact::sends_twice) |
            when(claims.outstanding, fact::outstanding) | when(claims.closed, fact::closed) |
-           when(claims.has_last_form, fact::last_form) | fact::known;
+           when(claims.has_last_form, fact::last_form) |
+           when(broadcast_.delay.has_value(), fact::answers_all) | fact::known;
 }
 
 bool ReplyHabits::may_be_duplicate(TimePoint now, const Attempt& attempt, const Claims& claims,

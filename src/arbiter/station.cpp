@@ -134,10 +134,15 @@ bool Station::may_retry(const Group& group) const {
     return harmless && failed <= settings_.retries;
 }
 
+Duration Station::twice_what_take(double share) const {
+    const Duration think = turnaround_.quantile(share);
+    return think + std::max(think, times_.shortest().value_or(Duration{}));
+}
+
 Duration Station::response_timeout() const {
     const Duration whole = settings_.response_timeout;
     if (!settings_.adaptive_timeout || !turnaround_.known()) return whole;
-    const Duration wanted = settings_.timeout_floor + 2 * turnaround_.quantile(0.98);
+    const Duration wanted = settings_.timeout_floor + twice_what_take(0.98);
     return std::min(whole, wanted * (1 << std::countr_one(lately_)));
 }
 
@@ -168,8 +173,8 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
         // A few replies delayed by a network must not make probes long: one in kDear waits as long
         // as it has ever needed, the others as long as most replies take.
         constexpr double kMost = 0.75;
-        const Duration most = std::max(timing::kShortestWait,
-                                       2 * turnaround_.quantile(kMost) + timing::kReceiveMargin);
+        const Duration most =
+            std::max(timing::kShortestWait, twice_what_take(kMost) + timing::kReceiveMargin);
         return std::min(usual(line), most);
     }
     if ((health_.offline() || flaky_beside_others) && !slowest()) {

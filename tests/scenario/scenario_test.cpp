@@ -233,15 +233,17 @@ TEST(Scenario, SeedsInWhichAnOddPanelOnceBrokeAPromiseKeepThemAll) {
 
 /// ... and with an odd panel: an exception equal to an earlier one ended nothing, and those of
 /// another function taught a lateness; a reply of another length is that to an earlier request, for
-/// anybody on the wire.
+/// anybody on the wire. Answers to broadcasts were taken for copies and for a second panel's.
 TEST(Scenario, SeedsInWhichThePanelAnsweredWronglyKeepThemAll) {
     struct Known {
         Oddity oddity;
         std::uint64_t seed;
     };
-    constexpr Known kKnown[] = {{Oddity::wrong_function, 4},  {Oddity::wrong_function, 5},
-                                {Oddity::wrong_function, 10}, {Oddity::wrong_function, 76},
-                                {Oddity::padded_inside, 18},  {Oddity::padded_inside, 65}};
+    constexpr Known kKnown[] = {
+        {Oddity::wrong_function, 4},       {Oddity::wrong_function, 5},
+        {Oddity::wrong_function, 10},      {Oddity::wrong_function, 76},
+        {Oddity::padded_inside, 18},       {Oddity::padded_inside, 65},
+        {Oddity::answers_broadcasts, 165}, {Oddity::answers_broadcasts, 301}};
     for (const Known& known : kKnown) {
         Outcome with;
         EXPECT_EQ(compare(known.oddity, known.seed, with), "")

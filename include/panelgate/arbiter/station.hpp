@@ -230,6 +230,10 @@ class Station {
     Duration timeout_cost() const {
         return static_cast<int>(1 / ProbeBudget::kFailing) * settings_.response_timeout;
     }
+    /// Twice the time that this share of its replies take. At low rates the silence behind the
+    /// request and the first character take longer than the panel: once is as long as it takes to
+    /// see any.
+    Duration twice_what_take(double share) const;
     bool rests_after_replies() const {
         return replies_.duplicates_until(Duration::max()) != TimePoint{};
     }

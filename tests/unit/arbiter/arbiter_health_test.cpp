@@ -314,5 +314,43 @@ TEST(ReplyHole, IsLearnedFromTwoInARowAndForgottenWhenItDoesNotPauseAnyMore) {
     EXPECT_EQ(hole.learned(), 500ms) << "no longer than its timeout";
 }
 
+/// At 1200 baud a reply cannot be seen before 4.5 characters have passed: 41 ms.
+class ArbiterAtALowRate : public ArbiterTest {
+  protected:
+    ArbiterAtALowRate() {
+        settings.serial = {1200, 8, Parity::none, 1};
+        for (StationSettings& station : settings.stations) station.response_timeout = 1s;
+    }
+    /// The panel answers 5 ms behind the silence that ends the request.
+    void answer_paced(BusScript& script, unsigned number) {
+        script.run_to_end_of_request();
+        script.run_for(silent_interval(settings.serial) + 5ms);
+        script.hear_paced(modbus::encode_adu(17, reply_number(number)));
+    }
+    void know(BusScript& script, unsigned replies) {
+        for (unsigned i = 0; i < replies; ++i) {
+            script.run_for(1s);
+            script.submit(17, read_at(i));
+            answer_paced(script, i);
+        }
+    }
+};
+
+TEST_F(ArbiterAtALowRate, P4AQuickPanelIsWaitedForAsLongAsItNeedsWhereTheTimeoutIsAdaptive) {
+    for (StationSettings& station : settings.stations) station.adaptive_timeout = true;
+    BusScript script{settings};
+    know(script, 40);
+    EXPECT_EQ(script.sent.size(), 40u);
+}
+
+TEST_F(ArbiterAtALowRate, P4AQuickPanelThatIsBackAnswersTheFirstProbe) {
+    BusScript script{settings};
+    know(script, 20);
+    silence(script);
+    ASSERT_TRUE(script.next_sent(10s));
+    answer_paced(script, 7);
+    EXPECT_FALSE(script.arbiter().health(17).offline());
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter::arbiter_health_test

@@ -86,15 +86,16 @@ TEST_F(StationTest, AnAdaptiveTimeoutFollowsTheTurnaroundBetweenFloorAndWhatIsCo
     station_.apply(settings, {}, true);
     EXPECT_EQ(station_.response_timeout(), kTimeout) << "nothing is known yet";
     for (int i = 0; i < 10; ++i) answer(kRead, kReply);
-    EXPECT_EQ(station_.response_timeout(), settings.timeout_floor + 2 * Duration(25ms));
+    const Duration wanted = settings.timeout_floor + 25ms + 30ms;
+    EXPECT_EQ(station_.response_timeout(), wanted);
     EXPECT_EQ(patience(kRead), station_.response_timeout());
     EXPECT_EQ(patience(kWrite), kTimeout) << "only its reply shows whether it was executed";
     miss(kRead);
-    EXPECT_EQ(station_.response_timeout(), 2 * (settings.timeout_floor + 2 * Duration(25ms)));
+    EXPECT_EQ(station_.response_timeout(), 2 * wanted);
     for (int i = 0; i < 100; ++i) miss(kRead);
     EXPECT_EQ(station_.response_timeout(), kTimeout);
     answer(kRead, kReply);
-    EXPECT_EQ(station_.response_timeout(), settings.timeout_floor + 2 * Duration(25ms));
+    EXPECT_EQ(station_.response_timeout(), wanted);
 }
 
 TEST_F(StationTest, P1WithAnOutstandingReplyOnlyTheVerySameMayBeAskedUntilItHasRested) {

@@ -42,6 +42,7 @@ inline constexpr Facts sends_twice = 1 << 15;  ///< its station is known to send
 inline constexpr Facts last_form = 1 << 16;    ///< has the form of the last reply, soon after it
 inline constexpr Facts broadcast = 1 << 17;    ///< may answer a broadcast
 inline constexpr Facts known = 1 << 18;        ///< its station was asked before
+inline constexpr Facts answers_all = 1 << 24;  ///< its station was seen to answer broadcasts
 
 }  // namespace fact
 
@@ -103,12 +104,13 @@ inline constexpr JudgeRow kJudgeRows[] = {
     {fact::request, Done::request},                                         // P1
     {fact::damaged, Done::damaged},                                         // MST-04
     {fact::other_master, Done::nobodys},                                    // P1
+    {fact::broadcast | fact::answers_all, Done::broadcast},                 // P8
     {fact::repeats | fact::sends_twice, Done::duplicate},                   // P1
     {fact::outstanding, Done::late},                                        // P1, P4
     {fact::repeats, Done::duplicate},                                       // P1
     {fact::closed, Done::disorder},                                         // P1
-    {fact::last_form, Done::second},                                        // P1
     {fact::broadcast, Done::broadcast},                                     // P8
+    {fact::last_form, Done::second},                                        // P1
     {fact::known, Done::unasked},                                           // P3
     {0, Done::nobodys},
 };

@@ -40,6 +40,16 @@ TEST(Judge, P8AReplyToABroadcastIsOneOnlyIfItIsNothingElse) {
     EXPECT_EQ(judge(fact::known | fact::broadcast | fact::outstanding), Done::late);
     EXPECT_EQ(judge(fact::known | fact::broadcast), Done::broadcast);
     EXPECT_EQ(judge(fact::broadcast), Done::broadcast) << "also of an unknown station";
+    EXPECT_EQ(judge(fact::known | fact::broadcast | fact::last_form), Done::broadcast)
+        << "its fields say more than its length";
+    constexpr Facts kMayRepeat = fact::known | fact::broadcast | fact::repeats;
+    EXPECT_EQ(judge(kMayRepeat), Done::duplicate);
+    EXPECT_EQ(judge(kMayRepeat | fact::answers_all), Done::broadcast);
+}
+
+TEST(Judge, P8AStationThatAnswersThemIsBelievedToDoSoAgain) {
+    EXPECT_EQ(judge(fact::known | fact::broadcast | fact::answers_all | fact::outstanding),
+              Done::broadcast);
 }
 
 TEST(Judge, P3WhatFitsNothingEndsTheAttemptOfItsStation) {
