@@ -179,8 +179,11 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
 
 /// Learns from the reply that has come whether the line keeps its rate.
 void Arbiter::learn_pace(bool early) {
-    if (active_->group().doubted_as_early)
-        pace_.on_asked_again(active_->reply() == active_->group().doubted);
+    const Group& group = active_->group();
+    if (group.doubted_as_early)
+        pace_.on_asked_again(active_->reply() == group.doubted ||
+                             (!early && !group.early_may_be_old));
+    if (active_->answers().follows_early()) pace_.on_followed();
     pace_.on_reply(early);
     pace_.on_rate(active_->pace().hasty());
     if (const auto& look = active_->pace().end_look()) wake_latency_.on_look(look->whole);
@@ -268,10 +271,23 @@ bool Arbiter::has_values(const Group& group, ByteView reply) {
     return equal;
 }
 
+/// An early reply was all that came. Is it another request's, as far as is known?
+void Arbiter::doubt_as_early(TimePoint now) {
+    Group& group = active_->group();
+    const Claims claims =
+        stations_.of(group.station)
+            .replies()
+            .claims(stations_.book(), now, active_->answers().candidate(), &*active_);
+    const bool may_be_old = claims.repeats || claims.repeats_other || claims.other_outstanding;
+    group.early_may_be_old = group.early_may_be_old || may_be_old;
+    pace_.on_doubted();
+}
+
 /// The reply may be a duplicate of an earlier one, and the real one may still come. The station's
 /// health is not affected.
 void Arbiter::ask_again(TimePoint now) {
-    if (active_->answers().is_early()) pace_.on_doubted();
+    if (active_->answers().is_early()) doubt_as_early(now);
+    if (active_->answers().follows_early()) pace_.on_followed();
     active_->remember_doubt();
     Attempt attempt = take_active(now);
     outbox_.report(attempt, TransactionEnd::doubtful);

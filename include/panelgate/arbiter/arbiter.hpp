@@ -145,6 +145,7 @@ class Arbiter {
     void learn_pace(bool early);
     bool begins_too_early() const;
     void settle(TimePoint now);
+    void doubt_as_early(TimePoint now);
     void ask_again(TimePoint now);
     void confirm(TimePoint now, const Group& group, ByteView reply, bool echoed);
     bool is_confirmed(TimePoint now, const Group& group, ByteView reply, bool echoed);

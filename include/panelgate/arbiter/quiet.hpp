@@ -116,14 +116,17 @@ class Pace {
     }
     /// An early reply was all that came.
     void on_doubted() { ++doubted_; }
-    /// Asked again, the `same` came, or another reply: the early one was none. Values change, so
-    /// one alone proves neither.
-    void on_asked_again(bool same) {
-        shown_ = std::clamp(shown_ + (same ? 1 : -1), -kEnough, kEnough);
+    /// Asked again, the same came as the early one, or in time another one, where the early one was
+    /// all that came and is no other request's as far as is known: `was_reply`, since values
+    /// change. One alone proves neither.
+    void on_asked_again(bool was_reply) {
+        shown_ = std::clamp(shown_ + (was_reply ? 1 : -1), -kEnough, kEnough);
         if (shown_ < kEnough) return;
         kept_ = false;
         comes_early_ = true;
     }
+    /// The reply came behind an early one, which was none: here are such.
+    void on_followed() { shown_ = -kEnough; }
     /// `hasty`: bytes of a reply came faster than the line's rate allows.
     void on_rate(bool hasty) {
         hasty_ = hasty ? std::min(hasty_ + kWeight, kHasty * kWeight) : std::max(hasty_ - 1, 0);

@@ -14,12 +14,13 @@ std::optional<Bytes> Answers::add(Bytes reply, Others others, const Group& group
     // Two equal ones cannot be distinguished.
     if (surplus == reply) {
         if (!may_be_echo()) first_came_ = times_.came;
-        if (!may_be_echo() && !early_) in_time_ = times_;
+        if (!may_be_echo() && !is_early()) in_time_ = times_;
         surplus.reset();
     } else if (surplus) {
         contradicted_ = contradicted_ || kept_ == Kept::held;
         if (contradicted_) note_said(*surplus);
-        if (early_ || kept_ == Kept::held) set_aside_.push_back(*std::exchange(surplus, {}));
+        if (is_early() || kept_ == Kept::held) set_aside_.push_back(*std::exchange(surplus, {}));
+        if (is_early()) early_ = Early::followed;
     }
     reply_ = std::move(reply);
     if (contradicted_) note_said(*reply_);
@@ -50,7 +51,7 @@ void Answers::remember_in(Group& group) {
     group.doubted = drop_candidate().value_or(Bytes{});
     group.doubted_at = times_.came;
     if (contradicted_) group.said.insert(group.said.end(), said_.begin(), said_.end());
-    group.doubted_as_early = early_;
+    group.doubted_as_early = is_early();
     ++group.doubts;
 }
 

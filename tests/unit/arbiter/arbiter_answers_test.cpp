@@ -12,6 +12,9 @@ namespace {
 
 using modbus::encode_adu;
 
+/// So soon that one before the request has left is not far sooner.
+constexpr Duration kAtOnce = 1ms;
+
 TEST_F(ArbiterAnswersTest, P1AFrameBeforeTheRequestHasLeftIsNoReplyWhereNoneComesSoSoon) {
     const Ticket first = ask(200);
     script.hear_reply(17, reply_number(900));
@@ -43,6 +46,31 @@ TEST_F(ArbiterAnswersTest, P5APanelThatHasBecomeFasterThanItsRequestIsBelievedWh
     const Ticket next = ask(203);
     script.hear_reply(17, reply_number(203));
     EXPECT_TRUE(script.answered(next));
+}
+
+/// Values change, so the second answer differs: a native TCP device, on a line said to be slow.
+TEST_F(ArbiterAnswersTest, P5WhereEarlyAnswersAreAllThatComesThreeShowThatSoTheyComeHere) {
+    know(17, kAtOnce);
+    for (unsigned i = 200; i < 203; ++i) ask_behind_an_early(i, reply_number(i));
+    const Ticket ticket = ask(203);
+    script.hear_reply(17, reply_number(203));
+    EXPECT_TRUE(script.answered(ticket));
+}
+
+TEST_F(ArbiterAnswersTest, P1EarlyAnswersThatRepeatOthersOrThatAnotherOneFollowedShowNothing) {
+    know(17, kAtOnce);
+    for (unsigned i = 206; i < 210; ++i) {
+        ask_behind_an_early(i, reply_number(i));
+        const Ticket followed = ask(300 + i);
+        script.hear_reply(17, reply_number(100 + i));
+        answer(script, 17, reply_number(300 + i), 12ms);
+        EXPECT_EQ(value(followed), reply_number(300 + i));
+        script.run_for(2s);
+    }
+    for (unsigned i = 200; i < 206; ++i) ask_behind_an_early(i, reply_number(1));
+    const Ticket ticket = ask(210);
+    script.hear_reply(17, reply_number(210));
+    EXPECT_FALSE(script.answered(ticket));
 }
 
 TEST_F(ArbiterAnswersTest, P1TheAnswerToAnotherReadIsAskedForOnceMoreHoweverOldItIs) {

@@ -94,17 +94,27 @@ class ArbiterTest : public testing::Test {
 /// Two panels that need 12 ms, heard often enough.
 class ArbiterAnswersTest : public ArbiterTest {
   protected:
-    void know(std::uint8_t station = 17) {
-        for (unsigned i = 1; i <= RecentTimes::kEnough; ++i) read(station, i);
+    void know(std::uint8_t station = 17, Duration after = 12ms) {
+        for (unsigned i = 1; i <= RecentTimes::kEnough; ++i) read(station, i, after);
     }
-    void read(std::uint8_t station, unsigned number) {
+    void read(std::uint8_t station, unsigned number, Duration after = 12ms) {
         script.run_for(10ms);
         script.submit(station, read_at(number), 1);
-        answer(script, station, reply_number(number), 12ms);
+        answer(script, station, reply_number(number), after);
     }
     Ticket ask(unsigned number) {
         script.run_for(10ms);
         return script.submit(17, read_at(number), 1);
+    }
+    /// All that comes is an answer before the request has left; asked again it answers in time.
+    void ask_behind_an_early(unsigned number, const Bytes& early) {
+        const Ticket ticket = ask(number);
+        script.hear_reply(17, early);
+        EXPECT_FALSE(script.answered(ticket));
+        ASSERT_TRUE(script.next_sent(200ms));
+        answer(script, 17, reply_number(1000 + number), 12ms);
+        EXPECT_EQ(value(ticket), reply_number(1000 + number));
+        script.run_for(2s);
     }
     /// Behind the first answer a second one comes, 4 ms later.
     void answer_twice(unsigned first, unsigned second) {

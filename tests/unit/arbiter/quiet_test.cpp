@@ -137,6 +137,19 @@ TEST(Pace, P1OldRepliesThatNowAndThenAreTheSameProveNothing) {
     }
 }
 
+TEST(Pace, P1WhereAReplyFollowedAnEarlyOneTwiceAsManyMustShowThatSuchAreReplies) {
+    Pace pace;
+    reply(pace, false, 8);
+    pace.on_asked_again(true);
+    pace.on_asked_again(true);
+    pace.on_followed();
+    for (int i = 0; i < 6; ++i) {
+        EXPECT_TRUE(pace.expects_none_early());
+        pace.on_asked_again(true);
+    }
+    EXPECT_FALSE(pace.expects_none_early());
+}
+
 TEST(Pace, HasteNowAndThenIsASenderThatWasHeldUpAndAgainAndAgainNoPaceUntilItHasCeased) {
     Pace pace;
     for (int i = 0; i < 50; ++i) {

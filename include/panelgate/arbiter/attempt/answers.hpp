@@ -53,7 +53,7 @@ class Answers {
         times_ = times;
     }
     /// The candidate began before the request had left: no reply of any request here.
-    void mark_early() { early_ = true; }
+    void mark_early() { early_ = Early::candidate; }
     /// The candidate is none. Returns it.
     std::optional<Bytes> drop_candidate() { return std::exchange(candidate_, std::nullopt); }
     /// Nothing else came: the candidate is the reply.
@@ -71,7 +71,10 @@ class Answers {
     /// True if it is the candidate that is held, and not yet contradicted.
     bool holds() const { return candidate_ && kept_ == Kept::held; }
     const Bytes& candidate() const { return *candidate_; }
-    bool is_early() const { return early_; }
+    /// True if the candidate is all that came, and began before the request had left.
+    bool is_early() const { return early_ == Early::candidate; }
+    /// True if the reply came behind such a one.
+    bool follows_early() const { return early_ == Early::followed; }
     bool had_candidate() const { return kept_ != Kept::none; }
     /// True if asking again decides about the candidate.
     bool is_doubted() const { return kept_ == Kept::doubted || may_be_echo(); }
@@ -103,7 +106,7 @@ class Answers {
     Times times_;  ///< of the candidate
     std::optional<Times> in_time_;
     std::optional<TimePoint> first_came_;
-    bool early_ = false;
+    enum class Early : std::uint8_t { none, candidate, followed } early_{};
     bool contradicted_ = false;
     PoolVector<Bytes> said_;  ///< the values that came, where they differ, each once
     std::vector<Bytes> set_aside_;

@@ -39,6 +39,7 @@ struct Group {
     PoolVector<Bytes> said{};  ///< values that came for the attempts before, where they differed
     int doubts = 0;            ///< attempts whose answer was doubtful
     bool odd_pace = false;     ///< its reply began before it had left, where that is unusual
+    bool early_may_be_old = false;  ///< one that was doubted as early may be another request's
 
     static constexpr int kMostDoubts = 2;  ///< after which there is no sure answer
 

@@ -119,6 +119,20 @@ TEST_F(AnswersTest, TheGroupRemembersTheDoubt) {
     EXPECT_TRUE(group_.was_said(kTwo));
 }
 
+TEST_F(AnswersTest, AnEarlyOneIsOneWhileItIsAllThatCame) {
+    add(kOne);
+    keep(Kept::doubted);
+    answers_.mark_early();
+    EXPECT_TRUE(answers_.is_early());
+    EXPECT_FALSE(answers_.follows_early());
+    add(kTwo);
+    EXPECT_FALSE(answers_.is_early());
+    EXPECT_TRUE(answers_.follows_early());
+    keep(Kept::doubted);
+    answers_.remember_in(group_);
+    EXPECT_FALSE(group_.doubted_as_early);
+}
+
 TEST_F(AnswersTest, NoMoreThanSomeAreRemembered) {
     Answers::Others others{.any = true};
     for (std::uint8_t i = 0; i < 2 * Answers::kMostSaid; ++i)
