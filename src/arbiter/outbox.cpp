@@ -185,6 +185,8 @@ void Outbox::on_unsolicited(TimePoint now, const modbus::Unused& part, Done done
                !begun.empty() && std::ranges::mismatch(begun, part.bytes).in1 == begun.end()) {
         ++symptoms_of(cut_for_).torn;  // it was no damage
     }
+    refused_late_ = refused_late_ || (inside_attempt_ && part.station == asked && is_late(done) &&
+                                      modbus::exception_of(pdu_of(part)));
     if (inside_attempt_ && is_surplus(done) && !old && part.station != asked)
         other_frame_.assign(pdu_of(part).begin(), pdu_of(part).end());
     actions_.push_back(Note{now, shown.kind, part.bytes, {}});
@@ -281,6 +283,15 @@ void Outbox::count_beside(const Attempt& attempt) {
     for (const modbus::Unused& frame : frames) ++symptoms_of(frame.station).unasked;
 }
 
+void Outbox::on_doubted(TimePoint now, const Attempt& attempt) {
+    const Group& group = attempt.group();
+    actions_.push_back(
+        Note{now,
+             FrameKind::reply,
+             modbus::encode_adu(group.station, group.doubted, orders_.of(group.station)),
+             {}});
+}
+
 void Outbox::on_failed(const Attempt& attempt, Verdict verdict) {
     Symptoms& symptoms = symptoms_of(attempt.group().station);
     const bool damaged = !attempt.damaged_bytes().empty() && !completed_;
@@ -293,7 +304,7 @@ void Outbox::on_failed(const Attempt& attempt, Verdict verdict) {
     if (attempt.echo().mismatch()) {
         ++symptoms.collided;
         symptoms.mute_in_a_row = 0;
-    } else if (verdict == Verdict::wrong || holds_own(frames)) {
+    } else if ((verdict == Verdict::wrong && !refused_late_) || holds_own(frames)) {
         ++symptoms.wrong;
         if (attempt.refused_other()) ++symptoms.wrong_exceptions;
     } else if (damaged && frames.empty()) {

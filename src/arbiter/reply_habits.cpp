@@ -122,8 +122,8 @@ void ReplyHabits::on_damaged_reply(OutstandingRequests& book, TimePoint now,
 void ReplyHabits::on_answered(OutstandingRequests& book, TimePoint now, const Attempt& attempt,
                               Duration waited) {
     const Group& group = attempt.group();
-    if (teaches_echo_of_writes(group.request) && !modbus::exception_of(attempt.reply()))
-        confirmation_ = attempt.reply();
+    if (group.request.access().write && teaches_echo_of_writes(group.request))
+        remember_confirmation(attempt.reply());
     proof_unanswered_ = false;
     late_.on_timely();
     reconnect_.on_replied(2 * waited <= late_.timeout());
@@ -132,6 +132,13 @@ void ReplyHabits::on_answered(OutstandingRequests& book, TimePoint now, const At
     settle(book, now, attempt);
     if (group.span && !modbus::exception_of(attempt.reply()))
         reads_.on_answered(group.request, *group.span);
+}
+
+void ReplyHabits::remember_confirmation(const Bytes& reply) {
+    if (modbus::exception_of(reply)) return;
+    const auto place = std::ranges::find_if(
+        confirmations_, [&](const Bytes& one) { return one.empty() || one[0] == reply[0]; });
+    if (place != confirmations_.end()) *place = reply;
 }
 
 /// A reply of `at` that was doubted has been checked.
@@ -211,7 +218,7 @@ ReplyHabits::Heard ReplyHabits::on_unsolicited(OutstandingRequests& book, TimePo
     const bool may_repeat =
         now < std::exchange(again_until_, TimePoint{}) || book.given(id_, now, pdu) != TimePoint{};
     if (modbus::exception_of(pdu)) book.on_refusal(id_, now, pdu);
-    if (asked && std::ranges::equal(pdu, confirmation_)) repeated_at_ = now;
+    if (asked && is_last_confirmation(pdu)) repeated_at_ = now;
     const bool is_surplus =
         done == Done::unasked || done == Done::second || done == Done::duplicate;
     if (is_surplus && follows_refusal(book, now, pdu)) {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/response.hpp"
 
@@ -241,7 +242,8 @@ void Arbiter::confirm(TimePoint now, const Group& group, ByteView reply, bool ec
 
 /// Where the place does not hold what was written (a command that resets itself), or cannot be
 /// read, only a line on which writes do not come back leaves no doubt: an adapter need not echo
-/// reads. A confirmation that repeats one was none where the place still holds what that confirmed.
+/// reads. A confirmation that repeats one was none where the place still holds what that confirmed;
+/// where the panel has just said one in place of another's it must hold what was written.
 bool Arbiter::is_confirmed(TimePoint now, const Group& group, ByteView reply, bool echoed) {
     const OutstandingRequests& book = stations_.book();
     const auto broadcast = book.behind_broadcast(group.doubted_at, group.confirms);
@@ -251,13 +253,14 @@ bool Arbiter::is_confirmed(TimePoint now, const Group& group, ByteView reply, bo
     if (broadcast && !holds && !modbus::exception_of(reply))
         habits.on_broadcast_answered(*broadcast, false);
     if (echo_memory_.comes_again(now, group.station) ||
-        habits.may_repeat_confirmation(now, group.confirms))
+        habits.may_repeat_confirmation(now, group.confirms, timing::kForgetDuplicates))
         return holds;
     const Asked* const earlier =
         habits.earlier_write(book, group.doubted_at, group.written, group.confirms);
-    if (broadcast || earlier == nullptr)
+    const bool repeats = earlier || habits.may_repeat_confirmation(now, group.confirms);
+    if (broadcast || !repeats)
         return !echoed && (holds || (echo_memory_.echoes_no_writes() && !broadcast));
-    const bool is_true = holds || !holds_written(earlier->pdu, reply);
+    const bool is_true = holds || !earlier || !holds_written(earlier->pdu, reply);
     habits.on_checked(book, group, is_true);
     return is_true;
 }
@@ -290,6 +293,7 @@ void Arbiter::ask_again(TimePoint now) {
     if (active_->answers().follows_early()) pace_.on_followed();
     active_->remember_doubt();
     Attempt attempt = take_active(now);
+    outbox_.on_doubted(now, attempt);
     outbox_.report(attempt, TransactionEnd::doubtful);
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);

@@ -60,6 +60,8 @@ class Outbox {
     void on_answered(TimePoint now, const Attempt& attempt, Duration think,
                      const Station::Replied& replied);
     void on_failed(const Attempt& attempt, Verdict verdict);
+    /// Its answer is asked for again, or a read is to show whether it was true.
+    void on_doubted(TimePoint now, const Attempt& attempt);
     /// Emits an event at most every 10 seconds: each would be a log line.
     void on_echo_mismatch(TimePoint now, std::uint8_t station);
     void on_echoed_again(std::uint8_t station) { ++symptoms_of(station).echoed_again; }
@@ -68,7 +70,10 @@ class Outbox {
     /// station asked last. Damage inside an attempt is counted there.
     void on_unsolicited(TimePoint now, const modbus::Unused& part, Done done, std::uint8_t asked,
                         Duration lateness = {});
-    void inside_attempt(bool inside) { inside_attempt_ = inside; }
+    void inside_attempt(bool inside) {
+        inside_attempt_ = inside;
+        refused_late_ = false;
+    }
 
     const LineCounters& line() const { return line_; }
     const std::map<std::uint8_t, StationCounters>& stations() const { return stations_; }
@@ -89,6 +94,7 @@ class Outbox {
     bool explain_ = false;
     modbus::CrcOrders orders_;
     bool inside_attempt_ = false;
+    bool refused_late_ = false;  ///< ... the refusal of an earlier request has come
     std::optional<TimePoint> reported_collision_;
     PoolDeque<Action> actions_;
     LineCounters line_;

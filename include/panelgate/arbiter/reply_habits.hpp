@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <optional>
 
@@ -112,11 +113,11 @@ class ReplyHabits {
     /// is no duplicate.
     bool may_be_duplicate(TimePoint now, const Attempt& attempt, const Claims& claims, bool early,
                           bool quicker) const;
-    /// True if this confirmation may be the last one once more, said instead of its own: the
-    /// station has done that with one that fitted no other write.
-    bool may_repeat_confirmation(TimePoint now, ByteView reply) const {
-        return repeated_at_ && now <= *repeated_at_ + timing::kForgetHabit &&
-               std::ranges::equal(reply, confirmation_);
+    /// True if this confirmation may be the last one of its function once more: in the last
+    /// `within` the station has said one instead of another's, which that did not fit.
+    bool may_repeat_confirmation(TimePoint now, ByteView reply,
+                                 Duration within = timing::kForgetHabit) const {
+        return repeated_at_ && now <= *repeated_at_ + within && is_last_confirmation(reply);
     }
     /// The write of other values that had this confirmation just before; null: none. A read tells
     /// whether the place still holds those.
@@ -196,6 +197,11 @@ class ReplyHabits {
     static constexpr int kClosedMemory = 8;  ///< response timeouts
 
   private:
+    void remember_confirmation(const Bytes& reply);
+    bool is_last_confirmation(ByteView pdu) const {
+        return std::ranges::any_of(confirmations_,
+                                   [&](const Bytes& one) { return std::ranges::equal(one, pdu); });
+    }
     void rest(const OutstandingRequests& book, TimePoint now);
     void rest_is_over(TimePoint not_before);
     Heard on_late(OutstandingRequests& book, TimePoint now, ByteView pdu, bool asked,
@@ -223,7 +229,8 @@ class ReplyHabits {
         bool refused = false;
         bool none = false;  ///< one had no answer
     } broadcast_;
-    Bytes confirmation_;                    ///< the last, of a write that is longer
+    /// The last one of each function whose writes are longer: 15, 16, 23.
+    std::array<Bytes, 3> confirmations_;
     std::optional<TimePoint> repeated_at_;  ///< when that came instead of another write's
     TimePoint not_before_{};                ///< duplicates may come, or the line was just opened
     TimePoint until_{};                     ///< outstanding replies may come; {}: none are

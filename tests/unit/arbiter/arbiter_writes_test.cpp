@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "arbiter_fixture.hpp"
+#include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 #include "support/request.hpp"
@@ -294,36 +295,61 @@ TEST_F(ArbiterBehindABroadcast, AStationThatHasAnsweredOneIsWaitedForAsForAnyOut
 }
 
 /// A panel that says its last confirmation once more instead of doing the next write.
-TEST_F(ArbiterTest, P8WhereConfirmationsComeAgainOneThatRepeatsTheLastIsReadBack) {
-    const auto write_to = [](unsigned at, unsigned value) {
-        return Writer().u8(16).u16(at).u16(1).u8(2).u16(value).take();
-    };
-    const auto said = [](unsigned at) { return Writer().u8(16).u16(at).u16(1).take(); };
-    const auto write = [&](unsigned at, unsigned value) {
+class ArbiterConfirmedAgain : public ArbiterTest {
+  protected:
+    ArbiterConfirmedAgain() {
+        for (unsigned i = 0; i < 20; ++i) {
+            bus.run_for(50ms);
+            bus.submit(17, read_at(i));
+            answer(bus, 17, reply_number(i), 12ms);
+        }
+    }
+    /// Register 1 or 2 is written, and the confirmation of the one to `said` comes.
+    Ticket write(unsigned at, unsigned value, unsigned said) {
         bus.run_for(1s);
-        const Ticket ticket = bus.submit(17, write_to(at, value));
+        const Ticket ticket =
+            bus.submit(17, Writer().u8(16).u16(at).u16(1).u8(2).u16(value).take());
+        answer(bus, 17, Writer().u8(16).u16(said).u16(1).take(), 12ms);
         return ticket;
-    };
-    for (unsigned i = 0; i < 20; ++i) {
-        bus.run_for(50ms);
-        bus.submit(17, read_at(i));
-        answer(bus, 17, reply_number(i), 12ms);
     }
-    write(1, 7);
-    answer(bus, 17, said(1), 12ms);
-    write(2, 8);
-    answer(bus, 17, said(1), 12ms);
-    bus.run_for(2s);
-    for (const unsigned held : {9u, 0u}) {
-        const Ticket ticket = write(1, 9);
-        answer(bus, 17, said(1), 12ms);
+    /// ... and is then found to hold this. Returns whether the write was confirmed.
+    bool is_confirmed(unsigned at, unsigned value, unsigned held) {
+        const Ticket ticket = write(at, value, at);
         EXPECT_FALSE(bus.answered(ticket));
-        ASSERT_TRUE(bus.next_sent(200ms));
-        EXPECT_EQ(bus.sent.back().adu, modbus::encode_adu(17, "03 00 01 00 01"_hex));
+        if (!bus.next_sent(200ms)) return false;
+        EXPECT_EQ(bus.sent.back().adu,
+                  modbus::encode_adu(17, Writer().u8(3).u16(at).u16(1).take()));
         answer(bus, 17, Writer().u8(3).u8(2).u16(held).take(), 12ms);
-        ASSERT_TRUE(bus.answered(ticket));
-        EXPECT_EQ(bus.answer(ticket).pdu.has_value(), held == 9);
+        EXPECT_TRUE(bus.answered(ticket));
+        return bus.answer(ticket).pdu.has_value();
     }
+};
+
+TEST_F(ArbiterConfirmedAgain, P8OneThatRepeatsTheLastIsReadBack) {
+    write(1, 7, 1);
+    write(2, 8, 1);
+    bus.run_for(2s);
+    EXPECT_TRUE(is_confirmed(1, 9, 9));
+    EXPECT_FALSE(is_confirmed(1, 9, 0));
+}
+
+/// ... a command that resets itself is not refused for ever.
+TEST_F(ArbiterConfirmedAgain, P3WhereThatShowsNothingItIsBelievedAgainAfterTwoMinutes) {
+    write(1, 7, 1);
+    write(2, 8, 1);
+    bus.run_for(timing::kForgetDuplicates);
+    EXPECT_TRUE(is_confirmed(1, 9, 0));
+}
+
+/// ... also where each function has a reply buffer of its own.
+TEST_F(ArbiterConfirmedAgain, P8TheLastOfEachFunctionMayComeAgain) {
+    write(1, 7, 1);
+    bus.run_for(1s);
+    bus.submit(17, "0F 00 05 00 01 01 01"_hex);
+    answer(bus, 17, "0F 00 05 00 01"_hex, 12ms);
+    write(2, 8, 1);
+    bus.run_for(2s);
+    EXPECT_FALSE(is_confirmed(1, 9, 0));
 }
 
 /// The same place is written again, with other values: its confirmation may be the last one's copy,

@@ -174,6 +174,16 @@ TEST_F(SymptomsTest, AnExceptionWithAnotherFunctionsNumberIsCountedBesides) {
     EXPECT_EQ(of(17).wrong_exceptions, 2u);
 }
 
+/// A write was given up, and its refusal ends the read behind it.
+TEST_F(SymptomsTest, ARefusalThatComesLateHasTheNumberOfItsOwnFunction) {
+    ask(17, kWrite, {});
+    ask(17, kRead, encode_adu(17, "86 02"_hex));
+    EXPECT_EQ(of(17).wrong, 0u);
+    EXPECT_EQ(of(17).wrong_exceptions, 0u);
+    EXPECT_EQ(of(17).disturbed, 1u);
+    EXPECT_EQ(of(17).attempts(), 2u);
+}
+
 TEST_F(SymptomsTest, APanelThatAnswersABroadcastIsNotUnsolicited) {
     ask(18, kRead, encode_adu(18, kReply));
     ask(0, kToAll, encode_adu(18, "10 00 64 00 01"_hex));
