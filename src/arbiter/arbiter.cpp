@@ -324,7 +324,7 @@ Attempt::Ends Arbiter::ends_attempt(TimePoint now) const {
 
 void Arbiter::hear_idle(TimePoint now, ByteView bytes) {
     quiet_.on_noise(now);
-    unsolicited_.hear(bytes);
+    unsolicited_.hear(now, bytes);
     if (unsolicited_.full()) judge_idle(now);
 }
 

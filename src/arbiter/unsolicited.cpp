@@ -27,17 +27,31 @@ bool is_request(ByteView adu) {
     return !fits_reply && modbus::request_adu_length(adu) == adu.size();
 }
 
+/// A frame whose last byte is 0 has a good CRC without it, too.
+bool lacks_last_byte(ByteView heard, ByteView frame) {
+    return heard.size() + 1 == frame.size() && std::ranges::equal(heard, frame.first(heard.size()));
+}
+
 bool is_exception(ByteView adu) { return modbus::exception_of(modbus::pdu_of(adu)).has_value(); }
 
 }  // namespace
 
-void UnsolicitedFrames::hear(ByteView bytes) {
+void UnsolicitedFrames::hear(TimePoint now, ByteView bytes) {
+    if (bytes.empty()) return;
+    if (idle_.empty()) arrivals_ = {};
     idle_.insert(idle_.end(), bytes.begin(), bytes.end());
+    arrivals_.add(now, bytes.size());
 }
 
 std::vector<Unused> UnsolicitedFrames::take(std::uint8_t asked) {
     if (serial_.mode == SerialMode::ascii) return take_delimited(asked, false);
-    return modbus::classify_heard(std::exchange(idle_, {}), asked, orders_);
+    std::vector<Unused> parts = modbus::classify_heard(std::exchange(idle_, {}), asked, orders_);
+    std::size_t behind = 0;
+    for (auto part = parts.rbegin(); part != parts.rend(); ++part) {
+        part->came = arrivals_.before(behind);
+        behind += part->bytes.size();
+    }
+    return parts;
 }
 
 std::vector<Unused> UnsolicitedFrames::take_delimited(std::uint8_t asked, bool good) {
@@ -54,9 +68,12 @@ std::vector<Unused> UnsolicitedFrames::joined(TimePoint now, std::vector<Unused>
         const bool first = whole.empty();
         whole.insert(whole.end(), part.bytes.begin(), part.bytes.end());
         const bool good = modbus::crc_ok(whole, orders_);
-        const Facts wanted = fact::own_frame | fact::request | fact::other_master | fact::repeats;
+        const Facts wanted = fact::own_frame | fact::request | fact::other_master | fact::repeats |
+                             fact::outstanding;
         if ((facts_of(now, whole, !good, stations) & wanted) != 0) {
+            const TimePoint came = part.came;
             if (!first) part = modbus::classify_frame(whole, part.station, good);
+            part.came = came;
         } else if (whole.size() < modbus::kMaxRtuAdu) {
             cut_ = std::move(whole);
         }
@@ -67,7 +84,8 @@ std::vector<Unused> UnsolicitedFrames::joined(TimePoint now, std::vector<Unused>
 Facts UnsolicitedFrames::facts_of(TimePoint now, ByteView adu, bool damaged,
                                   const Stations& stations) const {
     const bool begins = begins_with_request(adu, last_frame_, orders_);
-    const bool own = std::ranges::equal(adu, last_frame_) || is_own(now, adu);
+    const bool own = std::ranges::equal(adu, last_frame_) || is_own(now, adu) ||
+                     (!damaged && lacks_last_byte(adu, last_frame_));
     const Facts facts = when(own, fact::own_frame) |
                         when(begins && (damaged || is_request(adu)), fact::request) |
                         when(damaged, fact::damaged);
@@ -82,13 +100,14 @@ Facts UnsolicitedFrames::facts_of(TimePoint now, ByteView adu, bool damaged,
 
 void UnsolicitedFrames::note(TimePoint now, const std::vector<modbus::Unused>& parts, bool idle,
                              Stations& stations, Quiet& quiet, Outbox& outbox) {
-    const TimePoint heard_at = std::min(now, quiet.since());
     for (const Unused& part : parts) {
+        const TimePoint heard_at =
+            part.came != TimePoint{} ? part.came : std::min(now, quiet.since());
         const bool damaged = part.kind == Unused::Kind::damaged;
         const Done done = judge(facts_of(heard_at, part.bytes, damaged, stations));
         if (is_reply(done)) {
             const bool asked = !idle && part.station == quiet.station();
-            note_reply(now, part, done, asked, stations, quiet, outbox);
+            note_reply(now, heard_at, part, done, asked, stations, quiet, outbox);
             continue;
         }
         outbox.on_unsolicited(now, part, done, quiet.station());
@@ -108,9 +127,8 @@ void UnsolicitedFrames::note(TimePoint now, const std::vector<modbus::Unused>& p
 }
 
 /// A reply of a station that is not, or no longer, waited for.
-void UnsolicitedFrames::note_reply(TimePoint now, const Unused& part, Done done, bool asked,
-                                   Stations& stations, Quiet& quiet, Outbox& outbox) {
-    const TimePoint heard_at = std::min(now, quiet.since());
+void UnsolicitedFrames::note_reply(TimePoint now, TimePoint heard_at, const Unused& part, Done done,
+                                   bool asked, Stations& stations, Quiet& quiet, Outbox& outbox) {
     const Station::Heard heard = stations.of(part.station)
                                      .on_unsolicited_frame(stations.book(), heard_at, done,
                                                            modbus::pdu_of(part.bytes), asked);

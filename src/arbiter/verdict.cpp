@@ -52,7 +52,11 @@ void Arbiter::conclude(TimePoint now, Verdict verdict) {
     const std::vector<modbus::Unused> set_aside = active_->take_set_aside();
     outbox_.inside_attempt(true);
     if (verdict == Verdict::replied) settle(now);
+    const Duration usual = stations_.of(station).usual();
     note(now, unsolicited);
+    // A late one has shown that the station needs longer now.
+    if (const Duration longer = stations_.of(station).usual(); active_ && longer > usual)
+        active_->allow_for(longer + latency_);
     for (const modbus::Unused& part : set_aside)
         outbox_.on_unsolicited(now, part, Done::unasked, station);
     if (verdict == Verdict::doubtful) {
@@ -160,10 +164,11 @@ bool Arbiter::is_held(TimePoint now, const ReplyHabits& habits) const {
 }
 
 /// Returns true if it is the answer.
-bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
+bool Arbiter::takes_reply(TimePoint now, Station& station, bool early) {
     Attempt& attempt = *active_;
     const Facts facts = facts_of_reply(now, station, early);
     const Done done = judge(facts);
+    if ((facts & fact::overdue) != 0) station.on_doubted(attempt.waited(now));
     if (done == Done::contested) attempt.reject_contested();
     if (done == Done::reject) attempt.reject_reply();
     const auto keep = [&](Answers::Kept as) { attempt.keep_candidate(station.needed(), as); };
@@ -298,6 +303,7 @@ void Arbiter::ask_again(TimePoint now) {
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
     station.replies().on_doubted(stations_.book(), now, group, attempt.timing().sent);
+    if (!group.doubted.empty()) station.on_doubted(attempt.waited_for_doubted());
     station.on_kept(now, group.doubted_at);
     if (attempt.answers().contradicted()) station.replies().on_contradicted(now, group.doubts > 1);
     group.silent_after = group.cut_after = {};
@@ -339,7 +345,8 @@ void Arbiter::learn_from_failure(TimePoint now, const Attempt& attempt, Verdict 
     const modbus::Request& request = attempt.group().request;
     Station& station = stations_.of(attempt.group().station);
     OutstandingRequests& book = stations_.book();
-    if (attempt.came_damaged()) {
+    // Some panels repeat it at once, and a transport that stalls may hold that back.
+    if (attempt.came_damaged() && !settings_.may_stall) {
         station.replies().on_damaged_reply(book, now, request, attempt.timing().sent);
     } else if (!attempt.both_came()) {
         station.replies().on_unanswered(book, now, request.pdu(), attempt.timing().sent);
@@ -444,7 +451,7 @@ Attempt Arbiter::take_active(TimePoint now) {
     const bool keeps_pace = settings_.paced || pace_.believed();
     if (const auto noise = attempt.early_noise(); noise && keeps_pace)
         stations_.on_trail(*noise, unsolicited_.replied_before());
-    unsolicited_.hear(attempt.release_pending());
+    unsolicited_.hear(attempt.last_byte(), attempt.release_pending());
     return attempt;
 }
 

@@ -98,6 +98,8 @@ class Station {
     /// reply; `think`: without the silence by which the panel detects the end of the request.
     Replied on_reply(OutstandingRequests& book, TimePoint now, const Attempt& attempt,
                      Duration waited, Duration think);
+    /// An answer that was doubted came so long after the request: the next one may.
+    void on_doubted(Duration waited) { times_.add_long(waited); }
     /// The reply to a failed attempt broke off for so long.
     void on_broken_reply(TimePoint now, Duration pause) {
         hole_.on_broken(now, pause, settings_.response_timeout);

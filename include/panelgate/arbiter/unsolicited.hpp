@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "panelgate/arbiter/attempt/arrivals.hpp"
 #include "panelgate/arbiter/book/judge.hpp"
 #include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/arbiter/habits/echo.hpp"
@@ -64,7 +65,7 @@ class UnsolicitedFrames {
     }
 
     /// Unsolicited bytes (MST-04): counted, never matched with a later request.
-    void hear(ByteView bytes);
+    void hear(TimePoint now, ByteView bytes);
     bool pending() const { return !idle_.empty(); }
     /// True if that has begun with the last answer's header, and is shorter: the rest may follow a
     /// hole. Fewer bytes may be left of an echo.
@@ -97,15 +98,16 @@ class UnsolicitedFrames {
 
   private:
     Facts facts_of(TimePoint now, ByteView adu, bool damaged, const Stations& stations) const;
-    static void note_reply(TimePoint now, const modbus::Unused& part, Done done, bool asked,
-                           Stations& stations, Quiet& quiet, Outbox& outbox);
+    static void note_reply(TimePoint now, TimePoint heard_at, const modbus::Unused& part, Done done,
+                           bool asked, Stations& stations, Quiet& quiet, Outbox& outbox);
     void let_reply_pass(TimePoint now, ByteView request, const Stations& stations,
                         Quiet& quiet) const;
 
     SerialFormat serial_;
     modbus::CrcOrders orders_;
     Bytes idle_;
-    Bytes cut_;  ///< the last damaged bytes, which may go on
+    Arrivals arrivals_;  ///< of those
+    Bytes cut_;          ///< the last damaged bytes, which may go on
     Bytes last_frame_;
     Bytes frame_before_;  ///< if it was answered
     LateEcho late_echo_;

@@ -7,6 +7,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/pool.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::modbus {
@@ -34,6 +35,7 @@ struct Unused {
     Kind kind = Kind::damaged;
     std::uint8_t station = 0;  ///< of a valid frame
     Bytes bytes;
+    TimePoint came{};  ///< its last byte, if that is known
 };
 
 /// Finds the reply to one request in the bytes received after it. Lives for one attempt. Function

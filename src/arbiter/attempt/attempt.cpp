@@ -93,6 +93,7 @@ std::size_t Attempt::missing() const {
 Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     const bool was_complete = echo_.complete();
     const TimePoint before = std::exchange(buffered_at_, now);
+    const std::size_t last = std::exchange(buffered_last_, bytes.size());
     ByteView rest = echo_.feed(bytes);
     if (echo_.complete() && !was_complete) {
         pace_.restart(now, rest.size());
@@ -111,7 +112,7 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     append_up_to(modbus::kReadRequestAdu, first_heard_, rest);
     heard_size_ += rest.size();
     if (now < timing_.sent && !comes_back(rest)) early_ = now;
-    rest = drop_stale(now, before, rest, std::min(rest.size(), bytes.size()));
+    rest = drop_stale(now, before, rest, std::min(rest.size(), bytes.size()), last);
     if (rest.empty()) return Verdict::open;
     drop_what_ended(now, rest.size());
     const bool anew = std::exchange(begins_anew_, false);
@@ -124,14 +125,17 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
             std::max(longest_pause_, now - wire_time(timing_.serial, rest.size()) - last_byte_);
     heard_ = true;
     last_byte_ = now;
+    arrivals_.add(now, rest.size());
     return feed(rest, ends);
 }
 
 /// Returns the bytes that may be of a reply. All but the last `fresh` the echo filter gives back:
-/// they came `before`, and are the beginning of our own frame.
-ByteView Attempt::drop_stale(TimePoint now, TimePoint before, ByteView bytes, std::size_t fresh) {
+/// they came `before`, `last` of them at once, and are the beginning of our own frame.
+ByteView Attempt::drop_stale(TimePoint now, TimePoint before, ByteView bytes, std::size_t fresh,
+                             std::size_t last) {
     const std::size_t given_back = bytes.size() - fresh;
     std::size_t stale = given_back > 0 && is_stale(before, given_back) ? given_back : 0;
+    if (stale > last && !is_stale(before, last)) stale -= last;  // the reply's beginning
     if (fresh > 0 && is_stale(now, fresh)) {
         disturbed_ = true;
         // The reply may have begun behind what continues our own frame.
@@ -191,7 +195,9 @@ Verdict Attempt::believe() {
 }
 
 Verdict Attempt::accept(std::optional<Bytes> reply) {
-    const std::size_t behind = collect();
+    reply_came_ = last_byte_;
+    const bool fed = reply && !own_.borrowed;
+    const std::size_t behind = collect(fed ? reply->size() + modbus::kAduOverhead : 0);
     if (!reply) return Verdict::open;
     if (own_.may_be_echo(echo_, *reply)) return Verdict::open;
     Answers::Others others = take_others(*reply, behind);
@@ -273,9 +279,24 @@ void Attempt::judge_unsolicited(std::size_t from, const Ends& ends) {
     }
 }
 
-std::size_t Attempt::collect() {
+/// Notes when these parts came, and the reply between them.
+void Attempt::date(std::vector<Unused>& parts, std::size_t behind, std::size_t reply) {
+    std::size_t rest = framer_.pending().size();
+    for (std::size_t i = parts.size() + 1; i-- > 0;) {
+        if (reply > 0 && i + behind == parts.size()) {
+            reply_came_ = std::max(timing_.sent, arrivals_.before(rest));
+            rest += reply;
+        }
+        if (i == 0) break;
+        parts[i - 1].came = std::max(timing_.sent, arrivals_.before(rest));
+        rest += parts[i - 1].bytes.size();
+    }
+}
+
+std::size_t Attempt::collect(std::size_t reply) {
     const std::size_t behind = framer_.parts_behind();
     std::vector<Unused> parts = framer_.take_unused();
+    date(parts, behind, reply);
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const bool foreign = begins_with_request(parts[i].bytes, echo_.frame(), orders_);
         const bool in_front = i + behind < parts.size();
@@ -361,9 +382,11 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
 Verdict Attempt::take_from_echo(const Ends& ends) {
     const Bytes released = echo_.release();
     if (released.empty()) return Verdict::open;
-    if (drop_stale(buffered_at_, buffered_at_, released, 0).empty()) return Verdict::open;
+    const ByteView rest = drop_stale(buffered_at_, buffered_at_, released, 0, buffered_last_);
+    if (rest.empty()) return Verdict::open;
     heard_ = true;
-    return feed(released, ends);
+    arrivals_.add(buffered_at_, rest.size());
+    return feed(rest, ends);
 }
 
 Verdict Attempt::on_frame_end(bool good, const Ends& ends) {
@@ -397,9 +420,8 @@ void Attempt::teach(EchoMemory& memory) const {
 
 Duration Attempt::waited(TimePoint now) const {
     if (pace_.is_shorter()) return std::max(first_byte_ - timing_.sent, Duration::zero());
-    const Duration frame = frame_time(timing_.serial, reply().size() + modbus::kAduOverhead);
     const auto& before = answers_.in_time();
-    return std::max((before ? before->came : now) - timing_.sent - frame, Duration::zero());
+    return waited_for(before ? before->came : std::min(now, reply_came_), reply());
 }
 
 TimePoint Attempt::first_byte() const {
@@ -456,7 +478,7 @@ void Attempt::reject_reply() {
 }
 
 void Attempt::keep_candidate(Duration needed, Answers::Kept kind) {
-    answers_.keep(kind, {first_byte_, last_byte_});
+    answers_.keep(kind, {first_byte_, std::min(last_byte_, reply_came_)});
     timing_.usual = std::min(timing_.usual, needed);
     // The reply that the duplicate has delayed comes after it.
     if (answers_.is_doubted() || kind == Answers::Kept::held)

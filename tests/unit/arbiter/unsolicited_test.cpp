@@ -41,7 +41,7 @@ class UnsolicitedFramesTest : public testing::Test {
     std::string heard(const Bytes& bytes, bool idle = false) {
         now += 1s;
         quiet.on_noise(now);
-        unsolicited.hear(bytes);
+        unsolicited.hear(now, bytes);
         unsolicited.note(now, unsolicited.take(17), idle, stations, quiet, outbox);
         EXPECT_FALSE(unsolicited.pending());
         std::string words;
@@ -87,6 +87,33 @@ TEST_F(UnsolicitedFramesTest, AreClassifiedAndCounted) {
     EXPECT_EQ(counters().symptoms.strays, 1u);
     EXPECT_EQ(counters().discarded_bytes, discarded + 3);
     EXPECT_EQ(heard(Writer().raw(encode_adu(99, kReply)).u8(0xFF).take()), "foreign damaged");
+}
+
+/// An adapter that lets all but its last byte through: the CRC of the rest is good where that is 0.
+TEST_F(UnsolicitedFramesTest, OurOwnFrameWithoutALast0IsNoReply) {
+    Bytes own = encode_adu(17, kRead);
+    for (unsigned address = 0; own.back() != 0 && address < 0x10000; ++address)
+        own = encode_adu(17, Writer().u8(3).u16(address).u16(4).take());
+    ASSERT_EQ(own.back(), 0);
+    unsolicited.on_sent(now, own);
+    own.pop_back();
+    EXPECT_FALSE(is_wrong_reply(own));
+    EXPECT_EQ(heard(own), "echo");
+}
+
+TEST_F(UnsolicitedFramesTest, ALateReplyThatAPauseHasCutIsWhole) {
+    stations.of(17).replies().on_unanswered(stations.book(), now, kRead, now - 500ms);
+    const auto joined = [&](ByteView bytes) {
+        unsolicited.hear(now, bytes);
+        return unsolicited.joined(now, unsolicited.take(17), stations);
+    };
+    const ByteView whole = kAnswer;
+    EXPECT_EQ(joined(whole.first(6)).front().kind, modbus::Unused::Kind::damaged);
+    const auto parts = joined(whole.subspan(6));
+    ASSERT_EQ(parts.size(), 1u);
+    EXPECT_EQ(parts[0].bytes, kAnswer);
+    unsolicited.note(now, parts, true, stations, quiet, outbox);
+    EXPECT_EQ(counters().late_frames, 1u);
 }
 
 TEST_F(UnsolicitedFramesTest, BehindAnotherMastersRequestTheLineRestsForItsReply) {
@@ -138,10 +165,10 @@ TEST_F(UnsolicitedFramesTest, AReplyToABroadcastIsOneForSeconds) {
 
 TEST_F(UnsolicitedFramesTest, GathersNoMoreThanAnyFrameHas) {
     EXPECT_FALSE(unsolicited.pending());
-    unsolicited.hear(Bytes(modbus::ReplyFramer::kMaxHeard, 0xFF));
+    unsolicited.hear(now, Bytes(modbus::ReplyFramer::kMaxHeard, 0xFF));
     EXPECT_TRUE(unsolicited.pending());
     EXPECT_FALSE(unsolicited.full());
-    unsolicited.hear("FF"_hex);
+    unsolicited.hear(now, "FF"_hex);
     EXPECT_TRUE(unsolicited.full());
     unsolicited.forget();
     EXPECT_FALSE(unsolicited.pending());

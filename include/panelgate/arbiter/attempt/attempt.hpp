@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "panelgate/arbiter/attempt/answers.hpp"
+#include "panelgate/arbiter/attempt/arrivals.hpp"
 #include "panelgate/arbiter/attempt/group.hpp"
 #include "panelgate/arbiter/habits/echo.hpp"
 #include "panelgate/arbiter/habits/input_pace.hpp"
@@ -130,6 +131,11 @@ class Attempt {
     /// The whole reply PDU.
     const Bytes& reply() const { return answers_.reply(); }
     const Answers& answers() const { return answers_; }
+    /// The reply may need longer than was thought when the request left.
+    void allow_for(Duration longer) {
+        timing_.usual = std::max(timing_.usual, longer);
+        timing_.patience = std::max(timing_.patience, longer);
+    }
     /// The candidate began before the request had left.
     void mark_early() { answers_.mark_early(); }
     /// True if its first byte came before the computed end of the request. Noise in front of it
@@ -139,10 +145,13 @@ class Attempt {
     bool replied_too_early() const { return replied_early() && first_byte_ < earliest_end(); }
     /// When the reply came that is judged now: before, if it was a candidate.
     TimePoint came_at(TimePoint now) const {
-        return answers_.in_time() && !answers_.first_came() ? answers_.in_time()->came : now;
+        return answers_.in_time() && !answers_.first_came() ? answers_.in_time()->came
+                                                            : std::min(now, reply_came_);
     }
     /// Time from the end of the request to the start of the reply, whose last byte came now.
     Duration waited(TimePoint now) const;
+    /// ... of the candidate that its group doubts now.
+    Duration waited_for_doubted() const { return waited_for(group_.doubted_at, group_.doubted); }
     /// Time from the end of the request to the first sign of a reply, as received: adapters buffer
     /// bytes.
     Duration first_sign(TimePoint now) const {
@@ -265,9 +274,14 @@ class Attempt {
         unrelated,  ///< of another function: perhaps babble, and the reply has its usual time
         reply,      ///< it has said something else
     };
+    Duration waited_for(TimePoint came, const Bytes& reply) const {
+        const Duration frame = frame_time(timing_.serial, reply.size() + modbus::kAduOverhead);
+        return std::max(came - timing_.sent - frame, Duration::zero());
+    }
     void drop_what_ended(TimePoint now, std::size_t size);
     bool comes_back(ByteView bytes);
-    ByteView drop_stale(TimePoint now, TimePoint before, ByteView bytes, std::size_t fresh);
+    ByteView drop_stale(TimePoint now, TimePoint before, ByteView bytes, std::size_t fresh,
+                        std::size_t last);
     Verdict hear(TimePoint now, ByteView bytes, const Ends& ends);
     /// Bytes until the frame that has begun can be judged. 0: each may decide.
     std::size_t missing() const;
@@ -290,8 +304,9 @@ class Attempt {
         return modbus::encode_adu(group_.station, reply, orders_.of(group_.station));
     }
     void judge_unsolicited(std::size_t from, const Ends& ends);
-    /// Returns how many of the parts follow the reply.
-    std::size_t collect();
+    /// Returns how many of the parts follow the reply, which has so many bytes.
+    std::size_t collect(std::size_t reply = 0);
+    void date(std::vector<modbus::Unused>& parts, std::size_t behind, std::size_t reply);
     void on_frame_in_front();
     void on_own_frame(bool in_front);
     bool is_hold_over() const;
@@ -321,11 +336,14 @@ class Attempt {
     Bytes stale_;
     Bytes first_heard_;           ///< the first bytes behind the echo, stale or not
     std::size_t heard_size_ = 0;  ///< of all of them
+    Arrivals arrivals_;           ///< of what was fed to the framer
+    TimePoint reply_came_{};
     InputPace pace_;
     TimePoint computed_end_;
     TimePoint first_byte_;
     std::optional<TimePoint> echo_since_;  ///< when the echo filter buffered its first byte
     TimePoint buffered_at_{};              ///< ... its last
+    std::size_t buffered_last_ = 0;        ///< ... so many with that
     std::optional<TimePoint> early_;
     TimePoint last_byte_;
     Duration longest_pause_{};

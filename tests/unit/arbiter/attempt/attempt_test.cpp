@@ -83,6 +83,31 @@ TEST_F(AttemptTest, AHoleInAReplyIsWaitedForAndALongerOneMakesItDamage) {
     EXPECT_EQ(run_to_verdict(), Verdict::damaged);
 }
 
+/// A line that nobody drives: what stands in it may be a part of another's frame, until that has
+/// had the time to come.
+TEST_F(AttemptTest, AReplyInAHumHasComeWhenItsBytesHaveNotWhenItIsBelieved) {
+    EXPECT_EQ(hear(29ms, "12 03 40 00"_hex), Verdict::open);
+    EXPECT_EQ(hear(30ms, kReplyAdu), Verdict::open) << "perhaps data of another frame";
+    Verdict verdict = Verdict::open;
+    Duration after = 30ms;
+    while (verdict == Verdict::open && after < 300ms) verdict = hear(after += 1500us, "00"_hex);
+    ASSERT_EQ(verdict, Verdict::replied);
+    EXPECT_GT(after, 100ms);
+    const TimePoint now = attempt_.timing().sent + after;
+    EXPECT_EQ(attempt_.came_at(now), attempt_.timing().sent + 30ms);
+    EXPECT_LT(attempt_.waited(now), 30ms);
+    const auto parts = attempt_.take_unsolicited();
+    ASSERT_EQ(parts.size(), 2u) << "before it and behind it";
+    EXPECT_EQ(parts[0].came, attempt_.timing().sent + 29ms);
+    EXPECT_EQ(parts[1].came, now);
+}
+
+TEST_F(AttemptTest, IsWaitedForLongerWhereItsStationIsSeenToNeedThat) {
+    attempt_.allow_for(600ms);
+    EXPECT_EQ(run_to_verdict(), Verdict::silent);
+    EXPECT_EQ(ended_, Duration(600ms));
+}
+
 TEST_F(AttemptTest, WhatComesBackWhileItLeavesIsNoNoiseBehindTheLastReply) {
     const Bytes frame = encode_adu(kStation, kRead);
     attempt_ = Attempt(group_of(kStation, kRead), timing_of(100ms),
