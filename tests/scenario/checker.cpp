@@ -18,10 +18,9 @@ Checker::Checker(const Plan& plan)
       calm_(plan.is_calm()),
       adaptive_(
           std::ranges::any_of(settings_.stations, &arbiter::StationSettings::adaptive_timeout)),
-      repeats_requests_(std::ranges::any_of(
-          plan.panels, [](const PanelPlan& p) { return p.repeats_request > 0; })),
       echoes_(plan.line.echo || plan.line.echo_writes || plan.line.partial_echo > 0 ||
-              repeats_requests_),
+              std::ranges::any_of(plan.panels,
+                                  [](const PanelPlan& p) { return p.repeats_request > 0; })),
       watch_(plan_),
       costs_(plan_, watch_) {
     for (const arbiter::StationSettings& station : settings_.stations) {
@@ -66,12 +65,19 @@ bool Checker::may_be_echo(std::uint8_t station) const {
            modbus::normal_write_reply(asked->second) == asked->second;
 }
 
+/// The last answer that was heard of it before `since` equalled its request.
+bool Checker::was_like_echo(std::uint8_t station, TimePoint since) const {
+    const auto unlike = unlike_echo_.find(station);
+    return said_.contains(station) && (unlike == unlike_echo_.end() || unlike->second > since);
+}
+
 void Checker::on_refused(TimePoint now, const arbiter::Job& job, Fault fault) {
     const Client& client = clients_[job.client];
     // A late reply is told from what may follow it by a silence.
     constexpr Duration kSilence = 50ms;
     if (fault == Fault::offline && watch_.is_good(job.station, now - kSilence) &&
-        !may_be_echo(job.station))
+        !was_like_echo(job.station, now - kSilence) &&
+        !is_only_overdue(job.station, now - kSilence))
         fail("P4: a good station was refused as offline: " + std::to_string(job.station));
     if (fault != Fault::busy) return;
     if (client.polite) fail("P9: a polite client was refused");
@@ -155,6 +161,12 @@ bool Checker::is_overdue(TimePoint now, std::uint8_t station) const {
     const TimePoint came = attempt_.answered && replied != replied_.end() ? replied->second : now;
     return attempt_.station == station && (!attempt_.trusted || attempt_.owed) &&
            came > attempt_.sent + attempt_.needed;
+}
+
+/// It was, each time that it did not answer, and was not heard before `since`.
+bool Checker::is_only_overdue(std::uint8_t station, TimePoint since) const {
+    const auto found = missed_.find(station);
+    return found != missed_.end() && found->second.only_overdue && since <= found->second.heard;
 }
 
 /// A sound panel's requests do not fail, unless something hit them.

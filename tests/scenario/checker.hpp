@@ -51,7 +51,7 @@ class Checker : public Witness {
     void on_exception(TimePoint now, std::uint8_t station, ByteView pdu) override {
         truth_.on_exception(now, station, pdu);
     }
-    void on_copy(TimePoint now, std::uint8_t station) override;
+    void on_copy(TimePoint now, ByteView adu) override;
     void on_imitation(std::uint8_t station) override {
         attempt_.imitated =
             attempt_.imitated || (!attempt_.answered && attempt_.station == station);
@@ -121,6 +121,7 @@ class Checker : public Witness {
     // What may be sent when (checker_wire.cpp)
     void check_moment(TimePoint now);
     void check_idling(TimePoint now);
+    bool may_have_echo() const;
     bool looks_late(std::uint8_t station) const;
     void check_write_sent(std::uint8_t station, ByteView pdu);
     void check_again(std::uint8_t station, ByteView pdu, FrameKind what);
@@ -140,6 +141,7 @@ class Checker : public Witness {
     void mark_answered(std::uint8_t station);
     bool joins_attempt(TimePoint now, const arbiter::Job& job) const;
     std::size_t waiting() const;
+    bool rests_behind_damage(std::uint8_t station, TimePoint since) const;
     void check_turn(TimePoint now, bool write);
     // What may be answered (checker.cpp)
     void check_reply(TimePoint now, const Open& open, const arbiter::Finish& finish);
@@ -150,7 +152,9 @@ class Checker : public Witness {
     void check_write(TimePoint now, const Open& open, const Bytes& reply);
     void check_fault(TimePoint now, const Open& open, Fault fault);
     bool may_be_echo(std::uint8_t station) const;
+    bool was_like_echo(std::uint8_t station, TimePoint since) const;
     bool is_overdue(TimePoint now, std::uint8_t station) const;
+    bool is_only_overdue(std::uint8_t station, TimePoint since) const;
     void check_in_time(TimePoint now, const Open& open, const arbiter::Finish& finish);
     Duration gap() const;
 
@@ -158,8 +162,7 @@ class Checker : public Witness {
     const arbiter::Settings& settings_;
     bool calm_ = false;
     bool adaptive_ = false;
-    bool repeats_requests_ = false;  ///< one panel says them as an adapter does that hears itself
-    bool echoes_ = false;
+    bool echoes_ = false;  ///< or one panel repeats requests, as an adapter does that hears itself
     std::string violation_;
     Truth truth_;
     Watch watch_;
@@ -174,14 +177,25 @@ class Checker : public Witness {
     std::map<std::string, int> written_;             ///< times that each write was on the wire
     std::unordered_set<std::string> closed_writes_;  ///< answered, or of nobody any more
     std::map<std::string, arbiter::Ticket> open_writes_;
-    std::unordered_set<std::uint8_t> repeat_writes_;  ///< stations that allow it
-    std::unordered_set<std::uint8_t> doublers_;       ///< that were heard to say a reply twice
-    std::map<std::uint8_t, TimePoint> replied_;       ///< each station, the last time
-    std::map<std::uint8_t, Duration> begun_after_;    ///< a request: the latest begin of a reply
-    std::map<std::uint8_t, Order> orders_;            ///< of those who do not serve in turn
-    std::unordered_set<std::uint8_t> overtakers_;     ///< of them, who have shown so
-    std::unordered_set<std::uint8_t> retried_;        ///< whose last request was a retry
-    std::map<std::uint8_t, Bytes> asked_;             ///< what each station was asked last
+    std::unordered_set<std::uint8_t> repeat_writes_;   ///< stations that allow it
+    std::unordered_set<std::uint8_t> doublers_;        ///< that have said a reply twice
+    std::unordered_set<std::uint8_t> known_doublers_;  ///< ... and were heard to, both times
+    std::map<std::uint8_t, TimePoint> replied_;        ///< each station, the last time
+    std::map<std::uint8_t, Bytes> said_;               ///< its last answer that was heard whole
+    std::map<std::uint8_t, TimePoint> unlike_echo_;    ///< the first that no request equals, since
+    std::map<std::uint8_t, Duration> begun_after_;     ///< a request: the latest begin of a reply
+    std::map<std::uint8_t, Order> orders_;             ///< of those who do not serve in turn
+    std::unordered_set<std::uint8_t> overtakers_;      ///< of them, who have shown so
+    std::unordered_set<std::uint8_t> retried_;         ///< whose last request was a retry
+    struct Missed {
+        bool only_overdue = true;            ///< each time
+        TimePoint heard = TimePoint::max();  ///< the first answer since then
+    };
+    /// Until when an answer may be said again that came behind as many other bytes: perhaps it was
+    /// one of them, damaged.
+    std::map<std::uint8_t, TimePoint> behind_damage_;
+    std::map<std::uint8_t, Missed> missed_;  ///< stations that have failed, and not answered since
+    std::map<std::uint8_t, Bytes> asked_;    ///< what each station was asked last
     std::map<Bytes, TimePoint> spread_;  ///< when broadcasts had left, by what would answer them
     std::map<std::uint8_t, TimePoint> excused_from_;  ///< see on_copy()
     /// Until when the reply may come that a refusal for being busy has announced, by the station

@@ -44,12 +44,21 @@ void Checker::on_heard(TimePoint now, std::size_t bytes) {
     if (first > std::max(heard_until_, sent_until_) + gap()) noisy_since_ = first;
     heard_until_ = now;
     attempt_.heard = true;
+    attempt_.bytes += bytes;
 }
 
 void Checker::on_answered(TimePoint now, std::uint8_t station) {
     on_heard(now, 1);
-    if (attempt_.answered || attempt_.station != station) return;
+    const auto missed = missed_.find(station);
+    if (missed != missed_.end()) missed->second.heard = std::min(missed->second.heard, now);
+    const auto said = said_.find(station);
+    const bool is_its =
+        said == said_.end() || modbus::answers(asked_[station], modbus::pdu_of(said->second));
+    if (attempt_.answered || attempt_.station != station || !is_its) return;
     attempt_.answered = true;
+    if (said != said_.end() && attempt_.bytes > said->second.size())
+        behind_damage_[station] = now + 150ms;
+    missed_.erase(station);
     silent_before_[station] = false;
     replied_[station] = now;
     const auto size = modbus::reply_length_from_request(asked_[station]).value_or(0);
@@ -64,14 +73,19 @@ void Checker::on_answered(TimePoint now, std::uint8_t station) {
     if (watch_.is_good(attempt_.station, now)) costs_.on_answered(now, attempt_);
 }
 
-/// A copy tells that this station says its replies twice: but not one behind a retry, which may be
-/// the reply to that. The first one that comes in place of the answer to another request is found
-/// by asking once more. Where the very same is asked again it is that answer for any gateway, and
-/// what it has displaced comes one late: see open.hpp.
-void Checker::on_copy(TimePoint now, std::uint8_t station) {
+/// A copy tells that this station says its replies twice: but not one of a reply that nobody has
+/// heard whole, which is the reply, nor one behind a retry, which may be the reply to that. The
+/// first one that comes in place of the answer to another request is found by asking once more.
+/// Where the very same is asked again it is that answer for any gateway, and what it has displaced
+/// comes one late: see open.hpp.
+void Checker::on_copy(TimePoint now, ByteView adu) {
+    const std::uint8_t station = adu[0];
     const bool awaited = !attempt_.answered && attempt_.station == station;
     if (!awaited && retried_.contains(station)) return;
-    if (!doublers_.insert(station).second || !awaited) return;
+    doublers_.insert(station);
+    const auto said = said_.find(station);
+    if (said == said_.end() || !std::ranges::equal(said->second, adu)) return;
+    if (!known_doublers_.insert(station).second || !awaited) return;
     ++first_copies_;
     if (!attempt_.same) return;
     ++excused_;
@@ -83,6 +97,12 @@ void Checker::on_copy(TimePoint now, std::uint8_t station) {
 /// it has displaced, and that comes one late.
 void Checker::on_reply(TimePoint now, ByteView adu, bool overtaken) {
     const std::uint8_t station = adu[0];
+    said_[station].assign(adu.begin(), adu.end());
+    if (adu[1] == modbus::kWriteSingleCoil || adu[1] == modbus::kWriteSingleRegister) {
+        unlike_echo_.erase(station);
+    } else {
+        unlike_echo_.try_emplace(station, now);
+    }
     const auto order = orders_.find(station);
     if (order == orders_.end()) return;
     const bool is_last =
@@ -130,6 +150,7 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     attempt_.answered = station == kBroadcast;
     attempt_.first = false;
     attempt_.heard = false;
+    attempt_.bytes = 0;
     attempt_.imitated = false;
     attempt_.span = test::read_span(station, pdu);
     attempt_.again = what == FrameKind::retry;
@@ -183,6 +204,8 @@ Duration Checker::least_wait() const {
 
 void Checker::close_attempt(TimePoint now) {
     if (attempt_.answered) return;
+    Missed& missed = missed_[attempt_.station];
+    missed.only_overdue = missed.only_overdue && is_overdue(now, attempt_.station);
     const Duration cost = now - attempt_.started;
     const bool wanted = good_work_since(attempt_.started) == attempt_.started;
     const bool plain = calm_ && watch_.only_dies(attempt_.station) && !attempt_.heard;
@@ -223,10 +246,9 @@ void Checker::check_idling(TimePoint now) {
     const Duration slack = 25ms + (60ms + frame_time(settings_.serial, kReply)) * 5 / 4;
     // An answer that repeats another one may be held back for as long as its station needs: it
     // could be a copy of that, with its own still to come (P1). Values are not handed on then, but
-    // asked for once more. So may a station's very first that
-    // equals its request, for a timeout: it could be the echo (P8); so could each, until replies of
-    // others have shown that only one panel repeats requests.
-    const bool is_echo = (attempt_.first || repeats_requests_) && told_ < heard_until_;
+    // asked for once more. So may one that equals its request, for a timeout, where it could be
+    // the echo (P8).
+    const bool is_echo = may_have_echo() && may_be_echo(attempt_.station) && told_ < heard_until_;
     const Duration needs = is_echo ? settings_of(attempt_.station).response_timeout
                                    : watch_.own_slowest(attempt_.station);
     const TimePoint held = heard_until_ + needs + 20ms;
@@ -248,6 +270,17 @@ void Checker::check_idling(TimePoint now) {
     if (calm_ && idle > most)
         fail("P5: the line was silent for " + std::to_string(idle / 1ms) +
              " ms while a request waited");
+}
+
+/// For all that anybody can know, what was sent last may come back: it does, at times, or in part;
+/// or its station has not answered before; or says its address and function in front of its
+/// replies, like an adapter that hears the beginning of what it sends, until as many answers have
+/// come as show that there is none.
+bool Checker::may_have_echo() const {
+    constexpr std::uint64_t kEnough = 16;
+    const auto panel = std::ranges::find(plan_.panels, attempt_.station, &PanelPlan::id);
+    const bool begins_twice = panel != plan_.panels.end() && panel->fragment > 0;
+    return attempt_.first || echoes_ || (begins_twice && good_ < kEnough);
 }
 
 /// It says replies of other lengths than were asked for.

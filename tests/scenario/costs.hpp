@@ -21,6 +21,7 @@ struct Attempt {
     bool answered = true;
     bool first = false;     ///< by the first answer of its station
     bool heard = false;     ///< anything
+    std::size_t bytes = 0;  ///< that were heard in it, before the last ones of its answer
     bool again = false;     ///< it was on the wire before
     bool same = false;      ///< its station was asked the very same before
     bool owed = false;      ///< an earlier one may still be answered

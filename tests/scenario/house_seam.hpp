@@ -25,7 +25,7 @@ class HouseJudge final : public Witness {
     void on_exception(TimePoint now, std::uint8_t station, ByteView pdu) override {
         truth_.on_exception(now, station, pdu);
     }
-    void on_copy(TimePoint, std::uint8_t) override {}
+    void on_copy(TimePoint, ByteView) override {}
     void on_imitation(std::uint8_t) override {}
     void on_reply(TimePoint, ByteView, bool) override {}
     void on_said(TimePoint now, ByteView bytes) override { truth_.on_said(now, bytes); }

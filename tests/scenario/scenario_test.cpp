@@ -184,6 +184,25 @@ constexpr BrokenOnce kBrokenOnce[] = {
     {Kind::company, 195},
     // The first byte of a reply was read together with the end of an echo.
     {Kind::receiver, 186},
+    // What lay in a hum was taken to have come when that ended: replies, and copies.
+    {Kind::company, 220},
+    {Kind::company, 738},
+    {Kind::company, 1490},
+    // The beginning of our own frame had a good CRC: it lacked a last 0.
+    {Kind::receiver, 735},
+    {Kind::receiver, 2016},
+    // An answer that was doubted showed that its panel needed longer, and the next one had no more.
+    {Kind::receiver, 705},
+    // ... so did one that may have been to an earlier request, ...
+    {Kind::company, 1498},
+    {Kind::receiver, 1481},
+    // ... and one that came late, while the next one was awaited.
+    {Kind::receiver, 851},
+    // The reply began with the byte that our own frame, of which a part came back, went on with.
+    {Kind::receiver, 1950},
+    // The first copy that was heard was of a reply that had come damaged.
+    {Kind::receiver, 883},
+    {Kind::voices, 1503},
 };
 
 TEST(Scenario, SeedsThatOnceBrokeAPromiseKeepThemAll) {

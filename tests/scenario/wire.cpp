@@ -156,12 +156,11 @@ void Wire::deliver(const FramePtr& frame, std::size_t from, std::size_t to) {
             .subspan(whole.answer_from, whole.answer_to - whole.answer_from);
     };
     const bool ends = to == frame->bytes.size() && !frame->garbled_from;
-    const auto its = [&](bool is) { return ends && is ? frame->station : std::uint8_t{0}; };
     arrive({{part.begin(), part.end()},
             answered ? frame->station : std::uint8_t{0},
             frame->connection,
-            its(frame->copy),
-            its(frame->imitation),
+            ends && frame->copy ? understood(plan_.settings.serial, frame->bytes) : Bytes{},
+            ends && frame->imitation ? frame->station : std::uint8_t{0},
             answered ? understood(plan_.settings.serial, said(*frame)) : Bytes{},
             frame->overtaken});
 }
@@ -191,8 +190,8 @@ void Wire::arrive(Held held) {
         held_in_.push_back(std::move(held));
         return;
     }
-    if (held.copy_of != 0) agenda_.tell("next ends the copy of what was said before");
-    if (held.copy_of != 0) witness_.on_copy(agenda_.now(), held.copy_of);
+    if (!held.copy.empty()) agenda_.tell("next ends the copy of what was said before");
+    if (!held.copy.empty()) witness_.on_copy(agenda_.now(), held.copy);
     if (!held.reply.empty()) witness_.on_reply(agenda_.now(), held.reply, held.overtaken);
     if (held.imitation_of != 0) agenda_.tell("next ends what is no answer");
     if (held.imitation_of != 0) witness_.on_imitation(held.imitation_of);

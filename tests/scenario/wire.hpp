@@ -79,8 +79,8 @@ class Wire {
         Bytes bytes;
         std::uint8_t answer_of = 0;
         std::uint64_t connection = 0;
-        std::uint8_t copy_of = 0;       ///< the station whose answer it repeats
-        std::uint8_t imitation_of = 0;  ///< ... or imitates
+        Bytes copy{};                   ///< the answer that is said again, and ends here
+        std::uint8_t imitation_of = 0;  ///< the station whose answer it imitates
         Bytes reply{};                  ///< the answer that ends here
         bool overtaken = false;         ///< ... and was said after that to a later request
     };

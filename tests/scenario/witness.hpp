@@ -16,7 +16,7 @@ class Witness {
     virtual void on_executed(TimePoint now, std::uint8_t station, ByteView pdu) = 0;
     virtual void on_exception(TimePoint now, std::uint8_t station, ByteView pdu) = 0;
     /// A second copy of an answer was delivered to its last byte.
-    virtual void on_copy(TimePoint now, std::uint8_t station) = 0;
+    virtual void on_copy(TimePoint now, ByteView adu) = 0;
     /// What has the form of the answer, and is none, was delivered to its last byte.
     virtual void on_imitation(std::uint8_t station) = 0;
     /// A good answer was delivered to its last byte; `overtaken`: after that to a later request.

@@ -102,7 +102,11 @@ void World::reach(std::function<void()> call) {
 }
 
 void World::act(const arbiter::Note& note) {
-    if (direction_of(note.kind) == FrameDirection::sent) what_next_ = note.kind;
+    if (direction_of(note.kind) == FrameDirection::sent) {
+        what_next_ = note.kind;
+    } else {
+        agenda_.tell("taken for: " + std::string(label(note.kind)), note.bytes);
+    }
 }
 
 void World::act(const arbiter::Transmit& transmit) {
