@@ -66,8 +66,7 @@ Station::Replied Station::on_reply(OutstandingRequests& book, TimePoint now, con
         if (!group.request.is_read())
             slowest_write_ = std::max(waited, slowest_write_.value_or(waited));
     }
-    // To a retry: longer still, if it was to the attempt before.
-    if (!group.shows_pace()) times_.add_long(waited);
+    if (!group.shows_pace()) times_.add_long(waited);  // if not to the attempt before: more
     turnaround_.add(think);
     result.drift = turnaround_.take_report(settings_.response_timeout);
     result.trailed = trail_.seen();
