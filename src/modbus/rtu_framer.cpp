@@ -276,14 +276,21 @@ std::optional<Bytes> ReplyFramer::accept(std::size_t start, Bytes pdu) {
     return pdu;
 }
 
-/// True if these bytes may be the beginning of a reply with values.
+/// True if these bytes may be the beginning of another reply: of one with values its header is
+/// known, of the confirmation of a write all that it repeats.
 bool ReplyFramer::begins_like_reply(ByteView bytes) const {
-    if (!is_read(request_[0]) || !expected_ || bytes.empty() || bytes.size() >= *expected_)
+    if (!expected_ || bytes.empty() || bytes.size() >= *expected_) return false;
+    Bytes head{station_, request_[0]};
+    if (is_read(request_[0])) {
+        head.push_back(static_cast<std::uint8_t>(*expected_ - kReadReplyOverhead));
+    } else if (is_broadcastable(request_[0])) {
+        const Bytes reply = normal_write_reply(request_);
+        head.insert(head.end(), reply.begin() + 1, reply.end());
+    } else {
         return false;
-    const std::array head{station_, request_[0],
-                          static_cast<std::uint8_t>(*expected_ - kReadReplyOverhead)};
-    return std::equal(head.begin(), head.begin() + std::min(head.size(), bytes.size()),
-                      bytes.begin());
+    }
+    const std::size_t size = std::min(head.size(), bytes.size());
+    return std::ranges::equal(ByteView(head).first(size), bytes.first(size));
 }
 
 /// Returns what may be the beginning of another reply.

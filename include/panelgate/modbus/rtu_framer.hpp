@@ -58,7 +58,7 @@ class ReplyFramer {
                 Ends ends = Ends::by_length);
 
     /// Feeds bytes; returns the reply PDU as soon as its last byte is there. What has begun behind
-    /// it like another reply to the read stays pending.
+    /// it like another reply stays pending.
     std::optional<Bytes> feed(ByteView bytes);
     /// The line has been silent for the end-of-frame time. Returns a reply that only silence could
     /// end (or that followed noise like the start of a frame); drops the rest.

@@ -377,10 +377,17 @@ TEST_F(LearnedEcho, P8AnEchoBehindTheReplyOfAReadConfirmsNoWrite) {
     answer(bus, 17, kReply, 3ms);
     bus.hear(bus.sent.back().adu);
     bus.run_for(10ms);
-    for (const bool done : {true, false}) {
+    for (const std::ptrdiff_t begun : {0, 3, 7, 8}) {  // bytes of it that are read with the reply
+        const bool done = begun < 8;
         const Ticket write = bus.submit(17, kWrite);
-        answer(bus, 17, kWrite, 3ms);
-        if (done) bus.hear(bus.sent.back().adu);
+        const Bytes frame = bus.sent.back().adu;
+        Bytes first = frame;
+        if (done) first.insert(first.end(), frame.begin(), frame.begin() + begun);
+        bus.run_to_end_of_request();
+        bus.run_for(3ms);
+        bus.hear(first);
+        EXPECT_FALSE(bus.answered(write));
+        if (done) bus.hear(Bytes(frame.begin() + begun, frame.end()));
         EXPECT_EQ(bus.answered(write), done);
         bus.run_for(100ms);
         if (!done) answer(bus, 17, "03 02 00 04"_hex, 3ms);

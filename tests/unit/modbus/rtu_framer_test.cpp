@@ -317,6 +317,25 @@ TEST_F(RtuFramer, WhatBeginsBehindTheReplyLikeAnotherOneIsKeptForItsRest) {
     EXPECT_FALSE(framer.has_pending()) << "noise";
 }
 
+TEST_F(RtuFramer, SoIsWhatBeginsLikeTheSameConfirmationOfAWrite) {
+    for (const Bytes& request : {"06 00 01 00 03"_hex, "10 00 01 00 01 02 00 03"_hex}) {
+        const Bytes confirmation(request.begin(), request.begin() + 5);
+        const Bytes reply = encode_adu(5, confirmation);
+        for (std::size_t begun = 1; begun < reply.size(); ++begun) {
+            ReplyFramer framer(5, request);
+            Bytes heard = reply;
+            heard.insert(heard.end(), reply.begin(), reply.begin() + static_cast<int>(begun));
+            ASSERT_EQ(framer.feed(heard), confirmation);
+            EXPECT_EQ(framer.feed(ByteView(reply).subspan(begun)), confirmation) << begun;
+        }
+        ReplyFramer framer(5, request);
+        Bytes heard = reply;
+        heard.insert(heard.end(), {5, request[0], 0, 2});  // of another place
+        ASSERT_EQ(framer.feed(heard), confirmation);
+        EXPECT_FALSE(framer.has_pending());
+    }
+}
+
 /// P4: a reply that has begun is not damaged by who speaks in its pause, and a request heard there
 /// keeps its reply.
 TEST(Framer, AFrameBehindTheBeginningOfAnotherIsFound) {
