@@ -253,12 +253,38 @@ void OutstandingRequests::forget_damaged(std::uint8_t station) {
 
 void OutstandingRequests::on_reply(std::uint8_t station, TimePoint now, const Bytes& pdu,
                                    ByteView reply) {
-    enter(at(station),
-          {.state = State::answered,
-           .pdu = pdu,
-           .replied = now,
-           .reply = Bytes(reply.begin(), reply.end())},
-          kReplies);
+    Asked one{.state = State::answered,
+              .pdu = pdu,
+              .replied = now,
+              .reply = Bytes(reply.begin(), reply.end())};
+    Page& page = at(station);
+    if (Asked* const old = oldest_reply(page, pdu[0])) {
+        *old = std::move(one);
+    } else {
+        page.asked.push_back(std::move(one));
+    }
+}
+
+/// The reply that is forgotten for one to `function`; null: there is room. Not the last to another
+/// function: a panel may have a buffer for each, and says that once more.
+Asked* OutstandingRequests::oldest_reply(Page& page, std::uint8_t function) {
+    std::size_t count = 0;
+    Asked* oldest = nullptr;
+    Asked* oldest_like_it = nullptr;
+    const auto take_older = [](Asked*& old, Asked& other) {
+        if (old == nullptr || other.replied < old->replied) old = &other;
+    };
+    for (Asked& other : page.asked) {
+        if (other.state != State::answered) continue;
+        ++count;
+        take_older(oldest, other);
+        if (other.pdu[0] == function) take_older(oldest_like_it, other);
+    }
+    if (count < kReplies) return nullptr;
+    const bool is_last = std::ranges::none_of(page.asked, [&](const Asked& other) {
+        return &other != oldest && other.state == State::answered && other.pdu[0] == oldest->pdu[0];
+    });
+    return is_last && oldest_like_it != nullptr ? oldest_like_it : oldest;
 }
 
 bool OutstandingRequests::on_followed(std::uint8_t station) {

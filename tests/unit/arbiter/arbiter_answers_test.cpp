@@ -344,5 +344,17 @@ TEST_F(ArbiterAnswersTest,
     EXPECT_EQ(value(second), "04 08 00 01 00 02 00 03 00 04"_hex);
 }
 
+TEST_F(ArbiterAnswersTest, P1TheLastReplyOfEachFunctionMayBeSaidOnceMore) {
+    know();
+    script.submit(17, "18 05 29"_hex, 1);
+    answer(script, 17, "18 00 06 00 02 5F 73 00 0A"_hex, 12ms);
+    for (unsigned i = 0; i < 12; ++i) read(17, 30 + i);
+    script.run_for(10ms);
+    const Ticket other = script.submit(17, "18 04 BD"_hex, 1);
+    answer(script, 17, "18 00 06 00 02 5F 73 00 0A"_hex, 12ms);
+    script.run_for(100ms);
+    EXPECT_FALSE(script.answered(other));
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter::arbiter_answers_test

@@ -63,7 +63,8 @@ struct Claims {
 class OutstandingRequests {
   public:
     static constexpr std::size_t kMost = 16;    ///< outstanding, of a station
-    static constexpr std::size_t kReplies = 8;  ///< remembered, of a station
+    static constexpr std::size_t kReplies = 8;  ///< remembered, of a station: the last ones, and
+                                                ///< the last one of each function
     static constexpr std::size_t kForeign = 8;  ///< other masters' requests, to a station
     static constexpr std::size_t kBroadcasts = 16;
 
@@ -206,6 +207,7 @@ class OutstandingRequests {
     /// Enters one; of its state the page keeps `most`, and forgets the oldest beyond that.
     static void enter(Page& page, Asked one, std::size_t most);
     static void take_first(Page& page);
+    static Asked* oldest_reply(Page& page, std::uint8_t function);
     /// The outstanding ones that left before `before`, and not before `since`, are so now.
     static void close(Page& page, Asked::State state, TimePoint since, TimePoint before);
 

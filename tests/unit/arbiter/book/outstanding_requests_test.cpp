@@ -154,19 +154,16 @@ TEST_F(OutstandingTest, ForgetsTheOldestOfTooMany) {
     EXPECT_EQ(oldest(kReplyOfThree), at(2s));
 }
 
-TEST(ReconnectState, P4TriesAnotherLengthAgainAfterSixteenReplies) {
-    ReconnectState state;
-    state.on_probe_unanswered(true);
-    for (int i = 0; i < 99; ++i) state.on_replied(false);
-    for (int i = 0; i < 15; ++i) {
-        state.on_replied(true);
-        EXPECT_TRUE(state.only_known_reads()) << i;
-    }
-    state.on_replied(true);
-    EXPECT_FALSE(state.only_known_reads()) << "it may just have been lost";
-    state.on_probe_unanswered(true);
-    state.on_replied(true);
-    EXPECT_TRUE(state.only_known_reads());
+/// A panel with a reply buffer for each function says the last one of that once more.
+TEST_F(OutstandingTest, P1RemembersTheLastReplyOfEachFunction) {
+    const Bytes coils = "01 01 05"_hex;
+    book_.on_reply(kId, at(1s), "01 00 00 00 08"_hex, "01 01 04"_hex);
+    book_.on_reply(kId, at(2s), "01 00 08 00 08"_hex, coils);
+    for (std::size_t i = 0; i < 3 * OutstandingRequests::kReplies; ++i)
+        book_.on_reply(kId, at(3s), kThree, kReplyOfThree);
+    const Bytes open = "01 00 10 00 08"_hex;
+    EXPECT_TRUE(book_.claims(at(9s), kId, coils, {}, open).repeats_other);
+    EXPECT_FALSE(book_.claims(at(9s), kId, "01 01 04"_hex, {}, open).repeats_other);
 }
 
 TEST_F(OutstandingTest, BroadcastsAreRememberedOfTheLastOnesAndConcernNoReads) {

@@ -62,5 +62,20 @@ TEST(ReconnectState, AReadOfAnotherLengthThatWasNotAnsweredIsNotTriedAgainBefore
     EXPECT_FALSE(state.only_known_reads()) << "a usual read";
 }
 
+TEST(ReconnectState, P4TriesAnotherLengthAgainAfterSixteenReplies) {
+    ReconnectState state;
+    state.on_probe_unanswered(true);
+    for (int i = 0; i < 99; ++i) state.on_replied(false);
+    for (int i = 0; i < 15; ++i) {
+        state.on_replied(true);
+        EXPECT_TRUE(state.only_known_reads()) << i;
+    }
+    state.on_replied(true);
+    EXPECT_FALSE(state.only_known_reads()) << "it may just have been lost";
+    state.on_probe_unanswered(true);
+    state.on_replied(true);
+    EXPECT_TRUE(state.only_known_reads());
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter::known_reads_test
