@@ -97,7 +97,8 @@ void Station::on_failed(TimePoint now, Verdict verdict, Duration cost,
     const int silent = verdict == Verdict::silent ? 1 : 0;
     lately_ = static_cast<std::uint8_t>(lately_ << 1 | silent);
     if (failing()) failing_.spend(now, cost);
-    if (!health_.offline()) spend(now, cost, is_read);
+    // A silent write says nothing about reads; damage does.
+    if (!health_.offline()) spend(now, cost, is_read || silent == 0);
 }
 
 bool Station::take_half_open(TimePoint now, bool is_read) {

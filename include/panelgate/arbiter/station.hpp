@@ -225,7 +225,7 @@ class Station {
     static constexpr int kWritesInARow = 4;     ///< while a read waits for it
     static constexpr int kPollsPassedOver = 3;  ///< while a poll waits for it
     static constexpr int kCredit = 2;           ///< whole timeouts of credit
-    static constexpr int kBudgetMemory = 3;     ///< whole timeouts that are remembered
+    static constexpr int kBudgetMemory = 3;     ///< failures, or whole timeouts, that it remembers
 
   private:
     /// Time in which its share of the line covers one whole timeout.
@@ -239,8 +239,10 @@ class Station {
     bool rests_after_replies() const {
         return replies_.duplicates_until(Duration::max()) != TimePoint{};
     }
-    void spend(TimePoint now, Duration cost, bool is_read = true) {
-        (is_read ? budget_ : writes_).spend(now, cost, kBudgetMemory * timeout_cost());
+    void spend(TimePoint now, Duration cost, bool of_reads = true) {
+        const Duration paid_in = static_cast<int>(1 / ProbeBudget::kFailing) * cost;
+        const Duration most = kBudgetMemory * std::max(timeout_cost(), paid_in);
+        (of_reads ? budget_ : writes_).spend(now, cost, most);
     }
     /// True if it has not answered a write there, or of any sort: to several places in a row.
     bool ignores(const modbus::Request& write) const {
@@ -260,8 +262,8 @@ class Station {
     StationHealth health_;
     Turnaround turnaround_;
     Trail trail_;
-    ProbeBudget budget_{ProbeBudget::kFailing};   ///< of reads that fail; replies do not reduce it
-    ProbeBudget writes_{ProbeBudget::kFailing};   ///< of writes that fail, separate from reads
+    ProbeBudget budget_{ProbeBudget::kFailing};   ///< of failures; replies do not reduce it
+    ProbeBudget writes_{ProbeBudget::kFailing};   ///< ... but of silent writes, apart from reads
     ProbeBudget failing_{ProbeBudget::kFailing};  ///< of failures while it is failing()
     std::uint8_t lately_ = 0;  ///< the last 8 attempts, latest lowest: 1 was silent
     TimePoint asked_{};

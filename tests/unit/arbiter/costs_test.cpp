@@ -14,8 +14,10 @@
 #include <vector>
 
 #include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/arbiter/station.hpp"
 #include "support/bus_script.hpp"
 #include "support/hex.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::arbiter::costs_test {
 namespace {
@@ -220,6 +222,24 @@ TEST(Costs, P4APanelThatGetsARequestInTenTwiceIsAskedAgainForTheseAlone) {
     EXPECT_EQ(plant.faults[1], 0);
     EXPECT_GT(plant.said_again, 20);
     EXPECT_LE(plant.asked[kFlaky], plant.answers[kFlaky] + plant.said_again + 1);
+}
+
+/// Each reply breaks off, and is waited for on a line that may pause for longer than a timeout.
+TEST(Costs, P4FailuresThatCostMoreThanATimeoutHaveAFifthAllTheSame) {
+    const StationSettings settings;
+    Station station(settings, OfflineSettings{}, true);
+    const modbus::Request write = test::request_of("06 00 01 00 03"_hex);
+    const Duration cost = 2 * settings.response_timeout;
+    const TimePoint began{1h};
+    TimePoint now = began;
+    Duration spent{};
+    for (int i = 0; i < 30; ++i) {
+        now = std::max(now, station.affordable_at()) + cost;
+        spent += cost;
+        station.on_failed(now, Verdict::damaged, cost, i % 2 == 0 ? &write : nullptr);
+    }
+    EXPECT_LE(spent, (now - began) / 4);
+    EXPECT_GE(spent, (now - began) / 6);
 }
 
 TEST(Costs, P4APanelThatNeedsAlmostItsTimeoutIsNeverCutShort) {
