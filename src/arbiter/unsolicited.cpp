@@ -32,6 +32,11 @@ bool lacks_last_byte(ByteView heard, ByteView frame) {
     return heard.size() + 1 == frame.size() && std::ranges::equal(heard, frame.first(heard.size()));
 }
 
+/// A late reply with values may have begun, whatever was cut before.
+bool begins_late_reply(ByteView heard, const OutstandingRequests& book) {
+    return heard.size() > 2 && heard[1] <= modbus::kReadInputRegisters && book.any(heard[0]);
+}
+
 bool is_exception(ByteView adu) { return modbus::exception_of(modbus::pdu_of(adu)).has_value(); }
 
 }  // namespace
@@ -75,7 +80,7 @@ std::vector<Unused> UnsolicitedFrames::joined(TimePoint now, std::vector<Unused>
             if (!first) part = modbus::classify_frame(whole, part.station, good);
             part.came = came;
         } else if (whole.size() < modbus::kMaxRtuAdu) {
-            cut_ = std::move(whole);
+            cut_ = begins_late_reply(part.bytes, stations.book()) ? part.bytes : std::move(whole);
         }
     }
     return parts;
