@@ -75,7 +75,11 @@ void Checker::on_refused(TimePoint now, const arbiter::Job& job, Fault fault) {
     const Client& client = clients_[job.client];
     // A late reply is told from what may follow it by a silence.
     constexpr Duration kSilence = 50ms;
-    if (fault == Fault::offline && watch_.is_good(job.station, now - kSilence) &&
+    // What a probe was answered may repeat another answer, and is held for as long as its station
+    // needs (P1): see check_idling().
+    const TimePoint held = heard_until_ + watch_.own_slowest(job.station) + 20ms;
+    const bool may_be_held = attempt_.answered && attempt_.station == job.station && now <= held;
+    if (fault == Fault::offline && !may_be_held && watch_.is_good(job.station, now - kSilence) &&
         !was_like_echo(job.station, now - kSilence) &&
         !is_only_overdue(job.station, now - kSilence))
         fail("P4: a good station was refused as offline: " + std::to_string(job.station));

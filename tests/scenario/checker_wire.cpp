@@ -62,8 +62,12 @@ void Checker::on_answered(TimePoint now, std::uint8_t station) {
     silent_before_[station] = false;
     replied_[station] = now;
     const auto size = modbus::reply_length_from_request(asked_[station]).value_or(0);
+    // What equals its request, and comes when nobody waits for it, shows nothing: see
+    // may_be_echo().
+    const bool shows =
+        !may_be_echo(station) || open_writes_.contains(key_of(station, asked_[station]));
     Duration& latest = begun_after_[station];
-    latest = std::max(latest, now - attempt_.sent - frame_time(settings_.serial, size));
+    if (shows) latest = std::max(latest, now - attempt_.sent - frame_time(settings_.serial, size));
     attempt_.first = !watch_.has_answered(attempt_.station);
     const bool is_first = watch_.on_answered(now, attempt_.station, now - attempt_.sent);
     // What the way held back may have reached the station only now.
@@ -207,6 +211,9 @@ void Checker::close_attempt(TimePoint now) {
     Missed& missed = missed_[attempt_.station];
     missed.only_overdue = missed.only_overdue && is_overdue(now, attempt_.station);
     const Duration cost = now - attempt_.started;
+    TimePoint& spent = spent_[attempt_.station];
+    const Duration longest = 2 * settings_of(attempt_.station).response_timeout;
+    spent = std::max(spent, now) + kFifth * std::min(cost, longest);
     const bool wanted = good_work_since(attempt_.started) == attempt_.started;
     const bool plain = calm_ && watch_.only_dies(attempt_.station) && !attempt_.heard;
     if (plain && attempt_.dead && cost > costs_.limit(attempt_) && wanted)

@@ -200,6 +200,8 @@ constexpr BrokenOnce kBrokenOnce[] = {
     {Kind::receiver, 851},
     // The reply began with the byte that our own frame, of which a part came back, went on with.
     {Kind::receiver, 1950},
+    // A late reply was cut by a pause, and its panel had begun to say it before.
+    {Kind::voices, 377},
     // The first copy that was heard was of a reply that had come damaged.
     {Kind::receiver, 883},
     {Kind::voices, 1503},

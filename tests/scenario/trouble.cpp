@@ -52,9 +52,9 @@ void Trouble::babble() {
     if (is_over_()) return;
     Said said;
     const std::uint8_t id = plan_.panels.back().id;
-    const auto coils = static_cast<std::uint8_t>(random_.between(1, 8));
-    Bytes pdu{1, coils};
-    pdu.resize(2u + coils, 0x55);
+    const auto inputs = static_cast<std::uint8_t>(random_.between(1, 8));
+    Bytes pdu{2, inputs};
+    pdu.resize(2u + inputs, 0x55);
     said.bytes = spoken(plan_.settings.serial, id, pdu, plan_.panels.back().crc_order);
     said.connection = wire_.connection();
     wire_.say(std::move(said));
