@@ -140,7 +140,8 @@ Bytes Customers::draw_write() {
         return Writer().u8(16).u16(cell).u16(2).u8(4).u16(id).u16(~id & 0xFFFF).take();
     Writer longest;
     longest.u8(16).u16(kMemory).u16(kMost).u8(2 * kMost);
-    for (unsigned i = 0; i < kMost; ++i) longest.u16((id + i) & 0xFFFF);
+    // No later write of one register finds its value there.
+    for (unsigned i = 0; i < kMost; ++i) longest.u16(~(id + i) & 0xFFFF);
     return longest.take();
 }
 
