@@ -124,8 +124,9 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     const JobQueue::PushResult pushed = schedule_.backlog().queue().push(job);
     for (const Job& shed : pushed.shed) {
         outbox_.decide(now, Decision::Kind::shed, shed);
-        const bool sent = shed.attempts > 0;  // in a joined read that failed
-        outbox_.finish(shed, sent ? Fault::timeout : Fault::busy);
+        // A read may have been sent, in a joined one that failed, and has changed nothing.
+        const bool unsure = shed.attempts > 0 && !shed.request.is_read();
+        outbox_.finish(shed, unsure ? Fault::timeout : Fault::busy);
     }
     if (!pushed.taken) {
         outbox_.decide(now, Decision::Kind::full, job, {}, queue_depth());

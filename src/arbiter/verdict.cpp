@@ -225,7 +225,8 @@ void Arbiter::settle(TimePoint now) {
     if (attempt.answers().may_be_echo()) echo_memory_.on_suspected(now, group.station);
     const bool refused = modbus::exception_of(reply).has_value();
     outbox_.report(attempt, refused ? TransactionEnd::exception : TransactionEnd::ok);
-    if (!group.confirms.empty()) return confirm(now, group, reply, attempt.echoed());
+    const bool shows_echo = attempt.echoed() && !attempt.timing().echoes;
+    if (!group.confirms.empty()) return confirm(now, group, reply, shows_echo);
     if (refused) {
         give_back(group);
     } else if (group.span && station.settings().max_age > Duration::zero()) {
@@ -237,10 +238,10 @@ void Arbiter::settle(TimePoint now) {
 
 /// P8: a reply came that may have been the write's echo, an answer to a broadcast, or the last
 /// confirmation once more, and a read has now shown what the station holds.
-void Arbiter::confirm(TimePoint now, const Group& group, ByteView reply, bool echoed) {
+void Arbiter::confirm(TimePoint now, const Group& group, ByteView reply, bool shows_echo) {
     const bool is_answer = modbus::returns_values(group.written)
                                ? has_values(group, reply)
-                               : is_confirmed(now, group, reply, echoed);
+                               : is_confirmed(now, group, reply, shows_echo);
     const Result<Bytes> outcome = is_answer ? Result<Bytes>(group.confirms) : Fault::timeout;
     for (const Job& job : group.jobs) outbox_.finish(job, outcome);
 }
@@ -249,7 +250,7 @@ void Arbiter::confirm(TimePoint now, const Group& group, ByteView reply, bool ec
 /// read, only a line on which writes do not come back leaves no doubt: an adapter need not echo
 /// reads. A confirmation that repeats one was none where the place still holds what that confirmed;
 /// where the panel has just said one in place of another's it must hold what was written.
-bool Arbiter::is_confirmed(TimePoint now, const Group& group, ByteView reply, bool echoed) {
+bool Arbiter::is_confirmed(TimePoint now, const Group& group, ByteView reply, bool shows_echo) {
     const OutstandingRequests& book = stations_.book();
     const auto broadcast = book.behind_broadcast(group.doubted_at, group.confirms);
     const bool holds = holds_written(group.written, reply);
@@ -264,7 +265,7 @@ bool Arbiter::is_confirmed(TimePoint now, const Group& group, ByteView reply, bo
         habits.earlier_write(book, group.doubted_at, group.written, group.confirms);
     const bool repeats = earlier || habits.may_repeat_confirmation(now, group.confirms);
     if (broadcast || !repeats)
-        return !echoed && (holds || (echo_memory_.echoes_no_writes() && !broadcast));
+        return !shows_echo && (holds || (echo_memory_.echoes_no_writes() && !broadcast));
     const bool is_true = holds || !earlier || !holds_written(earlier->pdu, reply);
     habits.on_checked(book, group, is_true);
     return is_true;

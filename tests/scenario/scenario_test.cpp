@@ -175,6 +175,8 @@ constexpr BrokenOnce kBrokenOnce[] = {
     {Kind::company, 35},
     // A confirmation came twice, and the second time the write behind it was lost.
     {Kind::company, 378},
+    // A line that echoes gave back, behind a stall, two requests at once.
+    {Kind::wild, 1867},
     {Kind::receiver, 32},
     // A silence behind somebody else's bytes made others be waited for less long.
     {Kind::company, 84},

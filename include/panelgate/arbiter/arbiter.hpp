@@ -147,8 +147,8 @@ class Arbiter {
     void settle(TimePoint now);
     void doubt_as_early(TimePoint now);
     void ask_again(TimePoint now);
-    void confirm(TimePoint now, const Group& group, ByteView reply, bool echoed);
-    bool is_confirmed(TimePoint now, const Group& group, ByteView reply, bool echoed);
+    void confirm(TimePoint now, const Group& group, ByteView reply, bool shows_echo);
+    bool is_confirmed(TimePoint now, const Group& group, ByteView reply, bool shows_echo);
     bool has_values(const Group& group, ByteView reply);
     static Group confirming(Group& write, const Station& station);
     void learn_from_failure(TimePoint now, const Attempt& attempt, Verdict verdict);

@@ -196,13 +196,13 @@ class Attempt {
         return timing_.echoes && !echo_.complete() && (echo_.mismatch() || own_.fragment);
     }
     /// True if the reply to a write may be the echo of its request, which it equals: none has come
-    /// in front of it, and it came too quickly, or writes come back on this line; or they come back
-    /// once more.
+    /// in front of it, and it came too quickly, or the line echoes, or writes come back; or they
+    /// come back once more.
     bool may_be_its_echo(TimePoint now, bool too_quick, const EchoMemory& line) const {
         const bool behind_echo = echo_.complete() || own_.seen;
         return !group_.request.is_read() && echo_.is_own(reply()) &&
                (line.comes_again(now, group_.station) ||
-                (!behind_echo && (too_quick || line.echoes_writes())));
+                (!behind_echo && (too_quick || timing_.echoes || line.echoes_writes())));
     }
     /// True if this answer to a read is that read itself, where requests come back late.
     bool is_late_echo(TimePoint now, const EchoMemory& line) const {
