@@ -142,7 +142,6 @@ class Checker : public Witness {
     bool joins_attempt(TimePoint now, const arbiter::Job& job) const;
     std::size_t waiting() const;
     bool rests_behind_damage(std::uint8_t station, TimePoint since) const;
-    bool is_over_share(std::uint8_t station, TimePoint since) const;
     void check_turn(TimePoint now, bool write);
     // What may be answered (checker.cpp)
     void check_reply(TimePoint now, const Open& open, const arbiter::Finish& finish);
@@ -195,8 +194,6 @@ class Checker : public Witness {
     /// Until when an answer may be said again that came behind as many other bytes: perhaps it was
     /// one of them, damaged.
     std::map<std::uint8_t, TimePoint> behind_damage_;
-    static constexpr int kFifth = 5;
-    std::map<std::uint8_t, TimePoint> spent_;  ///< until its failures are a fifth of all time
     std::map<std::uint8_t, Missed> missed_;  ///< stations that have failed, and not answered since
     std::map<std::uint8_t, Bytes> asked_;    ///< what each station was asked last
     std::map<Bytes, TimePoint> spread_;  ///< when broadcasts had left, by what would answer them

@@ -108,13 +108,6 @@ void Checker::on_settled() {
              std::to_string(settings_.queue.limit));
 }
 
-/// P4: its failures have used up its fifth of the line, and the credit of two timeouts.
-bool Checker::is_over_share(std::uint8_t station, TimePoint since) const {
-    const auto spent = spent_.find(station);
-    const Duration credit = 2 * kFifth * settings_of(station).response_timeout;
-    return spent != spent_.end() && spent->second > since + credit;
-}
-
 bool Checker::rests_behind_damage(std::uint8_t station, TimePoint since) const {
     const auto found = behind_damage_.find(station);
     return found != behind_damage_.end() && found->second > since;
@@ -144,7 +137,7 @@ void Checker::check_turn(TimePoint now, bool write) {
                client->second.single && watch_.is_good(o.job.station, o.submitted) &&
                !watch_.is_failing(o.job.station) && !doublers_.contains(o.job.station) &&
                watch_.rests_until(o.job.station) <= first &&
-               !rests_behind_damage(o.job.station, first) && !is_over_share(o.job.station, first);
+               !rests_behind_damage(o.job.station, first);
     });
     if (starves != open_.end())
         fail("P9: five writes in a row while a reader waits: " + std::to_string(starves->first));

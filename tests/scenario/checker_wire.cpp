@@ -211,9 +211,6 @@ void Checker::close_attempt(TimePoint now) {
     Missed& missed = missed_[attempt_.station];
     missed.only_overdue = missed.only_overdue && is_overdue(now, attempt_.station);
     const Duration cost = now - attempt_.started;
-    TimePoint& spent = spent_[attempt_.station];
-    const Duration longest = 2 * settings_of(attempt_.station).response_timeout;
-    spent = std::max(spent, now) + kFifth * std::min(cost, longest);
     const bool wanted = good_work_since(attempt_.started) == attempt_.started;
     const bool plain = calm_ && watch_.only_dies(attempt_.station) && !attempt_.heard;
     if (plain && attempt_.dead && cost > costs_.limit(attempt_) && wanted)
