@@ -63,6 +63,7 @@ bool ReplyHabits::may_be_duplicate(TimePoint now, const Attempt& attempt, const 
 
 const Asked* ReplyHabits::earlier_write(const OutstandingRequests& book, TimePoint now,
                                         ByteView write, ByteView confirmation) const {
+    if (!duplicates_.suspected(now)) return nullptr;
     if (modbus::exception_of(confirmation) || modbus::returns_values(write)) return nullptr;
     const TimePoint given = book.given(id_, now, confirmation, now);
     if (given == TimePoint{}) return nullptr;

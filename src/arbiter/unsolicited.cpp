@@ -109,7 +109,8 @@ void UnsolicitedFrames::note(TimePoint now, const std::vector<modbus::Unused>& p
         const TimePoint heard_at =
             part.came != TimePoint{} ? part.came : std::min(now, quiet.since());
         const bool damaged = part.kind == Unused::Kind::damaged;
-        const Done done = judge(facts_of(heard_at, part.bytes, damaged, stations));
+        const Facts facts = facts_of(heard_at, part.bytes, damaged, stations);
+        const Done done = judge(facts);
         if (is_reply(done)) {
             const bool asked = !idle && part.station == quiet.station();
             note_reply(now, heard_at, part, done, asked, stations, quiet, outbox);
@@ -120,6 +121,8 @@ void UnsolicitedFrames::note(TimePoint now, const std::vector<modbus::Unused>& p
         if ((done == Done::damaged || done == Done::echo) && idle)
             stations.on_trail(heard_at, replied_);
         if (done == Done::echo) quiet.has_come();
+        if (done == Done::echo && (facts & fact::repeats) != 0)
+            stations.of(part.bytes[0]).replies().on_perhaps_copied(heard_at);
         if (done == Done::request) stations.book().on_foreign(heard_at, part.bytes, false);
         if (done == Done::request) let_reply_pass(now, part.bytes, stations, quiet);
         if (done == Done::nobodys &&

@@ -119,8 +119,8 @@ class ReplyHabits {
                                  Duration within = timing::kForgetHabit) const {
         return repeated_at_ && now <= *repeated_at_ + within && is_last_confirmation(reply);
     }
-    /// The write of other values that had this confirmation just before; null: none. A read tells
-    /// whether the place still holds those.
+    /// The write of other values that had this confirmation just before, where copies may come from
+    /// this station; null: none. A read tells whether the place still holds those.
     const Asked* earlier_write(const OutstandingRequests& book, TimePoint now, ByteView write,
                                ByteView confirmation) const;
     /// Time of the latest request that this reply proves to have reached the station: an attempt
@@ -177,6 +177,8 @@ class ReplyHabits {
     /// wire, which this does not answer.
     Heard on_unsolicited(OutstandingRequests& book, TimePoint now, Done done, ByteView pdu,
                          bool asked);
+    /// A frame came that equals a recent reply, and may be our own.
+    void on_perhaps_copied(TimePoint now) { duplicates_.on_perhaps(now); }
     /// Damaged bytes were heard.
     void on_damaged_bytes(const OutstandingRequests& book, TimePoint now, ByteView bytes,
                           modbus::CrcOrder order);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <utility>
 
 #include "panelgate/arbiter/book/outstanding_requests.hpp"
@@ -90,6 +91,12 @@ class DuplicateHabit {
     void on_doubt(Duration wait) { doubt_ = std::max(doubt_, wait); }
     /// True if the station has sent duplicates lately.
     bool known() const { return settle_time() > Duration::zero(); }
+    /// A reply came again, or our own frame, which it equals.
+    void on_perhaps(TimePoint now) { perhaps_at_ = now; }
+    /// ... or may have.
+    bool suspected(TimePoint now) const {
+        return known() || (perhaps_at_ && now - *perhaps_at_ <= timing::kForgetDuplicates);
+    }
     /// True if this answer repeats the answer to another request, or, after a proven duplicate, any
     /// earlier one, and the station has not yet shown that it gives equal answers.
     bool suspicious(TimePoint now, ByteView request, ByteView reply, const Claims& claims) const {
@@ -171,6 +178,7 @@ class DuplicateHabit {
     int sooner_ = 0;      ///< duplicates in a row that came in less than half of that
     TimePoint learned_at_{};
     TimePoint replied_{};
+    std::optional<TimePoint> perhaps_at_;
     static constexpr int kSurplus = 2;
     static constexpr int kAlwaysTwo = 6;  ///< in a row
     int surplus_ = 0;
