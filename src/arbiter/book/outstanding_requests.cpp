@@ -265,26 +265,36 @@ void OutstandingRequests::on_reply(std::uint8_t station, TimePoint now, const By
     }
 }
 
-/// The reply that is forgotten for one to `function`; null: there is room. Not the last to another
-/// function: a panel may have a buffer for each, and says that once more.
+/// The reply that is forgotten for one to `function`; null: there is room. Beyond the last ones the
+/// last to each function is kept: a panel may have a buffer for each, and says that once more.
 Asked* OutstandingRequests::oldest_reply(Page& page, std::uint8_t function) {
     std::size_t count = 0;
     Asked* oldest = nullptr;
-    Asked* oldest_like_it = nullptr;
+    Asked* oldest_repeated = nullptr;  // a later one has its function
     const auto take_older = [](Asked*& old, Asked& other) {
         if (old == nullptr || other.replied < old->replied) old = &other;
+    };
+    const auto is_later = [](const Asked& one, const Asked& other) {
+        return one.state == State::answered && one.pdu[0] == other.pdu[0] &&
+               one.replied > other.replied;
     };
     for (Asked& other : page.asked) {
         if (other.state != State::answered) continue;
         ++count;
         take_older(oldest, other);
-        if (other.pdu[0] == function) take_older(oldest_like_it, other);
+        const bool repeated =
+            other.pdu[0] == function ||
+            std::ranges::any_of(page.asked, [&](const Asked& one) { return is_later(one, other); });
+        if (repeated) take_older(oldest_repeated, other);
     }
     if (count < kReplies) return nullptr;
-    const bool is_last = std::ranges::none_of(page.asked, [&](const Asked& other) {
-        return &other != oldest && other.state == State::answered && other.pdu[0] == oldest->pdu[0];
-    });
-    return is_last && oldest_like_it != nullptr ? oldest_like_it : oldest;
+    const auto is_recent = [&](const Asked& which) {
+        return std::ranges::count_if(page.asked, [&](const Asked& one) {
+                   return one.state == State::answered && one.replied > which.replied;
+               }) < static_cast<std::ptrdiff_t>(kReplies) - 1;
+    };
+    if (oldest_repeated != nullptr && !is_recent(*oldest_repeated)) return oldest_repeated;
+    return count < 2 * kReplies ? nullptr : oldest;
 }
 
 bool OutstandingRequests::on_followed(std::uint8_t station) {

@@ -160,7 +160,7 @@ TEST_F(OutstandingTest, P1RemembersTheLastReplyOfEachFunction) {
     book_.on_reply(kId, at(1s), "01 00 00 00 08"_hex, "01 01 04"_hex);
     book_.on_reply(kId, at(2s), "01 00 08 00 08"_hex, coils);
     for (std::size_t i = 0; i < 3 * OutstandingRequests::kReplies; ++i)
-        book_.on_reply(kId, at(3s), kThree, kReplyOfThree);
+        book_.on_reply(kId, at(3s + i * 1ms), kThree, kReplyOfThree);
     const Bytes open = "01 00 10 00 08"_hex;
     EXPECT_TRUE(book_.claims(at(9s), kId, coils, {}, open).repeats_other);
     EXPECT_FALSE(book_.claims(at(9s), kId, "01 01 04"_hex, {}, open).repeats_other);
