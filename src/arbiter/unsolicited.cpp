@@ -32,11 +32,6 @@ bool lacks_last_byte(ByteView heard, ByteView frame) {
     return heard.size() + 1 == frame.size() && std::ranges::equal(heard, frame.first(heard.size()));
 }
 
-/// A late reply with values may have begun, whatever was cut before.
-bool begins_late_reply(ByteView heard, const OutstandingRequests& book) {
-    return heard.size() > 2 && heard[1] <= modbus::kReadInputRegisters && book.any(heard[0]);
-}
-
 bool is_exception(ByteView adu) { return modbus::exception_of(modbus::pdu_of(adu)).has_value(); }
 
 }  // namespace
@@ -73,14 +68,13 @@ std::vector<Unused> UnsolicitedFrames::joined(TimePoint now, std::vector<Unused>
         const bool first = whole.empty();
         whole.insert(whole.end(), part.bytes.begin(), part.bytes.end());
         const bool good = modbus::crc_ok(whole, orders_);
-        const Facts wanted = fact::own_frame | fact::request | fact::other_master | fact::repeats |
-                             fact::outstanding;
+        const Facts wanted = fact::own_frame | fact::request | fact::other_master | fact::repeats;
         if ((facts_of(now, whole, !good, stations) & wanted) != 0) {
             const TimePoint came = part.came;
             if (!first) part = modbus::classify_frame(whole, part.station, good);
             part.came = came;
         } else if (whole.size() < modbus::kMaxRtuAdu) {
-            cut_ = begins_late_reply(part.bytes, stations.book()) ? part.bytes : std::move(whole);
+            cut_ = std::move(whole);
         }
     }
     return parts;

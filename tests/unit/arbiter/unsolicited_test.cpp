@@ -101,22 +101,6 @@ TEST_F(UnsolicitedFramesTest, OurOwnFrameWithoutALast0IsNoReply) {
     EXPECT_EQ(heard(own), "echo");
 }
 
-TEST_F(UnsolicitedFramesTest, ALateReplyThatAPauseHasCutIsWhole) {
-    stations.of(17).replies().on_unanswered(stations.book(), now, kRead, now - 500ms);
-    const auto joined = [&](ByteView bytes) {
-        unsolicited.hear(now, bytes);
-        return unsolicited.joined(now, unsolicited.take(17), stations);
-    };
-    const ByteView whole = kAnswer;
-    joined(whole.first(2));  // some panels say that before
-    EXPECT_EQ(joined(whole.first(6)).front().kind, modbus::Unused::Kind::damaged);
-    const auto parts = joined(whole.subspan(6));
-    ASSERT_EQ(parts.size(), 1u);
-    EXPECT_EQ(parts[0].bytes, kAnswer);
-    unsolicited.note(now, parts, true, stations, quiet, outbox);
-    EXPECT_EQ(counters().late_frames, 1u);
-}
-
 TEST_F(UnsolicitedFramesTest, BehindAnotherMastersRequestTheLineRestsForItsReply) {
     EXPECT_LT(quiet.free_at(2ms), now + 1s);
     heard(encode_adu(18, kRead));
