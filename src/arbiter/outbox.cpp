@@ -245,10 +245,7 @@ bool is_surely_echoed(const Attempt& attempt) {
 void Outbox::on_answered(TimePoint now, const Attempt& attempt, Duration think,
                          const Station::Replied& replied) {
     const std::uint8_t station = attempt.group().station;
-    actions_.push_back(Note{now,
-                            FrameKind::reply,
-                            modbus::encode_adu(station, attempt.reply(), orders_.of(station)),
-                            {}});
+    note_reply(now, station, attempt.reply());
     StationCounters& counters = of(station);
     Symptoms& symptoms = counters.symptoms;
     counters.turnaround.observe(think);
@@ -284,12 +281,12 @@ void Outbox::count_beside(const Attempt& attempt) {
 }
 
 void Outbox::on_doubted(TimePoint now, const Attempt& attempt) {
-    const Group& group = attempt.group();
+    note_reply(now, attempt.group().station, attempt.group().doubted);
+}
+
+void Outbox::note_reply(TimePoint now, std::uint8_t station, const Bytes& pdu) {
     actions_.push_back(
-        Note{now,
-             FrameKind::reply,
-             modbus::encode_adu(group.station, group.doubted, orders_.of(group.station)),
-             {}});
+        Note{now, FrameKind::reply, modbus::encode_adu(station, pdu, orders_.of(station)), {}});
 }
 
 void Outbox::on_failed(const Attempt& attempt, Verdict verdict) {

@@ -82,6 +82,7 @@ class Outbox {
   private:
     StationCounters& of(std::uint8_t station);
     Symptoms& symptoms_of(std::uint8_t station) { return of(station).symptoms; }
+    void note_reply(TimePoint now, std::uint8_t station, const Bytes& pdu);
     void count_damaged(const Attempt& attempt);
     void count_beside(const Attempt& attempt);
     void join(ByteView bytes, std::uint8_t asked);

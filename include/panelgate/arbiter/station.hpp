@@ -228,10 +228,12 @@ class Station {
     static constexpr int kBudgetMemory = 3;     ///< failures, or whole timeouts, that it remembers
 
   private:
-    /// Time in which its share of the line covers one whole timeout.
-    Duration timeout_cost() const {
-        return static_cast<int>(1 / ProbeBudget::kFailing) * settings_.response_timeout;
+    /// Time in which its share of the line covers this cost.
+    static Duration paid_in(Duration cost) {
+        return static_cast<int>(1 / ProbeBudget::kFailing) * cost;
     }
+    /// ... one whole timeout.
+    Duration timeout_cost() const { return paid_in(settings_.response_timeout); }
     /// Twice the time that this share of its replies take. At low rates the silence behind the
     /// request and the first character take longer than the panel: once is as long as it takes to
     /// see any.
@@ -240,8 +242,7 @@ class Station {
         return replies_.duplicates_until(Duration::max()) != TimePoint{};
     }
     void spend(TimePoint now, Duration cost, bool of_reads = true) {
-        const Duration paid_in = static_cast<int>(1 / ProbeBudget::kFailing) * cost;
-        const Duration most = kBudgetMemory * std::max(timeout_cost(), paid_in);
+        const Duration most = kBudgetMemory * std::max(timeout_cost(), paid_in(cost));
         (of_reads ? budget_ : writes_).spend(now, cost, most);
     }
     /// True if it has not answered a write there, or of any sort: to several places in a row.
