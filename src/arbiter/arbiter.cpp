@@ -241,6 +241,7 @@ void Arbiter::on_rx(TimePoint now, ByteView bytes) {
     if (ascii_) {
         ascii_->feed(now, bytes);
         while (const auto piece = ascii_->next()) hear_piece(now, *piece);
+        if (active_ && ascii_->inside()) active_->on_goes_on(now);
         quiet_.on_begun(ascii_->inside() ? now + settings_.end_of_frame : TimePoint{});
     } else {
         hear(now, bytes);
@@ -270,8 +271,11 @@ void Arbiter::hear_piece(TimePoint now, const modbus::AsciiTranscript::Piece& pi
     if (!piece.bytes.empty()) hear(now, piece.bytes);
     if (piece.end == End::none) return;
     const bool good = piece.end == End::frame;
-    if (active_ && !active_->is_broadcast())
-        conclude(now, active_->on_frame_end(good, ends_attempt(now)));
+    if (active_ && !active_->is_broadcast()) {
+        const Attempt::Ends ends = ends_attempt(now);
+        conclude(now, piece.end == End::cut ? active_->on_frame_cut(ends)
+                                            : active_->on_frame_end(good, ends));
+    }
     if (unsolicited_.pending()) note_idle(now, unsolicited_.take_delimited(quiet_.station(), good));
 }
 
@@ -398,7 +402,7 @@ void Arbiter::start(TimePoint now, Group group) {
         if (group.attempts == 1)
             group.first_silence = !station.missed_last() && !station.health().offline() &&
                                   !stations_.flaky_beside_others(now, station);
-        timing.is_last = group.request.is_read() && !station.may_retry(group);
+        timing.is_last = !station.may_retry(group);
         timing.patience = stations_.patience(now, group) + latency_;
         timing.usual = std::min(station.usual(stations_.slowest()) + latency_, timing.patience);
         timing.allow_hole(station.reply_hole());

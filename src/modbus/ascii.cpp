@@ -179,7 +179,7 @@ std::optional<AsciiTranscript::Piece> AsciiTranscript::next() {
         const bool over = std::exchange(paused_, false) || (character == kBegin && open());
         if (over) {
             write_rest(piece);
-            piece.end = Piece::End::damage;
+            piece.end = Piece::End::cut;
         } else {
             ++taken;
             take(character, piece);

@@ -119,6 +119,14 @@ std::optional<Bytes> ReplyFramer::on_end(bool good) {
     return reply;
 }
 
+void ReplyFramer::on_cut() {
+    const bool whole = damaged_whole_;
+    const bool header = own_header_;
+    discard(heard_.size());
+    damaged_whole_ = whole;
+    own_header_ = header;
+}
+
 /// The frame begins with the first byte fed.
 void ReplyFramer::find_start_at_head() {
     if (looked_ > 0 || heard_.size() < 2) return;
@@ -323,12 +331,13 @@ void ReplyFramer::discard(std::size_t count) {
 
 // Received bytes that are no reply: their classification.
 
-bool ReplyFramer::holds_start(ByteView bytes) const {
-    if (ends_ == Ends::told) return bytes.size() > 1 && is_start(bytes[0], bytes[1]);
-    for (std::size_t i = 0; i + 1 < bytes.size(); ++i) {
-        if (is_start(bytes[i], bytes[i + 1])) return true;
+/// How many of these bytes may be the reply's: from the first that begin like it. 0: none.
+std::size_t ReplyFramer::size_from_start(ByteView bytes) const {
+    for (; bytes.size() > 1; bytes = bytes.subspan(1)) {
+        if (is_start(bytes[0], bytes[1])) return bytes.size();
+        if (ends_ == Ends::told) break;
     }
-    return false;
+    return 0;
 }
 
 /// True for our damaged reply, and not for our own frame, which may begin like it.
@@ -376,10 +385,10 @@ void ReplyFramer::classify(ByteView bytes) {
 void ReplyFramer::step_over(Unused part) {
     if (part.kind == Unused::Kind::damaged) {
         const ByteView not_own = ByteView(part.bytes).subspan(own_beginning(part.bytes));
-        const bool started = holds_start(not_own);
-        damaged_ = damaged_ || started;
-        damaged_whole_ = damaged_whole_ || (started && not_own.size() >= expected_.value_or(0));
-        own_header_ = own_header_ || (started && is_own_reply(part.bytes));
+        const std::size_t size = size_from_start(not_own);
+        damaged_ = damaged_ || size > 0;
+        damaged_whole_ = damaged_whole_ || (size > 0 && size >= expected_.value_or(0));
+        own_header_ = own_header_ || (size > 0 && is_own_reply(part.bytes));
     }
     constexpr std::size_t kKept = 64;  // parts; further bytes go to the last one
     if (unused_.size() < kKept) {

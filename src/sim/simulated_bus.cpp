@@ -171,7 +171,7 @@ Bytes SimulatedBus::State::received_adu(Bytes wire) const {
         open.insert(open.end(), piece->bytes.begin(), piece->bytes.end());
         if (piece->end == modbus::AsciiTranscript::Piece::End::none) continue;
         frame = std::exchange(open, {});
-        if (piece->end == modbus::AsciiTranscript::Piece::End::damage) frame.clear();
+        if (piece->end != modbus::AsciiTranscript::Piece::End::frame) frame.clear();
     }
     return frame;
 }

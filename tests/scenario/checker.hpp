@@ -148,6 +148,7 @@ class Checker : public Witness {
     void check_values(TimePoint now, const Open& open, const arbiter::Finish& finish);
     Bytes heard_for(const Open& open, const Bytes& reply) const;
     bool is_padded(const Open& open, const Bytes& reply) const;
+    bool is_behind_first_copy(TimePoint now, std::uint8_t station) const;
     bool is_luck(ByteView heard);
     void check_write(TimePoint now, const Open& open, const Bytes& reply);
     void check_fault(TimePoint now, const Open& open, Fault fault);

@@ -14,6 +14,16 @@ namespace {
 
 constexpr std::size_t kLongestAdu = 256;
 
+/// True for two writes to one place: of their values the confirmation says nothing.
+bool are_confirmed_alike(ByteView before, ByteView pdu) {
+    const auto is_longer_write = [](ByteView request) {
+        return !request.empty() && (request[0] == modbus::kWriteMultipleCoils ||
+                                    request[0] == modbus::kWriteMultipleRegisters);
+    };
+    return is_longer_write(before) && is_longer_write(pdu) &&
+           modbus::normal_write_reply(before) == modbus::normal_write_reply(pdu);
+}
+
 }  // namespace
 
 void Checker::on_line_up(TimePoint now) {
@@ -159,7 +169,7 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     attempt_.span = test::read_span(station, pdu);
     attempt_.again = what == FrameKind::retry;
     const Bytes before = std::exchange(asked_[station], Bytes(pdu.begin(), pdu.end()));
-    attempt_.same = std::ranges::equal(before, pdu);
+    attempt_.same = std::ranges::equal(before, pdu) || are_confirmed_alike(before, pdu);
     const auto order = orders_.find(station);
     if (order != orders_.end()) order->second.on_asked(attempt_.sent, pdu);
     // Where an answer was not believed its own may still come, and the retry's fits both (P1).

@@ -16,10 +16,11 @@ struct OpenViolation {
 /// Not listed, because nobody can mend it, is what has nothing on the wire to be told by. The
 /// checker knows it by what the world knows, and lets nothing else pass:
 ///   - A good CRC by chance: nobody has said these bytes (Truth::is_chance()).
-///   - The first copy of all of a reply, which comes when the very same has just been asked again:
-///     byte for byte the answer of a panel whose values have not changed, in its time. The answer
-///     that it displaces comes one late (Checker::on_copy()). From the next copy on the panel is
-///     known, and to another question it would be asked for once more.
+///   - The first copy of all of a reply, which comes when the very same has just been asked again,
+///     or other values are written to the same place: byte for byte the answer of a panel whose
+///     values have not changed, or that has done it, in its time. The answer that it displaces
+///     comes one late (Checker::on_copy()). From the next copy on the panel is known: to another
+///     question it would be asked for once more, and a confirmation be read back.
 ///   - A reply with more values than were asked for, right count and good CRC: byte for byte the
 ///     late one to an earlier request of that length, or the answer to the present one
 ///     (Checker::is_padded(), looks_late()).
@@ -40,11 +41,6 @@ struct OpenViolation {
 ///     (Checker::on_refused()).
 ///   - A copy of a reply that nobody has heard whole: it is that reply (Checker::on_copy()).
 inline constexpr auto kOpenViolations = std::to_array<OpenViolation>({
-    // Three in 2,300 seeds: others' bytes in front of a write's confirmation, and nobody asks
-    // again.
-    {"company", "P4: a sound panel's request failed: damaged"},
-    // In ASCII, where a pause may be as long as the hole that is allowed.
-    {"voices", "P4: a sound panel's request failed: damaged"},
     // One in 2,300 (21): all stations that are asked for rest.
     {"company", "P5: the line was silent"},
     // One to seven in 2,300: its late reply lies in what was heard of others, or was cut by them,

@@ -207,6 +207,21 @@ constexpr BrokenOnce kBrokenOnce[] = {
     // The first copy that was heard was of a reply that had come damaged.
     {Kind::receiver, 883},
     {Kind::voices, 1503},
+    // ... and of a confirmation, when other values had been written to the same place.
+    {Kind::company, 893},
+    // A panel said the first bytes of a confirmation, then another one its frame, then all of it.
+    {Kind::company, 529},
+    {Kind::company, 1133},
+    // ... behind another master's request.
+    {Kind::company, 1514},
+    // In ASCII bytes that nobody says came behind the first ones.
+    {Kind::company, 8, SerialMode::ascii},
+    {Kind::company, 15, SerialMode::ascii},
+    // A pause came in front of a character that completes no byte, ...
+    {Kind::voices, 170, SerialMode::ascii},
+    // ... and the first bytes were those of our own frame.
+    {Kind::voices, 56, SerialMode::ascii},
+    {Kind::voices, 183, SerialMode::ascii},
 };
 
 TEST(Scenario, SeedsThatOnceBrokeAPromiseKeepThemAll) {

@@ -115,6 +115,7 @@ class AsciiTranscript {
             none,
             frame,   ///< valid: LRC, CR LF
             damage,  ///< not a valid frame
+            cut,     ///< ... another begins, or too long a pause followed: it may begin anew
         };
         Bytes bytes;
         End end = End::none;

@@ -66,6 +66,8 @@ class ReplyFramer {
     /// The bytes since the last end are one frame, valid if `good`. Returns the reply if it is one;
     /// drops the rest. For Ends::told.
     std::optional<Bytes> on_end(bool good);
+    /// They are the beginning of a frame that breaks off: the reply may begin anew. For Ends::told.
+    void on_cut();
 
     /// True if bytes are pending: more bytes or silence will decide.
     bool has_pending() const { return !heard_.empty(); }
@@ -118,7 +120,7 @@ class ReplyFramer {
     enum class Inside : std::uint8_t { no, perhaps, yes };
     Inside inside_other(std::size_t start, std::size_t end) const;
     bool is_start(std::uint8_t address, std::uint8_t function) const;
-    bool holds_start(ByteView bytes) const;
+    std::size_t size_from_start(ByteView bytes) const;
     bool is_own_reply(ByteView damaged) const;
     std::size_t own_beginning(ByteView damaged) const;
     void collect_starts();

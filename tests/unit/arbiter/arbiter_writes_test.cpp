@@ -49,6 +49,25 @@ TEST_F(ArbiterTest, P2NeverRepeatsAWriteUnlessTheStationAllowsIt) {
     EXPECT_EQ(script.sent.size(), 2u);
 }
 
+/// P4: nobody asks again, and all of it may still come behind its first bytes and others' frames.
+TEST_F(ArbiterTest, P4AConfirmationThatBeginsAnewBehindOthersFramesIsAwaited) {
+    for (int i = 0; i < 16; ++i) {
+        bus.submit(17, kRead);
+        answer_next(bus, 17, kReply, 3ms);
+    }
+    const Ticket ticket = bus.submit(17, kToOne);
+    ASSERT_TRUE(bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear_paced("11 10"_hex);
+    bus.run_for(4ms);
+    bus.hear_paced(modbus::encode_adu(40, kReply));
+    bus.run_for(30ms);
+    bus.hear_paced(modbus::encode_adu(17, kConfirmed));
+    bus.run_for(5ms);
+    EXPECT_EQ(bus.answer(ticket).pdu.value(), kConfirmed);
+}
+
 TEST_F(ArbiterTest, P6ReportsWhatAWriteTouchesWhenItLeavesAndWhenItsAttemptIsOver) {
     bus.submit(17, kRead);
     answer(bus, 17, kReply);

@@ -54,6 +54,35 @@ TEST_F(AsciiLine, HandsTheReplyOnAtItsLastCharacter) {
     EXPECT_EQ(bus.answer(ticket).at, bus.now());
 }
 
+/// P4: its first characters, bytes that nobody says, and then all of it.
+TEST_F(AsciiLine, AReplyThatBreaksOffMayBeginAnew) {
+    const Ticket ticket = ask(kWrite);
+    const Bytes confirmed = modbus::encode_ascii(17, kWrite);
+    bus.hear_paced(ByteView(confirmed).first(5));
+    bus.hear_paced("00 12 3C CD 00 45 00 00 BF"_hex);
+    bus.hear_paced(modbus::encode_ascii(40, kReply));
+    EXPECT_FALSE(bus.answered(ticket));
+    bus.hear_paced(confirmed);
+    EXPECT_EQ(told(ticket).value(), kWrite);
+}
+
+/// Of a pause the characters count, not the bytes.
+TEST_F(AsciiLine, AReplyGoesOnWithEachCharacter) {
+    for (const std::size_t front : {6u, 7u, 8u}) {
+        settings.reply_hole = 100ms;
+        BusScript script{settings};
+        const Ticket ticket = script.submit(17, kRead);
+        script.run_to_end_of_request();
+        script.run_for(2ms);
+        script.hear_paced(ByteView(kReplyText).first(front));
+        script.run_for(90ms);
+        script.hear_paced(ByteView(kReplyText).subspan(front, 1));
+        script.run_for(90ms);
+        script.hear_paced(ByteView(kReplyText).subspan(front + 1));
+        EXPECT_EQ(script.answer(ticket).pdu.value(), kReply) << front;
+    }
+}
+
 TEST_F(AsciiLine, CountsTheTimeoutFromTheEndOfItsLongerRequest) {
     settings.stations[0].retries = 0;
     BusScript script{settings};

@@ -363,6 +363,21 @@ TEST(Framer, AFrameBehindTheBeginningOfAnotherIsFound) {
     EXPECT_EQ(kept[1].bytes.size(), asked.size() + other.size());
 }
 
+/// What stands in front of its first byte is none of it.
+TEST(Framer, AReplyBehindARequestIsDamagedAsAWholeOnlyIfItWasAllThere) {
+    const Bytes reply = encode_adu(5, kReplyPdu);
+    for (const std::size_t size : {std::size_t{2}, reply.size()}) {
+        ReplyFramer framer(5, kRequest);
+        Bytes heard = encode_adu(9, kRequest);
+        heard.insert(heard.end(), reply.begin(), reply.begin() + static_cast<std::ptrdiff_t>(size));
+        heard.back() ^= size == reply.size() ? 1 : 0;
+        framer.feed(heard);
+        framer.on_silence();
+        EXPECT_TRUE(framer.was_damaged());
+        EXPECT_EQ(framer.was_damaged_whole(), size == reply.size());
+    }
+}
+
 TEST_F(FramerOfBothOrders, TheWrongOrderIsDamage) {
     const auto parts = classify_heard(encode_adu(5, kReplyPdu), 6, orders);
     ASSERT_EQ(parts.size(), 1u);

@@ -94,6 +94,17 @@ class Attempt {
     /// What was heard since the last end is one frame, if `good`, or none: where the line delimits
     /// frames (ASCII).
     Verdict on_frame_end(bool good, const Ends& ends);
+    /// A character came that completes no byte (ASCII): what has begun goes on.
+    void on_goes_on(TimePoint now) {
+        if (is_hearing()) last_byte_ = std::max(last_byte_, now);
+    }
+    /// What was heard since the last end breaks off.
+    Verdict on_frame_cut(const Ends& ends) {
+        take_from_echo(ends);
+        framer_.on_cut();
+        collect();
+        return Verdict::open;
+    }
     /// Harmless if nothing is due.
     Verdict on_deadline(TimePoint now, const Ends& ends);
     TimePoint deadline() const;
