@@ -128,13 +128,12 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
     // An earlier request may have been refused; the next refusal may be that again.
     const bool refuses_other =
         refusal && !group.probe && (attempt.refusal_was_rejected() || claims.other_outstanding);
-    const bool impossible =
-        ReplyHabits::is_impossible(attempt, claims, is_early && attempt.replied_too_early());
     const bool overdue =
         claims.passed && (station.is_slow(attempt.begun_after(now)) || habits.is_disordered());
     const bool too_soon =
         first && group.attempts <= 1 && station.is_far_too_quick(first_sign, claims.passed);
-    const bool other = claims.passed && attempt.answers().follows_other();
+    const bool other = (claims.passed && attempt.answers().follows_other()) ||
+                       (first && claims.outdated && group.doubted.empty());
     const bool contradicted = other || (attempt.is_undecided(claims.repeats_other) &&
                                         (group.doubts == 0 || !habits.answers_twice()));
     const bool misnumbered = refusal && group.may_doubt_refusal() &&
@@ -145,10 +144,10 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
                          (repeats && !group.jobs.empty() &&
                           habits.earlier_write(book, now, group.request.pdu(), reply) != nullptr);
     return fact::answers | facts_of_others(now, claims) | when(refuses_other, fact::refuses_other) |
-           when(impossible, fact::impossible) | when(overdue, fact::overdue) |
-           facts_of_equals(now, station, is_early) | when(misnumbered, fact::misnumbered) |
-           when(repeats, fact::repeats) | when(too_soon, fact::too_soon) |
-           when(before_end, fact::before_end) | when(contradicted, fact::contradicted) |
+           when(overdue, fact::overdue) | facts_of_equals(now, station, is_early) |
+           when(misnumbered, fact::misnumbered) | when(repeats, fact::repeats) |
+           when(too_soon, fact::too_soon) | when(before_end, fact::before_end) |
+           when(contradicted, fact::contradicted) |
            when(first && is_held(now, habits), fact::may_be_followed) |
            when(may_ask, fact::may_ask);
 }
@@ -166,6 +165,8 @@ bool Arbiter::is_held(TimePoint now, const ReplyHabits& habits) const {
 /// Returns true if it is the answer.
 bool Arbiter::takes_reply(TimePoint now, Station& station, bool early) {
     Attempt& attempt = *active_;
+    if (early && !settings_.paced && pace_.believed() && attempt.replied_too_early())
+        station.replies().on_perhaps_copied(now);
     const Facts facts = facts_of_reply(now, station, early);
     const Done done = judge(facts);
     if ((facts & fact::overdue) != 0) station.on_doubted(attempt.waited(now));
@@ -210,6 +211,7 @@ void Arbiter::settle(TimePoint now) {
     OutstandingRequests& book = stations_.book();
     const TimePoint proved =
         station.replies().surely_answered(book, attempt.timing().started, reply);
+    group.started = station.replies().sampled(book, now, group);
     const Station::Replied replied = station.on_reply(book, now, attempt, needed, think);
     stations_.on_reply(now, group.shows_pace() ? std::optional(needed) : std::nullopt);
     station.on_kept(now, attempt.came_at(now));

@@ -130,6 +130,12 @@ class ReplyHabits {
         const Asked* const other = book.first(id_, reply);
         return other != nullptr ? std::min(other->sent, started) : started;
     }
+    /// Not before this was sampled what answers the group now: an equal request of before may have
+    /// this reply.
+    TimePoint sampled(const OutstandingRequests& book, TimePoint now, const Group& group) const {
+        const auto first = book.first_asked(id_, group.request.pdu(), now - latest_reply());
+        return std::min(group.started, first.value_or(group.started));
+    }
 
     // Events
 
@@ -177,7 +183,7 @@ class ReplyHabits {
     /// wire, which this does not answer.
     Heard on_unsolicited(OutstandingRequests& book, TimePoint now, Done done, ByteView pdu,
                          bool asked);
-    /// A frame came that equals a recent reply, and may be our own.
+    /// A frame came that equals a recent reply and may be our own, or a reply sooner than computed.
     void on_perhaps_copied(TimePoint now) { duplicates_.on_perhaps(now); }
     /// Damaged bytes were heard.
     void on_damaged_bytes(const OutstandingRequests& book, TimePoint now, ByteView bytes,

@@ -40,15 +40,17 @@ auto closed_for(ByteView reply, TimePoint open) {
     };
 }
 
-/// One of ours that is closed. An earlier attempt of the same read may answer it; a write is not
-/// repeated.
+/// One of ours that is closed. An earlier attempt of the same read may answer it, unless that was
+/// written since; a write is not repeated.
 void add_closed(Claims& claims, const Asked& one, ByteView reply,
                 const OutstandingRequests::Windows& windows, bool is_same_read) {
     const bool closed = one.sent > windows.closed;
-    const bool passed = one.state == State::passed && one.sent > windows.passed && !is_same_read;
+    const bool passed = one.state == State::passed && one.sent > windows.passed &&
+                        (!is_same_read || one.outdated);
     if ((!closed && !passed) || !modbus::answers(one.pdu, reply)) return;
     claims.closed = claims.closed || closed;
     claims.passed = claims.passed || passed;
+    claims.outdated = claims.outdated || (passed && is_same_read);
 }
 
 /// A reply that was given before.
@@ -188,8 +190,8 @@ TimePoint OutstandingRequests::last_sent(std::uint8_t station) const {
 std::optional<TimePoint> OutstandingRequests::first_asked(std::uint8_t station, ByteView pdu,
                                                           TimePoint open) const {
     for (const Asked& one : of(station).asked) {
-        if (is_outstanding(one) && one.sent > open && std::ranges::equal(one.pdu, pdu))
-            return one.sent;
+        const bool may_come = is_outstanding(one) || is_closed(one);
+        if (may_come && one.sent > open && std::ranges::equal(one.pdu, pdu)) return one.sent;
     }
     return std::nullopt;
 }
@@ -241,6 +243,19 @@ void OutstandingRequests::announce(std::uint8_t station, ByteView exception) {
     PoolVector<Asked>& all = at(station).asked;
     const auto found = std::ranges::find_if(all, outstanding_for(exception));
     if (found != all.end()) found->announced = true;
+}
+
+void OutstandingRequests::on_written(std::uint8_t station, const modbus::Request& write) {
+    const std::optional<modbus::Span> items = write.access().write;
+    const auto mark = [&](Page& page) {
+        for (Asked& one : page.asked) {
+            if (!is_outstanding(one) && !is_closed(one)) continue;
+            const auto read = modbus::read_span(one.pdu);
+            one.outdated = one.outdated || !read || modbus::may_change(items, *read);
+        }
+    };
+    if (station != kBroadcast) return mark(at(station));
+    for (Page& page : pages_) mark(page);
 }
 
 void OutstandingRequests::on_damaged(std::uint8_t station, TimePoint sent, const Bytes& pdu) {

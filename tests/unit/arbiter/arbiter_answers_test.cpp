@@ -356,5 +356,29 @@ TEST_F(ArbiterAnswersTest, P1TheLastReplyOfEachFunctionMayBeSaidOnceMore) {
     EXPECT_FALSE(script.answered(other));
 }
 
+/// P2, P8: where a line has kept pace so far a confirmation that repeats one, and comes sooner than
+/// computed, is neither believed nor thrown away: a read tells.
+TEST_F(ArbiterAnswersTest, P8AnEarlyConfirmationThatRepeatsOneIsReadBack) {
+    const Bytes write = "10 00 64 00 02 04 00 0B 00 0C"_hex;
+    const Bytes confirmed = "10 00 64 00 02"_hex;
+    for (const bool is_done : {true, false}) {
+        BusScript tcp{settings};
+        for (unsigned i = 1; i <= RecentTimes::kEnough; ++i) {
+            tcp.submit(17, read_at(i), 1);
+            answer(tcp, 17, reply_number(i), 12ms);
+            tcp.run_for(10ms);
+        }
+        tcp.submit(17, "10 00 64 00 02 04 00 01 00 02"_hex, 1);
+        answer(tcp, 17, confirmed, 12ms);
+        tcp.run_for(10ms);
+        const Ticket ticket = tcp.submit(17, write, 1);
+        tcp.hear_reply(17, confirmed);
+        EXPECT_FALSE(tcp.answered(ticket));
+        EXPECT_EQ(tcp.next_sent(300ms).value().adu, encode_adu(17, "03 00 64 00 02"_hex));
+        answer(tcp, 17, is_done ? "03 04 00 0B 00 0C"_hex : "03 04 00 01 00 02"_hex, 12ms);
+        EXPECT_EQ(tcp.answer(ticket).pdu == Result<Bytes>(confirmed), is_done);
+    }
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter::arbiter_answers_test

@@ -137,5 +137,30 @@ TEST_F(ArbiterPassedByTest, P1WhoIsSeenToServeOutOfOrderIsBelievedNoneOfThemMean
     EXPECT_FALSE(script.answer(ticket).pdu);
 }
 
+/// P6: the value was read before the write, and is said behind it, out of turn.
+TEST_F(ArbiterPassedByTest, P1AnEarlierReadOfWhatWasWrittenSinceAnswersNoLaterOne) {
+    for (const Duration after : {Duration{20ms}, Duration{100ms}}) {
+        settings.stations[0].late_window = 5s;
+        BusScript script{settings};
+        ask_behind(script, RecentTimes::kEnough / 2, kLong);
+        answer(script, 17, reply_number(60), 20ms);
+        script.run_for(10ms);
+        script.submit(17, "06 13 88 00 07"_hex, 1);
+        answer(script, 17, "06 13 88 00 07"_hex, 20ms);
+        script.run_for(10ms);
+        const Ticket ticket = script.submit(17, read_at(50), 1);
+        answer(script, 17, reply_number(50), after);
+        EXPECT_FALSE(script.answered(ticket)) << after.count();
+        if (after == Duration{20ms}) {
+            ASSERT_TRUE(script.next_sent(5s)) << "asked again";
+            answer(script, 17, reply_number(70), 20ms);
+            EXPECT_EQ(script.answer(ticket).pdu.value(), reply_number(70));
+        } else {
+            script.run_for(2s);
+            EXPECT_FALSE(script.answer(ticket).pdu);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter::arbiter_disorder_test

@@ -246,6 +246,26 @@ TEST_F(ArbiterMemoryTest, P6AClientNeverReadsOlderThanItsOwnWriteAlsoOneThatTime
     EXPECT_EQ(bus.sent.back().adu[1], 3);
 }
 
+/// What answers a poll may be the late reply to the one before.
+TEST_F(ArbiterMemoryTest, P6ItsAgeCountsFromTheFirstReadThatMayHaveThisReply) {
+    settings.stations[0].retries = 0;
+    settings.stations[0].max_age = 1s;
+    BusScript script{settings};
+    const TimePoint first = script.now();
+    const Ticket missed = script.submit(17, kRead, 9, PriorityClass::poll);
+    while (!script.answered(missed)) script.run_for(1ms);
+    script.submit(17, "03 00 00 00 01"_hex, 2);
+    answer(script, 17, "03 02 00 07"_hex, 3ms);
+    script.run_for(3ms);
+    const Ticket polled = script.submit(17, kRead, 9, PriorityClass::poll);
+    answer(script, 17, kReply, 3ms);
+    ASSERT_TRUE(script.answered(polled));
+    script.run_until(first + 990ms);
+    EXPECT_TRUE(script.answered(script.submit(17, kRead, 1)));
+    script.run_until(first + 1010ms);
+    EXPECT_FALSE(script.answered(script.submit(17, kRead, 1)));
+}
+
 TEST_F(ArbiterMemoryTest, IsEmptyAfterTheLineWasLost) {
     poll(1min);
     bus.line_down();

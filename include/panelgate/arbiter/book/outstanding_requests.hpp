@@ -33,6 +33,7 @@ struct Asked {
     bool followed = false;   ///< a frame of the form of its reply came behind that; of another
                              ///< master's: its answer
     bool announced = false;  ///< an exception has announced its reply: the next one is not its
+    bool outdated = false;   ///< of a read: what it reads has been written since it left
 
     /// When it came to be what it is.
     TimePoint since() const { return sent < replied ? replied : sent; }
@@ -46,6 +47,7 @@ struct Claims {
     bool other_outstanding = false;  ///< ... which is not the open one
     bool closed = false;             ///< to one that has passed or lapsed
     bool passed = false;             ///< to one that has passed and is not the open one
+    bool outdated = false;           ///< ... but a read of the same, before that was written
     bool repeats = false;            ///< a recent reply once more
     bool repeats_other = false;      ///< ... to a request that is not the open one
     bool repeats_refusal = false;    ///< a recent exception that nobody had asked for
@@ -119,7 +121,7 @@ class OutstandingRequests {
     /// When the first and the last of the outstanding left; there must be one.
     TimePoint first_sent(std::uint8_t station) const;
     TimePoint last_sent(std::uint8_t station) const;
-    /// When the first equal request left that is outstanding and left later than `open`.
+    /// When the first equal request left that may still be answered, and left later than `open`.
     std::optional<TimePoint> first_asked(std::uint8_t station, ByteView pdu, TimePoint open) const;
     /// True if some are outstanding, and all of them are this request.
     bool is_only(std::uint8_t station, const Bytes& pdu) const;
@@ -154,6 +156,9 @@ class OutstandingRequests {
                        bool announced = false);
     /// An exception announces the reply to the first outstanding request that it may answer.
     void announce(std::uint8_t station, ByteView exception);
+    /// This write leaves (station 0: to all), answered or not: replies to reads of what it may
+    /// change that are still to come are older.
+    void on_written(std::uint8_t station, const modbus::Request& write);
     /// Its reply came, but damaged.
     void on_damaged(std::uint8_t station, TimePoint sent, const Bytes& pdu);
     void forget_damaged(std::uint8_t station);
