@@ -37,10 +37,14 @@ Station::Heard Station::on_unsolicited_frame(OutstandingRequests& book, TimePoin
     if (done == Done::second) times_ = times_before_;
     if (!is_late(done)) return heard;
     if (heard.needed) times_.add_long(*heard.needed);
-    heard.back = health_.on_late_reply(now);
+    heard.back = on_sign_of_life(now);
+    return heard;
+}
+
+bool Station::on_sign_of_life(TimePoint now) {
     missed_ = false;
     probes_ = 0;
-    return heard;
+    return health_.on_late_reply(now);
 }
 
 Station::Replied Station::on_reply(OutstandingRequests& book, TimePoint now, const Attempt& attempt,

@@ -73,6 +73,9 @@ std::vector<Unused> UnsolicitedFrames::joined(TimePoint now, std::vector<Unused>
             const TimePoint came = part.came;
             if (!first) part = modbus::classify_frame(whole, part.station, good);
             part.came = came;
+        } else if (const ByteView late = stations.book().late_in(whole, orders_); !late.empty()) {
+            part.station = late[0];
+            cut_.assign(late.end(), ByteView(whole).end());
         } else if (whole.size() < modbus::kMaxRtuAdu) {
             cut_ = std::move(whole);
         }
@@ -112,6 +115,9 @@ void UnsolicitedFrames::note(TimePoint now, const std::vector<modbus::Unused>& p
         }
         outbox.on_unsolicited(now, part, done, quiet.station());
         if (done == Done::damaged) stations.on_damaged(heard_at, part.bytes);
+        if (done == Done::damaged && part.station != 0)
+            note_life(stations.of(part.station).on_sign_of_life(heard_at), part.station, stations,
+                      outbox);
         if ((done == Done::damaged || done == Done::echo) && idle)
             stations.on_trail(heard_at, replied_);
         if (done == Done::echo) quiet.has_come();
@@ -136,11 +142,15 @@ void UnsolicitedFrames::note_reply(TimePoint now, TimePoint heard_at, const Unus
                                                            modbus::pdu_of(part.bytes), asked);
     outbox.on_unsolicited(now, part, done, quiet.station(), heard.lateness);
     if (is_late(done)) outbox.event(Kind::late, part.station, heard.lateness);
-    if (heard.back) {
-        stations.on_recovery();
-        outbox.event(Kind::online, part.station);
-    }
+    note_life(heard.back, part.station, stations, outbox);
     if (heard.settled) quiet.lift(now, part.station);
+}
+
+void UnsolicitedFrames::note_life(bool back, std::uint8_t station, Stations& stations,
+                                  Outbox& outbox) {
+    if (!back) return;
+    stations.on_recovery();
+    outbox.event(Kind::online, station);
 }
 
 /// Another master asks: sending now would damage the reply to it. Wait as long as our slowest panel

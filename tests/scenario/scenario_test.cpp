@@ -204,6 +204,8 @@ constexpr BrokenOnce kBrokenOnce[] = {
     {Kind::receiver, 1950},
     // A late reply was cut by a pause, and its panel had begun to say it before.
     {Kind::voices, 377},
+    // ... or lay behind our own request, in one damage with it.
+    {Kind::wild, 475},
     // The first copy that was heard was of a reply that had come damaged.
     {Kind::receiver, 883},
     {Kind::voices, 1503},

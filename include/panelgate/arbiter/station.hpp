@@ -84,6 +84,8 @@ class Station {
     /// `asked`: a request to it is on the wire.
     Heard on_unsolicited_frame(OutstandingRequests& book, TimePoint now, Done done, ByteView pdu,
                                bool asked = false);
+    /// A reply of it came, late, or in pieces. True if it was offline.
+    bool on_sign_of_life(TimePoint now);
     /// Unsolicited bytes followed its reply.
     void on_unsolicited_bytes(TimePoint now) { trail_.on_unsolicited(now); }
 

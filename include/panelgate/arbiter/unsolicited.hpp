@@ -82,7 +82,8 @@ class UnsolicitedFrames {
     std::vector<modbus::Unused> take_delimited(std::uint8_t asked, bool good);
 
     /// The same, but what a pause or our own request has cut in two is whole: our own frame,
-    /// another master's request, or an answer to one. Its first piece has passed as damage.
+    /// another master's request, or an answer to one. Its first piece has passed as damage. What
+    /// holds a late reply stays damage, and closes nothing, but names the station that is there.
     std::vector<modbus::Unused> joined(TimePoint now, std::vector<modbus::Unused> parts,
                                        const Stations& stations);
 
@@ -90,6 +91,8 @@ class UnsolicitedFrames {
     /// reply, so that bytes may be its trail.
     void note(TimePoint now, const std::vector<modbus::Unused>& parts, bool idle,
               Stations& stations, Quiet& quiet, Outbox& outbox);
+    /// What came shows that this station is there; `back`: it was offline.
+    static void note_life(bool back, std::uint8_t station, Stations& stations, Outbox& outbox);
     /// True if the station sent this instead of the right reply: not the echo, a duplicate, an
     /// outstanding reply, or its answer to a broadcast or another master. `heard_after`: from the
     /// end of the request to the first byte behind it.

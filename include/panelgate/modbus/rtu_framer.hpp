@@ -33,7 +33,7 @@ struct Unused {
         damaged,  ///< not a valid frame
     };
     Kind kind = Kind::damaged;
-    std::uint8_t station = 0;  ///< of a valid frame
+    std::uint8_t station = 0;  ///< of a valid frame; of damage that shows that it is there
     Bytes bytes;
     TimePoint came{};  ///< its last byte, if that is known
 };

@@ -6,6 +6,7 @@
 #include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/response.hpp"
+#include "panelgate/modbus/rtu_framer.hpp"
 
 namespace panelgate::arbiter {
 
@@ -170,6 +171,19 @@ const Bytes* OutstandingRequests::given_in(TimePoint now, std::uint8_t station, 
         if (!std::ranges::search(bytes, earlier).empty()) return &one.reply;
     }
     return nullptr;
+}
+
+ByteView OutstandingRequests::late_in(ByteView bytes, const modbus::CrcOrders& orders) const {
+    for (; bytes.size() >= modbus::kMinAdu; bytes = bytes.subspan(1)) {
+        const std::size_t size = modbus::reply_length(bytes).length;
+        if (!any(bytes[0]) || size < modbus::kMinAdu || size > bytes.size()) continue;
+        const ByteView adu = bytes.first(size);
+        const ByteView pdu = modbus::pdu_of(adu);
+        if (first(adu[0], pdu) != nullptr && !modbus::answers(pdu, pdu) &&
+            modbus::crc_ok(adu, orders))
+            return adu;
+    }
+    return {};
 }
 
 bool OutstandingRequests::any_announced(std::uint8_t station) const {

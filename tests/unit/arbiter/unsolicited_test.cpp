@@ -101,6 +101,27 @@ TEST_F(UnsolicitedFramesTest, OurOwnFrameWithoutALast0IsNoReply) {
     EXPECT_EQ(heard(own), "echo");
 }
 
+/// What it closed might be the retry's: it only shows that its station is there.
+TEST_F(UnsolicitedFramesTest, P4ALateReplyInPiecesBringsItsStationBackAndClosesNothing) {
+    Station& station = stations.of(17);
+    station.replies().on_unanswered(stations.book(), now, kRead, now - 500ms);
+    while (!station.on_given_up(now, Fault::timeout, true)) {
+    }
+    const auto hear = [&](ByteView bytes) {
+        unsolicited.hear(now, bytes);
+        unsolicited.note(now, unsolicited.joined(now, unsolicited.take(17), stations), true,
+                         stations, quiet, outbox);
+    };
+    const ByteView whole = kAnswer;
+    hear(whole.first(2));  // some panels say that before
+    hear(whole.first(6));
+    EXPECT_TRUE(station.health().offline());
+    hear(whole.subspan(6));
+    EXPECT_FALSE(station.health().offline());
+    EXPECT_TRUE(stations.book().any(17));
+    EXPECT_EQ(counters().late_frames, 0u);
+}
+
 TEST_F(UnsolicitedFramesTest, BehindAnotherMastersRequestTheLineRestsForItsReply) {
     EXPECT_LT(quiet.free_at(2ms), now + 1s);
     heard(encode_adu(18, kRead));

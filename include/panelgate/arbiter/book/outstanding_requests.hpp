@@ -105,6 +105,9 @@ class OutstandingRequests {
     /// Returns a recent reply that occurs again, as a good frame, inside damaged bytes; or nullptr.
     const Bytes* given_in(TimePoint now, std::uint8_t station, ByteView bytes,
                           modbus::CrcOrder order) const;
+    /// Returns a reply to an outstanding request inside damaged bytes, but none that equals its
+    /// request, which may be our own frame; or {}.
+    ByteView late_in(ByteView bytes, const modbus::CrcOrders& orders) const;
 
     // Admission
 
