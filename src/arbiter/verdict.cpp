@@ -176,6 +176,11 @@ bool Arbiter::takes_reply(TimePoint now, Station& station, bool early) {
     if (done == Done::keep) keep(Answers::Kept::believed);
     if (done == Done::ask_again) keep(Answers::Kept::doubted);
     if (done == Done::suspect_echo) keep(Answers::Kept::echo);
+    // Whatever it answers: it is neither our own frame nor an adapter's copy.
+    if ((facts & (fact::like_broadcast | fact::repeats)) == fact::like_broadcast &&
+        attempt.reply() != attempt.group().request.pdu())
+        UnsolicitedFrames::note_life(station.on_sign_of_life(now), station.id(), stations_,
+                                     outbox_);
     if (done == Done::hold)
         attempt.keep_candidate(holds_answer(now, station.replies()), Answers::Kept::held);
     if (done != Done::accept && (facts & fact::before_end) != 0) attempt.mark_early();

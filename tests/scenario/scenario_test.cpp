@@ -206,6 +206,8 @@ constexpr BrokenOnce kBrokenOnce[] = {
     {Kind::voices, 377},
     // ... or lay behind our own request, in one damage with it.
     {Kind::wild, 475},
+    // A write's answer might have been that to a broadcast, and its panel stayed offline.
+    {Kind::stall, 3},
     // The first copy that was heard was of a reply that had come damaged.
     {Kind::receiver, 883},
     {Kind::voices, 1503},
