@@ -258,8 +258,11 @@ ReplyHabits::Heard ReplyHabits::on_late(OutstandingRequests& book, TimePoint now
     if (answered.announced) announced_.on_kept();
     const bool may_be_meant = asked && modbus::exception_of(pdu);  // for the request on the wire
     // After a shortened wait it shows how long the panel needs; a reply delayed beyond the whole
-    // timeout does not.
-    if (now <= due && !may_be_meant) heard.needed = now - answered.sent;
+    // timeout does not, unless it was to a later request.
+    heard.at_least = now > due;
+    const TimePoint sent =
+        heard.at_least ? book.first(id_, pdu, TimePoint::max())->sent : answered.sent;
+    if (now <= sent + late_.timeout() && !may_be_meant) heard.needed = now - sent;
     heard.lateness = std::max(now - due, Duration::zero());
     if (heard.lateness > Duration::zero() && !may_be_meant) late_.on_late(heard.lateness);
     // A repetition of the previous reply may be a duplicate, and the outstanding reply still comes.

@@ -36,7 +36,8 @@ Station::Heard Station::on_unsolicited_frame(OutstandingRequests& book, TimePoin
     // It may be the true answer to the last request: then the one before it shows no pace.
     if (done == Done::second) times_ = times_before_;
     if (!is_late(done)) return heard;
-    if (heard.needed) times_.add_long(*heard.needed);
+    // Probes wait for less long, and any of many may have been answered.
+    if (heard.needed && (!heard.at_least || health_.offline())) times_.add_long(*heard.needed);
     heard.back = on_sign_of_life(now);
     return heard;
 }

@@ -208,6 +208,8 @@ constexpr BrokenOnce kBrokenOnce[] = {
     {Kind::wild, 475},
     // A write's answer might have been that to a broadcast, and its panel stayed offline.
     {Kind::stall, 3},
+    // Late replies to probes were taken for those to the first ones, and the next had no longer.
+    {Kind::company, 508},
     // The first copy that was heard was of a reply that had come damaged.
     {Kind::receiver, 883},
     {Kind::voices, 1503},

@@ -177,6 +177,7 @@ class ReplyHabits {
     struct Heard {
         Duration lateness{};             ///< of a late reply, after its response timeout
         std::optional<Duration> needed;  ///< of one that came within it, after a shortened wait
+        bool at_least = false;           ///< that, as it is to the last request that it fits
         bool settled = false;            ///< no reply is outstanding any more
     };
     /// A good frame came that is no answer, and was judged. `asked`: a request to it is on the
