@@ -282,7 +282,7 @@ void Schedule::take_turn(const Job& job) {
 
 bool Schedule::others_go_first(const Line& line) const {
     const TimePoint until = others_since_ + std::max(patience_, timing::kOthersFirst);
-    if (turns_ == 0 || line.now >= until) return false;
+    if (turns_ == 0 || !backlog_.has_retries() || line.now >= until) return false;
     return backlog_.queue().any_first([&](const Job& job) {
         return has_turn(job) && may_run(line, job) && line.stations.may_spend(line.now, job);
     });

@@ -210,6 +210,8 @@ constexpr BrokenOnce kBrokenOnce[] = {
     {Kind::stall, 3},
     // Late replies to probes were taken for those to the first ones, and the next had no longer.
     {Kind::company, 508},
+    // A retry had gone with its client, and the turns that it had left to others stayed.
+    {Kind::company, 823},
     // The first copy that was heard was of a reply that had come damaged.
     {Kind::receiver, 883},
     {Kind::voices, 1503},

@@ -191,6 +191,17 @@ TEST_F(ScheduleTest, P9AReaderWaitsForFourWritesAlsoBesideARetry) {
     EXPECT_EQ(writes, 4);
 }
 
+/// ... and nobody has a turn for the sake of a retry that has gone with its client.
+TEST_F(ScheduleTest, P9ARetryThatNobodyWaitsForAnyMoreReservesNoTurns) {
+    for (int i = 0; i < 6; ++i) wait(2, true);
+    Group retry = failed(1);
+    const Client client = retry.jobs.front().client;
+    schedule.retry(now, std::move(retry), kDear, stations);
+    wait(3);
+    EXPECT_EQ(schedule.backlog().cancel(client).size(), 1u);
+    EXPECT_EQ(order(), "2 2 2 2 3 2 2");
+}
+
 /// While it rests after each reply the polls of another station have the turns of their class.
 TEST_F(ScheduleTest, P9ReadsOfAStationThatSaysItsRepliesTwiceLeaveTurnsToItsPolls) {
     const Bytes reply = "03 02 00 07"_hex;
