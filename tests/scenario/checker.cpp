@@ -191,6 +191,15 @@ void Checker::check_fault(TimePoint now, const Open& open, Fault fault) {
     const bool refused = (truth_.refused(station, open.job.request.pdu(), open.submitted) ||
                           truth_.refused(station, asked_[station], open.submitted)) &&
                          watch_.rests_until(station) > open.submitted;
+    // What would confirm it may be the answer to a broadcast, and its place cannot be read (P8).
+    constexpr Duration kLatestAnswer = 5s;
+    const auto spread = open.write
+                            ? spread_.find(modbus::normal_write_reply(open.job.request.pdu()))
+                            : spread_.end();
+    if (fault == Fault::timeout && spread != spread_.end() &&
+        open.submitted < spread->second + kLatestAnswer &&
+        truth_.refused(station, asked_[station], open.submitted))
+        return;
     const bool failed =
         was_heard(fault) || fault == Fault::offline || (fault == Fault::timeout && !at_deadline);
     if (failed && !refused && !is_overdue(now, station))

@@ -130,7 +130,8 @@ class Checker : public Witness {
     TimePoint behind_announced(arbiter::Ticket ticket, const Open& open) const;
     TimePoint behind_copies(std::uint8_t station) const;
     std::optional<TimePoint> good_work_since(TimePoint since) const;
-    bool waits_in_order(TimePoint since, arbiter::Ticket ticket, const Open& open) const;
+    TimePoint rests_for(arbiter::Ticket ticket, const Open& open) const;
+    TimePoint behind_own(TimePoint since, arbiter::Ticket ticket, const Open& open) const;
     bool is_noisy(TimePoint now) const;
     Duration least_wait() const;
     const arbiter::StationSettings& settings_of(std::uint8_t station) const;

@@ -79,7 +79,7 @@ void Checker::on_answered(TimePoint now, std::uint8_t station) {
     Duration& latest = begun_after_[station];
     if (shows) latest = std::max(latest, now - attempt_.sent - frame_time(settings_.serial, size));
     attempt_.first = !watch_.has_answered(attempt_.station);
-    const bool is_first = watch_.on_answered(now, attempt_.station, now - attempt_.sent);
+    const bool is_first = shows && watch_.on_answered(now, attempt_.station, now - attempt_.sent);
     // What the way held back may have reached the station only now.
     if (is_first && settings_.may_stall) watch_.on_owed(attempt_.station, owed_until());
     // Of two attempts nobody knows which one the reply was for.
@@ -311,11 +311,10 @@ std::optional<TimePoint> Checker::good_work_since(TimePoint since) const {
         const std::uint8_t station = o.job.station;
         const bool good = !o.sent && !o.gone && station != kBroadcast &&
                           !watch_.is_silent(station) && watch_.is_good(station, since) &&
-                          !(o.write && echoes_) && !waits_in_order(since, ticket, o);
-        if (!good) continue;
-        const TimePoint from =
-            std::max({since, o.submitted, watch_.rests_until(station), behind_broadcasts(o),
-                      behind_announced(ticket, o), behind_copies(station)});
+                          !(o.write && echoes_);
+        const TimePoint before = good ? behind_own(since, ticket, o) : TimePoint::max();
+        if (before == TimePoint::max()) continue;
+        const TimePoint from = std::max({since, o.submitted, before, rests_for(ticket, o)});
         if (!first || from < *first) first = from;
     }
     return first;
@@ -359,17 +358,29 @@ TimePoint Checker::behind_announced(arbiter::Ticket ticket, const Open& open) co
     return over;
 }
 
-/// Its client's broadcast goes before it, and behind a request to a station that is silent.
-bool Checker::waits_in_order(TimePoint since, arbiter::Ticket ticket, const Open& open) const {
+/// Until when its station is not asked for it, because of what that has said or may yet say.
+TimePoint Checker::rests_for(arbiter::Ticket ticket, const Open& open) const {
+    const auto damaged = behind_damage_.find(open.job.station);
+    return std::max({watch_.rests_until(open.job.station), behind_broadcasts(open),
+                     behind_announced(ticket, open), behind_copies(open.job.station),
+                     damaged == behind_damage_.end() ? TimePoint{} : damaged->second});
+}
+
+/// Its client's broadcast goes before it, and behind a request to a station that is silent, or
+/// rests: until when; max(): nobody knows.
+TimePoint Checker::behind_own(TimePoint since, arbiter::Ticket ticket, const Open& open) const {
     const auto client = clients_.find(open.job.client);
-    bool behind = client != clients_.end() && client->second.held_until > since;
+    const bool held = client != clients_.end() && client->second.held_until > since;
+    TimePoint rest = held ? TimePoint::max() : TimePoint{};
+    TimePoint behind{};
     for (const auto& [older, o] : open_) {
-        if (older >= ticket) return false;
+        if (older >= ticket) break;
         if (o.gone || o.job.client != open.job.client) continue;
-        if (behind && !o.sent && o.job.station == kBroadcast) return true;
-        behind = behind || watch_.is_silent(o.job.station);
+        if (!o.sent && o.job.station == kBroadcast) behind = rest;
+        rest = watch_.is_silent(o.job.station) ? TimePoint::max()
+                                               : std::max(rest, rests_for(older, o));
     }
-    return false;
+    return behind;
 }
 
 void Checker::check_write_sent(std::uint8_t station, ByteView pdu) {

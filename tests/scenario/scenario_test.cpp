@@ -208,10 +208,18 @@ constexpr BrokenOnce kBrokenOnce[] = {
     {Kind::wild, 475},
     // A write's answer might have been that to a broadcast, and its panel stayed offline.
     {Kind::stall, 3},
+    // ... and what it had written could not be read.
+    {Kind::company, 2598},
     // Late replies to probes were taken for those to the first ones, and the next had no longer.
     {Kind::company, 508},
+    // The late confirmation of a write, which equals it, showed nothing.
+    {Kind::company, 1429},
     // A retry had gone with its client, and the turns that it had left to others stayed.
     {Kind::company, 823},
+    // A broadcast waited for a panel that rested, and so did its client's next requests.
+    {Kind::company, 21},
+    // A reply came behind damage, and might be said again.
+    {Kind::company, 3803},
     // The first copy that was heard was of a reply that had come damaged.
     {Kind::receiver, 883},
     {Kind::voices, 1503},
