@@ -123,7 +123,9 @@ void Checker::on_finish(TimePoint now, const arbiter::Finish& finish) {
     open_.erase(found);
     if (const auto client = clients_.find(open.job.client); client != clients_.end()) {
         --client->second.open;
-        if (!finish.pdu && watch_.is_silent(open.job.station)) client->second.held_until = now;
+        if (!finish.pdu &&
+            (watch_.is_silent(open.job.station) || now < rests_for(finish.ticket, open)))
+            client->second.held_until = now;
     }
     check_in_time(now, open, finish);
     // Who was sent before, in a joined read, is told so when it has to go. Not all that look as if

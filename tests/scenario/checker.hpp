@@ -113,7 +113,7 @@ class Checker : public Witness {
         bool healthy = false;  ///< none of its stations is ever dead
         bool polite = false;
         bool single = false;     ///< one request at a time
-        TimePoint held_until{};  ///< the last fault that a silent station has brought it
+        TimePoint held_until{};  ///< the last fault of one that was silent, or rested
     };
 
     void fail(std::string what);

@@ -46,8 +46,8 @@ auto closed_for(ByteView reply, TimePoint open) {
 void add_closed(Claims& claims, const Asked& one, ByteView reply,
                 const OutstandingRequests::Windows& windows, bool is_same_read) {
     const bool closed = one.sent > windows.closed;
-    const bool passed = one.state == State::passed && one.sent > windows.passed &&
-                        (!is_same_read || one.outdated);
+    const bool passed =
+        one.state == State::passed && one.sent > windows.passed && (!is_same_read || one.outdated);
     if ((!closed && !passed) || !modbus::answers(one.pdu, reply)) return;
     claims.closed = claims.closed || closed;
     claims.passed = claims.passed || passed;
