@@ -54,7 +54,7 @@ bool ReplyHabits::may_be_duplicate(TimePoint now, const Attempt& attempt, const 
                                    bool early, bool quicker) const {
     const Group& group = attempt.group();
     if (attempt.answers().had_candidate() || attempt.reply() == group.doubted) return false;
-    return is_impossible(attempt, claims, early) ||
+    return (early && group.attempts <= 1 && claims.repeats) ||
            duplicates_.repeats_itself(now, claims.repeated) ||
            duplicates_.suspicious(now, group.request.pdu(), attempt.reply(), claims) ||
            (quicker && claims.repeats_other) ||

@@ -38,7 +38,6 @@ Station::Heard Station::on_unsolicited_frame(OutstandingRequests& book, TimePoin
     if (!is_late(done)) return heard;
     // Probes wait for less long, and any of many may have been answered.
     if (heard.needed && (!heard.at_least || health_.offline())) times_.add_long(*heard.needed);
-    heard.back = on_sign_of_life(now);
     return heard;
 }
 

@@ -116,8 +116,7 @@ void UnsolicitedFrames::note(TimePoint now, const std::vector<modbus::Unused>& p
         outbox.on_unsolicited(now, part, done, quiet.station());
         if (done == Done::damaged) stations.on_damaged(heard_at, part.bytes);
         if (done == Done::damaged && part.station != 0)
-            note_life(stations.of(part.station).on_sign_of_life(heard_at), part.station, stations,
-                      outbox);
+            note_life(heard_at, part.station, stations, outbox);
         if ((done == Done::damaged || done == Done::echo) && idle)
             stations.on_trail(heard_at, replied_);
         if (done == Done::echo) quiet.has_come();
@@ -142,13 +141,13 @@ void UnsolicitedFrames::note_reply(TimePoint now, TimePoint heard_at, const Unus
                                                            modbus::pdu_of(part.bytes), asked);
     outbox.on_unsolicited(now, part, done, quiet.station(), heard.lateness);
     if (is_late(done)) outbox.event(Kind::late, part.station, heard.lateness);
-    note_life(heard.back, part.station, stations, outbox);
+    if (is_late(done)) note_life(heard_at, part.station, stations, outbox);
     if (heard.settled) quiet.lift(now, part.station);
 }
 
-void UnsolicitedFrames::note_life(bool back, std::uint8_t station, Stations& stations,
+void UnsolicitedFrames::note_life(TimePoint now, std::uint8_t station, Stations& stations,
                                   Outbox& outbox) {
-    if (!back) return;
+    if (!stations.of(station).on_sign_of_life(now)) return;
     stations.on_recovery();
     outbox.event(Kind::online, station);
 }

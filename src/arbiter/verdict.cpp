@@ -84,7 +84,7 @@ Facts Arbiter::facts_of_others(TimePoint now, const Claims& claims) const {
     const bool contested = claims.contested || (active_->may_answer_first_heard() &&
                                                 !unsolicited_.is_own(now, active_->first_heard()));
     return when(contested, fact::other_master) |
-           when(active_->is_late_echo(now, echo_memory_), fact::impossible);
+           when(active_->is_late_echo(now, echo_memory_), fact::late_echo);
 }
 
 /// True if a reply that began before its request had left is none, as far as the last ones show.
@@ -136,6 +136,7 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
                        (first && claims.outdated && group.doubted.empty());
     const bool contradicted = other || (attempt.is_undecided(claims.repeats_other) &&
                                         (group.doubts == 0 || !habits.answers_twice()));
+    const bool may_be_followed = attempt.goes_on() || holds_answer(now, habits) > Duration::zero();
     const bool misnumbered = refusal && group.may_doubt_refusal() &&
                              habits.may_refuse_other(book, now, claims, group.request.function());
     const bool repeats = station.may_be_duplicate(now, attempt, claims, is_early);
@@ -148,18 +149,13 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
            when(misnumbered, fact::misnumbered) | when(repeats, fact::repeats) |
            when(too_soon, fact::too_soon) | when(before_end, fact::before_end) |
            when(contradicted, fact::contradicted) |
-           when(first && is_held(now, habits), fact::may_be_followed) |
-           when(may_ask, fact::may_ask);
+           when(first && may_be_followed, fact::may_be_followed) | when(may_ask, fact::may_ask);
 }
 
 /// How long the answer is held because another one may follow, or (ASCII) has already begun.
 Duration Arbiter::holds_answer(TimePoint now, const ReplyHabits& habits) const {
     const bool begun = ascii_ && ascii_->goes_on();
     return std::max(habits.holds_answers(now), begun ? active_->timing().hole : Duration::zero());
-}
-
-bool Arbiter::is_held(TimePoint now, const ReplyHabits& habits) const {
-    return active_->goes_on() || holds_answer(now, habits) > Duration::zero();
 }
 
 /// Returns true if it is the answer.
@@ -179,8 +175,7 @@ bool Arbiter::takes_reply(TimePoint now, Station& station, bool early) {
     // Whatever it answers: it is neither our own frame nor an adapter's copy.
     if ((facts & (fact::like_broadcast | fact::repeats)) == fact::like_broadcast &&
         attempt.reply() != attempt.group().request.pdu())
-        UnsolicitedFrames::note_life(station.on_sign_of_life(now), station.id(), stations_,
-                                     outbox_);
+        UnsolicitedFrames::note_life(now, station.id(), stations_, outbox_);
     if (done == Done::hold)
         attempt.keep_candidate(holds_answer(now, station.replies()), Answers::Kept::held);
     if (done != Done::accept && (facts & fact::before_end) != 0) attempt.mark_early();

@@ -23,6 +23,36 @@ namespace panelgate::scenario {
 
 /// Holds what an arbiter does against what it promises. Knows the truth (what the panels did and
 /// when) from the world and the claims (answers, frames) from the arbiter; shares no code with it.
+///
+/// What has nothing on the wire to be told by no arbiter can mend. It is known by what the world
+/// knows, and nothing else passes:
+///   - A good CRC by chance: nobody has said these bytes (Truth::is_chance()).
+///   - The first copy of all of a reply, which comes when the very same has just been asked again,
+///     or other values are written to the same place: byte for byte the answer of a panel whose
+///     values have not changed, or that has done it, in its time. The answer that it displaces
+///     comes one late (on_copy()). From the next copy on the panel is known: to another
+///     question it would be asked for once more, and a confirmation be read back.
+///   - A reply with more values than were asked for, right count and good CRC: byte for byte the
+///     late one to an earlier request of that length, or the answer to the present one
+///     (is_padded(), looks_late()).
+///   - A frame that nobody asked for, of the form of the awaited reply, while that is thought
+///     about: to this question alone (on_imitation()). What it leaves over to the next
+///     ones comes much sooner than the panel has ever answered, which 24 replies have shown before.
+///   - A reply that a later one has overtaken, where it can only be the awaited one for anybody who
+///     takes stations to serve in order, and nothing has come that this does not explain: the same
+///     bytes in the same order are those of a panel that serves in turn (Order,
+///     on_reply()). So is the one that it has displaced, and that comes one late.
+///   - A reply that begins later than any of its panel, where another or it has just been silent,
+///     or an earlier one of its form is owed: to wait for it is to wait for all who may have died
+///     with that one, to believe it is to believe the one that is owed (is_overdue()).
+///   - An answer that equals its request and comes when nobody waits for it any more, or between
+///     bytes that nobody says: it may be our own frame (may_be_echo()).
+///   - A confirmation that may be the answer to a broadcast of the last seconds, of a place that
+///     cannot be read (check_fault()).
+///   - A panel that is offline because it was overdue each time, until it has been heard; or whose
+///     last answer equals its request; or whose answer to a probe repeats another one, and is held
+///     (on_refused()).
+///   - A copy of a reply that nobody has heard whole: it is that reply (on_copy()).
 class Checker : public Witness {
   public:
     explicit Checker(const Plan& plan);

@@ -91,7 +91,7 @@ void Checker::on_answered(TimePoint now, std::uint8_t station) {
 /// heard whole, which is the reply, nor one behind a retry, which may be the reply to that. The
 /// first one that comes in place of the answer to another request is found by asking once more.
 /// Where the very same is asked again it is that answer for any gateway, and what it has displaced
-/// comes one late: see open.hpp.
+/// comes one late: see Checker.
 void Checker::on_copy(TimePoint now, ByteView adu) {
     const std::uint8_t station = adu[0];
     const bool awaited = !attempt_.answered && attempt_.station == station;

@@ -140,7 +140,6 @@ class Arbiter {
     Facts facts_of_others(TimePoint now, const Claims& claims) const;
     Facts facts_of_equals(TimePoint now, const Station& station, bool early) const;
     bool takes_reply(TimePoint now, Station& station, bool early);
-    bool is_held(TimePoint now, const ReplyHabits& habits) const;
     Duration holds_answer(TimePoint now, const ReplyHabits& habits) const;
     void learn_pace(bool early);
     bool begins_too_early() const;

@@ -102,11 +102,6 @@ class ReplyHabits {
                           std::uint8_t function) const {
         return claims.repeats_refusal || (now < until_ && book.has_other_function(id_, function));
     }
-    /// True if the answer repeats a recent reply and came `too_early`: the request may never have
-    /// arrived.
-    static bool is_impossible(const Attempt& attempt, const Claims& claims, bool too_early) {
-        return too_early && attempt.group().attempts <= 1 && claims.repeats;
-    }
     /// True if it may be a duplicate: it repeats a reply, and duplicates come from this station, or
     /// it has not yet shown that it gives equal answers to different requests, or it came `early`
     /// or `quicker` than ever, or is a refusal behind a collision. A doubted reply that comes again

@@ -75,9 +75,7 @@ class Station {
 
     // Replies and failures
 
-    struct Heard : ReplyHabits::Heard {
-        bool back = false;  ///< it was offline
-    };
+    using Heard = ReplyHabits::Heard;
     /// How long after a broadcast it may answer it.
     Duration broadcast_window() const { return replies_.broadcast_window(usual()); }
     /// A good frame came that is no answer, and was judged. `pdu`: without address and CRC.

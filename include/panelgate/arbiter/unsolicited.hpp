@@ -91,8 +91,8 @@ class UnsolicitedFrames {
     /// reply, so that bytes may be its trail.
     void note(TimePoint now, const std::vector<modbus::Unused>& parts, bool idle,
               Stations& stations, Quiet& quiet, Outbox& outbox);
-    /// What came shows that this station is there; `back`: it was offline.
-    static void note_life(bool back, std::uint8_t station, Stations& stations, Outbox& outbox);
+    /// What came shows that this station is there.
+    static void note_life(TimePoint now, std::uint8_t station, Stations& stations, Outbox& outbox);
     /// True if the station sent this instead of the right reply: not the echo, a duplicate, an
     /// outstanding reply, or its answer to a broadcast or another master. `heard_after`: from the
     /// end of the request to the first byte behind it.

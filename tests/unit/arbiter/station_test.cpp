@@ -64,7 +64,9 @@ class StationTest : public testing::Test {
     /// A good frame comes that answers no open request; `asked`: one is on the wire.
     Heard hear(TimePoint now, const Bytes& pdu, bool asked = false) {
         const Done done = judged(now, pdu);
-        return {station_.on_unsolicited_frame(book_, now, done, pdu, asked), done};
+        const Heard heard{station_.on_unsolicited_frame(book_, now, done, pdu, asked), done};
+        if (is_late(done)) station_.on_sign_of_life(now);
+        return heard;
     }
     /// It may answer an earlier request that is closed, rather than the open one.
     bool may_have_passed(const Bytes& pdu, const Bytes& open) const {
@@ -430,6 +432,7 @@ TEST_F(StationTest, OnlyAnUnheardStationIsForgottenWhenNotWantedForAMinute) {
     unheard.replies().on_unanswered(book_, now_, kRead, now_);
     EXPECT_FALSE(unheard.forgettable(book_, now_ + 1h)) << "a reply is outstanding";
     unheard.on_unsolicited_frame(book_, now_ + 1s, Done::late, kReply);
+    unheard.on_sign_of_life(now_ + 1s);
     EXPECT_FALSE(unheard.forgettable(book_, now_ + 1h)) << "it was heard";
 }
 

@@ -19,17 +19,17 @@ inline constexpr Facts repeats = 1 << 1;       ///< may be a recent reply once m
 
 // Of one that answers the open request.
 inline constexpr Facts answers = 1 << 2;
-inline constexpr Facts refuses_other = 1 << 3;    ///< or refuses another outstanding request
-inline constexpr Facts impossible = 1 << 4;       ///< a repetition, sooner than the request arrived
-inline constexpr Facts overdue = 1 << 5;          ///< may be to one that has passed, and odd
-inline constexpr Facts like_echo = 1 << 6;        ///< equals its request, and came too soon
-inline constexpr Facts misnumbered = 1 << 7;      ///< may refuse a request of another function
-inline constexpr Facts may_ask = 1 << 8;          ///< asking once more would tell
-inline constexpr Facts before_echo = 1 << 9;      ///< our own frame may still come behind it
-inline constexpr Facts like_broadcast = 1 << 20;  ///< may be the answer to a broadcast
-inline constexpr Facts too_soon = 1 << 19;        ///< by a wide margin sooner than ever
-inline constexpr Facts before_end = 1 << 21;      ///< began before the request had left
-inline constexpr Facts contradicted = 1 << 22;    ///< another one came that differs
+inline constexpr Facts refuses_other = 1 << 3;     ///< or refuses another outstanding request
+inline constexpr Facts late_echo = 1 << 4;         ///< is the request itself, where those come late
+inline constexpr Facts overdue = 1 << 5;           ///< may be to one that has passed, and odd
+inline constexpr Facts like_echo = 1 << 6;         ///< equals its request, and came too soon
+inline constexpr Facts misnumbered = 1 << 7;       ///< may refuse a request of another function
+inline constexpr Facts may_ask = 1 << 8;           ///< asking once more would tell
+inline constexpr Facts before_echo = 1 << 9;       ///< our own frame may still come behind it
+inline constexpr Facts like_broadcast = 1 << 20;   ///< may be the answer to a broadcast
+inline constexpr Facts too_soon = 1 << 19;         ///< by a wide margin sooner than ever
+inline constexpr Facts before_end = 1 << 21;       ///< began before the request had left
+inline constexpr Facts contradicted = 1 << 22;     ///< another one came that differs
 inline constexpr Facts may_be_followed = 1 << 23;  ///< its station sends surplus answers
 
 // Of one that does not.
@@ -86,7 +86,7 @@ struct JudgeRow {
 inline constexpr JudgeRow kJudgeRows[] = {
     {fact::answers | fact::other_master, Done::contested},                  // P1
     {fact::answers | fact::refuses_other, Done::reject},                    // P1
-    {fact::answers | fact::impossible, Done::reject},                       // P1
+    {fact::answers | fact::late_echo, Done::reject},                        // P1
     {fact::answers | fact::overdue, Done::reject},                          // P1
     {fact::answers | fact::like_echo, Done::suspect_echo},                  // P8
     {fact::answers | fact::like_broadcast, Done::suspect_echo},             // P8
