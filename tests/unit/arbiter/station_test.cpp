@@ -64,9 +64,8 @@ class StationTest : public testing::Test {
     /// A good frame comes that answers no open request; `asked`: one is on the wire.
     Heard hear(TimePoint now, const Bytes& pdu, bool asked = false) {
         const Done done = judged(now, pdu);
-        const Heard heard{station_.on_unsolicited_frame(book_, now, done, pdu, asked), done};
         if (is_late(done)) station_.on_sign_of_life(now);
-        return heard;
+        return {station_.on_unsolicited_frame(book_, now, done, pdu, asked), done};
     }
     /// It may answer an earlier request that is closed, rather than the open one.
     bool may_have_passed(const Bytes& pdu, const Bytes& open) const {
