@@ -411,10 +411,7 @@ void Arbiter::start(TimePoint now, Group group) {
         timing.echoes = echo_memory_.expects_one() && !echo_memory_.comes_late(now);
         timing.as_asked = station.answers_as_asked() && echo_memory_.known();
     }
-    if (!group.request.is_read()) {
-        memory_.on_write(now, group.station, group.request);
-        stations_.book().on_written(group.station, group.request);
-    }
+    if (!group.request.is_read()) memory_.on_write(now, group.station, group.request);
     outbox_.written(group, false);
     const Reason why = reason_of(now, group, schedule_.backlog().queue());
     quiet_.on_sent(timing.sent, group.station);

@@ -76,6 +76,7 @@ void ReplyHabits::on_asked(OutstandingRequests& book, TimePoint now, const Group
     if (now >= rested() && !in_transit) book.lapse(id_);
     if (disordered_at_ && now > *disordered_at_ + timing::kForgetHabit) disordered_at_.reset();
     announced_.forget(now);
+    if (!group.request.is_read()) book.on_written(id_, group.request.pdu());
     if (group.span && !group.distinct_length) reads_.on_wanted(group.request);
 }
 

@@ -259,8 +259,8 @@ void OutstandingRequests::announce(std::uint8_t station, ByteView exception) {
     if (found != all.end()) found->announced = true;
 }
 
-void OutstandingRequests::on_written(std::uint8_t station, const modbus::Request& write) {
-    const std::optional<modbus::Span> items = write.access().write;
+void OutstandingRequests::on_written(std::uint8_t station, ByteView write) {
+    const std::optional<modbus::Span> items = modbus::access_of(write).write;
     const auto mark = [&](Page& page) {
         for (Asked& one : page.asked) {
             if (!is_outstanding(one) && !is_closed(one)) continue;
@@ -372,6 +372,7 @@ void OutstandingRequests::on_foreign_over(std::uint8_t station) {
 }
 
 void OutstandingRequests::on_broadcast(TimePoint sent, const Bytes& pdu) {
+    on_written(kBroadcast, pdu);
     enter(at(kBroadcast),
           {.state = State::broadcast,
            .sent = sent,

@@ -161,7 +161,7 @@ class OutstandingRequests {
     void announce(std::uint8_t station, ByteView exception);
     /// This write leaves (station 0: to all), answered or not: replies to reads of what it may
     /// change that are still to come are older.
-    void on_written(std::uint8_t station, const modbus::Request& write);
+    void on_written(std::uint8_t station, ByteView write);
     /// Its reply came, but damaged.
     void on_damaged(std::uint8_t station, TimePoint sent, const Bytes& pdu);
     void forget_damaged(std::uint8_t station);
