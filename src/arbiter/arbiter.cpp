@@ -415,7 +415,7 @@ void Arbiter::start(TimePoint now, Group group) {
     outbox_.written(group, false);
     const Reason why = reason_of(now, group, schedule_.backlog().queue());
     quiet_.on_sent(timing.sent, group.station);
-    unsolicited_.on_sent(now, adu);
+    unsolicited_.on_sent(now, adu, settings_.may_stall && echo_memory_.expects_one());
     EchoFilter echo(adu, echo_memory_.expect(now, group.request));
     active_.emplace(std::move(group), timing, std::move(echo), orders_);
     outbox_.transmit(now, *active_, std::move(adu), std::move(wire), why);

@@ -445,6 +445,7 @@ Attempt Arbiter::take_active(TimePoint now) {
     quiet_.take_rested(now);  // the attempt's own time
     outbox_.written(attempt.group(), true);
     const Group& group = attempt.group();
+    if (attempt.echoed() || attempt.echo().mismatch()) unsolicited_.late_echo().on_came();
     if (attempt.echoed() &&
         echo_memory_.on_echo(group.request, !group.confirms.empty(), group.station))
         outbox_.event(Kind::echo, attempt.group().station);

@@ -221,6 +221,8 @@ constexpr BrokenOnce kBrokenOnce[] = {
     // In ASCII bytes that nobody says came behind the first ones.
     {Kind::company, 8, SerialMode::ascii},
     {Kind::company, 15, SerialMode::ascii},
+    // A stall held back the echoes of what was sent meanwhile.
+    {Kind::wild, 1068},
     // A pause came in front of a character that completes no byte, ...
     {Kind::voices, 170, SerialMode::ascii},
     // ... and the first bytes were those of our own frame.

@@ -31,8 +31,8 @@ class UnsolicitedFrames {
         : serial_(serial), orders_(orders) {}
 
     /// The frame sent last: its echo may come late.
-    void on_sent(TimePoint now, ByteView adu) {
-        late_echo_.on_sent(now, adu);
+    void on_sent(TimePoint now, ByteView adu, bool echoes = false) {
+        late_echo_.on_sent(now, adu, echoes);
         frame_before_ = replied_ != 0 ? std::move(last_frame_) : Bytes{};
         last_frame_.assign(adu.begin(), adu.end());
         values_size_ = 0;

@@ -237,6 +237,13 @@ std::optional<Duration> LateEcho::delay_of(TimePoint now, ByteView adu) const {
     return found;
 }
 
+bool LateEcho::is_missing(TimePoint now, ByteView adu) const {
+    return std::ranges::any_of(sent_, [&](const Sent& one) {
+        return one.missing && now <= one.at + timing::kLatestCopy &&
+               std::ranges::equal(one.adu, adu);
+    });
+}
+
 bool LateEcho::on_heard(TimePoint now, ByteView adu) {
     const auto delay = delay_of(now, adu);
     if (!delay) return false;

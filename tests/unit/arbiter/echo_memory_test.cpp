@@ -145,6 +145,23 @@ TEST_F(EchoMemoryTest, P8APanelThatRepeatsRequestsNoMoreIsForgotten) {
     EXPECT_FALSE(memory.comes_again(TimePoint{}, 17));
 }
 
+/// A line that gives back what is sent, and stalls: each frame whose echo has not come is that.
+TEST(LateEcho, IsOwnAsLongAsItIsMissing) {
+    const Bytes first = "11 03 00 6B 00 03 76 87"_hex;
+    const Bytes second = "11 03 00 6C 00 03 C7 46"_hex;
+    LateEcho echo;
+    echo.on_sent(TimePoint{}, first, true);
+    echo.on_sent(TimePoint{} + 1s, second, true);
+    EXPECT_TRUE(echo.is_own(TimePoint{} + 2s, first));
+    EXPECT_TRUE(echo.is_own(TimePoint{} + 2s, second));
+    echo.on_came();
+    EXPECT_TRUE(echo.is_own(TimePoint{} + 2s, first));
+    EXPECT_FALSE(echo.is_own(TimePoint{} + 2s, second));
+    EXPECT_FALSE(echo.is_own(TimePoint{} + timing::kLatestCopy + 1ns, first));
+    echo.on_sent(TimePoint{} + 3s, second);
+    EXPECT_FALSE(echo.is_own(TimePoint{} + 4s, second)) << "the line gives nothing back";
+}
+
 TEST(LateEcho, ComesAfterTheSameTimeEachTime) {
     const Bytes read = "11 03 00 00 00 01"_hex;
     for (const bool steady : {true, false}) {

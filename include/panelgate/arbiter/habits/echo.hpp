@@ -205,16 +205,21 @@ class EchoMemory {
 /// same does so at any time. Pure.
 class LateEcho {
   public:
-    void on_sent(TimePoint now, ByteView adu) {
+    /// `echoes`: the line gives it back at once, unless it stalls.
+    void on_sent(TimePoint now, ByteView adu, bool echoes = false) {
+        next_ = (next_ + 1) % sent_.size();
         sent_[next_].at = now;
         sent_[next_].adu.assign(adu.begin(), adu.end());
-        next_ = (next_ + 1) % sent_.size();
+        sent_[next_].missing = echoes;
     }
+    /// The echo of the frame sent last has come, or what was made of it.
+    void on_came() { sent_[next_].missing = false; }
     /// This frame was heard. True if it is one of ours, and three in a row have come so.
     bool on_heard(TimePoint now, ByteView adu);
-    /// ... without learning from it.
+    /// ... without learning from it. So it is if its echo is still missing.
     bool is_own(TimePoint now, ByteView adu) const {
-        return times_ >= kEnough && now <= heard_at_ + timing::kForgetHabit && delay_of(now, adu);
+        return is_missing(now, adu) ||
+               (times_ >= kEnough && now <= heard_at_ + timing::kForgetHabit && delay_of(now, adu));
     }
 
   private:
@@ -223,7 +228,9 @@ class LateEcho {
     struct Sent {
         TimePoint at{};
         Bytes adu{};
+        bool missing = false;
     };
+    bool is_missing(TimePoint now, ByteView adu) const;
     /// How long before it was sent: the most usual of the times that are possible.
     std::optional<Duration> delay_of(TimePoint now, ByteView adu) const;
     bool is_usual(Duration delay) const {
