@@ -241,7 +241,7 @@ void Arbiter::on_rx(TimePoint now, ByteView bytes) {
     if (ascii_) {
         ascii_->feed(now, bytes);
         while (const auto piece = ascii_->next()) hear_piece(now, *piece);
-        if (active_ && ascii_->inside()) active_->on_goes_on(now);
+        if (active_ && ascii_->inside()) active_->on_character(now);
         quiet_.on_begun(ascii_->inside() ? now + settings_.end_of_frame : TimePoint{});
     } else {
         hear(now, bytes);

@@ -358,13 +358,16 @@ Schedule::Next Schedule::next_job(const Line& line) {
         bool others;
         bool in_budget = true;
     } wanted{others_go_first(line)};
+    const Station* const last = line.stations.find(line.quiet.station());
+    const bool is_dear = last != nullptr && last->usual() > timing::kDearRetry;
     const JobQueue::Test test = [&](const Job& job) {
+        const bool lets_others = is_dear && job.station == last->id();
         return (!wanted.others || has_turn(job)) && may_run(line, job) &&
-               (!wanted.in_budget || line.stations.may_spend(line.now, job));
+               (!wanted.in_budget || (!lets_others && line.stations.may_spend(line.now, job)));
     };
     const JobQueue& queue = backlog_.queue();
     JobQueue::Choice next = queue.choose(test);
-    // A failing station waits for its share only while others want the line.
+    // One that fails or needs long waits, for its share or a turn, only while others want the line.
     wanted.in_budget = next.job() != nullptr;
     if (next.job() == nullptr) next = queue.choose(test);
     if (next.job() == nullptr) return {};

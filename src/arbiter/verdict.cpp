@@ -87,13 +87,6 @@ Facts Arbiter::facts_of_others(TimePoint now, const Claims& claims) const {
            when(active_->is_late_echo(now, echo_memory_), fact::late_echo);
 }
 
-/// True if a reply that began before its request had left is none, as far as the last ones show.
-/// What comes early again, and is the same, answers each time.
-bool Arbiter::begins_too_early() const {
-    return !settings_.paced && pace_.expects_none_early() &&
-           active_->reply() != active_->group().doubted;
-}
-
 /// Whether it may be the echo of the request, or a confirmation to all, which equal the answer to a
 /// write. `early`: it began before the request had left, on a line that keeps pace.
 Facts Arbiter::facts_of_equals(TimePoint now, const Station& station, bool early) const {
@@ -124,7 +117,9 @@ Facts Arbiter::facts_of_reply(TimePoint now, const Station& station, bool early)
     const bool refusal = modbus::exception_of(reply).has_value();
     const bool first = !attempt.answers().had_candidate();
     const bool is_early = early && !settings_.paced && pace_.believed();
-    const bool before_end = early && first && begins_too_early();
+    // What comes early again, and is the same, answers each time.
+    const bool before_end =
+        early && first && !settings_.paced && pace_.expects_none_early() && reply != group.doubted;
     // An earlier request may have been refused; the next refusal may be that again.
     const bool refuses_other =
         refusal && !group.probe && (attempt.refusal_was_rejected() || claims.other_outstanding);

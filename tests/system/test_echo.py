@@ -46,7 +46,7 @@ def holding(*values):
 def configuration(link, mode):
     return config.gateway(config.line(
         device=link, stations="{id: 1, name: good}, {id: 2, name: absent}", baud=115200,
-        timing="{response_timeout: 60ms}", retries=1, echo=mode), http=config.ADMIN)
+        timing="{response_timeout: 120ms}", retries=1, echo=mode), http=config.ADMIN)
 
 
 @contextlib.contextmanager

@@ -142,7 +142,6 @@ class Arbiter {
     bool takes_reply(TimePoint now, Station& station, bool early);
     Duration holds_answer(TimePoint now, const ReplyHabits& habits) const;
     void learn_pace(bool early);
-    bool begins_too_early() const;
     void settle(TimePoint now);
     void doubt_as_early(TimePoint now);
     void ask_again(TimePoint now);

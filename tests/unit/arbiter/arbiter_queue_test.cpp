@@ -206,6 +206,29 @@ TEST_F(ArbiterTest, P9TheTimeOfASharedTransactionIsSharedOut) {
     EXPECT_EQ(uart.arbiter().shares().all().size(), 2u);
 }
 
+/// Two write to a panel that needs 300 ms, and would have four turns of five.
+TEST_F(ArbiterTest, P4APanelThatNeedsLongLetsAnotherOneGoBetweenItsRequests) {
+    std::vector<std::uint8_t> asked;
+    const auto serve = [&] {
+        ASSERT_TRUE(bus.next_sent());
+        const Bytes adu = bus.sent.back().adu;
+        asked.push_back(adu[0]);
+        const bool is_write = adu[1] == 6;
+        answer(bus, adu[0],
+               is_write ? Bytes(adu.begin() + 1, adu.end() - 2) : reply_number(asked.size()),
+               adu[0] == 17 ? 300ms : 5ms);
+    };
+    const auto write = [&](unsigned place) {
+        bus.submit(17, Writer().u8(6).u16(place).u16(1).take(), place, PriorityClass::write);
+    };
+    write(1);
+    answer(bus, 17, Writer().u8(6).u16(1).u16(1).take(), 300ms);
+    for (const unsigned place : {2u, 3u, 4u}) write(place);
+    for (const unsigned client : {11u, 12u}) bus.submit(18, read_at(client), client);
+    for (int i = 0; i < 5; ++i) serve();
+    EXPECT_EQ(asked, (std::vector<std::uint8_t>{18, 17, 18, 17, 17}));
+}
+
 /// Values of station 17 may be so old, and it was polled.
 class ArbiterMemoryTest : public ArbiterTest {
   protected:

@@ -95,7 +95,7 @@ class Attempt {
     /// frames (ASCII).
     Verdict on_frame_end(bool good, const Ends& ends);
     /// A character came that completes no byte (ASCII): what has begun goes on.
-    void on_goes_on(TimePoint now) {
+    void on_character(TimePoint now) {
         if (is_hearing()) last_byte_ = std::max(last_byte_, now);
     }
     /// What was heard since the last end breaks off.

@@ -60,7 +60,8 @@ inline constexpr Duration kForgetUnheard = 60s;
 inline constexpr Duration kProbeWaits = 20ms;
 /// Others go before a retry for this long at least ...
 inline constexpr Duration kOthersFirst = 20ms;
-/// ... and one of each waiting station where the retry may take longer than this.
+/// ... and one of each waiting station where the retry may take longer than this. What usually
+/// takes longer lets one go between two of the same station.
 inline constexpr Duration kDearRetry = 200ms;
 /// An outage of all stations is young: probes may use half of the line.
 inline constexpr Duration kYoungOutage = 30s;
