@@ -26,6 +26,9 @@ bool is_closed(const Asked& one) {
     return one.state == State::passed || one.state == State::lapsed;
 }
 
+/// One of ours without its reply, whatever is believed of that.
+bool is_unanswered(const Asked& one) { return is_outstanding(one) || is_closed(one); }
+
 bool is_recent_reply(const Asked& one, TimePoint now) {
     return one.state == State::answered && now - one.replied <= timing::kLatestRepetition;
 }
@@ -204,8 +207,8 @@ TimePoint OutstandingRequests::last_sent(std::uint8_t station) const {
 std::optional<TimePoint> OutstandingRequests::first_asked(std::uint8_t station, ByteView pdu,
                                                           TimePoint open) const {
     for (const Asked& one : of(station).asked) {
-        const bool may_come = is_outstanding(one) || is_closed(one);
-        if (may_come && one.sent > open && std::ranges::equal(one.pdu, pdu)) return one.sent;
+        if (is_unanswered(one) && one.sent > open && std::ranges::equal(one.pdu, pdu))
+            return one.sent;
     }
     return std::nullopt;
 }
@@ -263,7 +266,7 @@ void OutstandingRequests::on_written(std::uint8_t station, ByteView write) {
     const std::optional<modbus::Span> items = modbus::access_of(write).write;
     const auto mark = [&](Page& page) {
         for (Asked& one : page.asked) {
-            if (!is_outstanding(one) && !is_closed(one)) continue;
+            if (!is_unanswered(one)) continue;
             const auto read = modbus::read_span(one.pdu);
             one.outdated = one.outdated || !read || modbus::may_change(items, *read);
         }
