@@ -25,6 +25,16 @@ struct StationSettings {
     /// Silence before a request to this station and after its reply; empty: the standard's
     /// (silent_interval()).
     std::optional<Duration> frame_gap;
+    /// Least time between a reply of this station and the next request to it. Other stations are
+    /// asked meanwhile. T14: devices that ignore what follows their own reply for 50 to 850 ms
+    /// (NModbus#188, eModbus#223). 0: none.
+    Duration station_gap{};
+    /// The same behind a write to this station. T14: devices that store a command for 1 to 3 s
+    /// (batpred#1209). 0: as `station_gap`.
+    Duration after_write{};
+    /// The byte count of a reply to 01 to 04 need not be the quantity asked: the reply's own byte
+    /// count decides. T14: registers of 4 or 12 bytes (pymodbus#669, libmodbus#466).
+    bool any_length = false;
     int retries = 1;  ///< of reads; 0..10
     bool retry_writes = false;
     modbus::CrcOrder crc_order = modbus::CrcOrder::low_first;  ///< as it sends and expects it
@@ -63,6 +73,9 @@ struct Settings {
     /// is for a tty: a USB latency timer (16 ms) and a busy machine. In ASCII also the longest
     /// between two characters of any frame.
     Duration reply_hole = 60ms;
+    /// The line rests so long after each opening. T8: device servers that ignore the first seconds
+    /// of a connection (telegraf#11919, ioBroker.modbus#250).
+    Duration connect_pause{};
     QueueSettings queue;
     OfflineSettings offline;
     Quarantine quarantine = Quarantine::automatic;
