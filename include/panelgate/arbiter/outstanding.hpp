@@ -1,0 +1,139 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/pool.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+
+namespace panelgate::arbiter {
+
+/// One request whose reply may still come.
+struct Asked {
+    enum class By : std::uint8_t {
+        us,           ///< a request of this gateway to the station
+        broadcast,    ///< a request of this gateway to all stations, which no station may answer (T11)
+        other_master  ///< a request of another master to the station (T9)
+    };
+    By by = By::us;
+    TimePoint sent{};    ///< last bit out; of another master's request: last byte in
+    TimePoint until{};   ///< no reply comes later than this, as far as the late window tells
+    unsigned epoch = 0;  ///< number of the connection that carried the request (T8)
+    Bytes pdu{};
+};
+
+/// The memory of one line's past, by station: requests whose reply may still come, and the last
+/// reply. Two questions are answered here: may this frame be the reply to one of them, and could a
+/// reply to one of them be taken for the reply to a new request (T2). A station serves the requests
+/// of one connection in order: the reply to a later request closes the earlier ones. Bounded. Pure.
+class Outstanding {
+  public:
+    static constexpr std::size_t kMost = 16;       ///< requests of this gateway, a station
+    static constexpr std::size_t kMostOthers = 4;  ///< broadcasts, and other masters' requests
+    /// `until` of a request over a transport that may stall (T8): its time begins to run when a
+    /// later request has been answered.
+    static constexpr TimePoint kInTransit = TimePoint::max();
+
+    // May this frame be the reply?
+
+    /// The oldest request of `by` to this station that this reply PDU may answer, or null.
+    const Asked* answered_by(TimePoint now, std::uint8_t station, ByteView reply,
+                             Asked::By by = Asked::By::us) const;
+    /// True if this reply PDU equals the last reply of the station, which ended at most `within`
+    /// before `now`.
+    bool is_last_reply(TimePoint now, std::uint8_t station, ByteView reply, Duration within) const;
+    /// True if this reply PDU has function and length of the last reply of the station, which ended
+    /// at most `within` before `now`.
+    bool has_last_form(TimePoint now, std::uint8_t station, ByteView reply, Duration within) const;
+    /// When the last reply of the station ended; TimePoint{}: the station has not replied.
+    TimePoint replied(std::uint8_t station) const;
+
+    // Could a reply be taken for the reply to a new request?
+
+    /// True if a request of this gateway to the station is outstanding.
+    bool any(TimePoint now, std::uint8_t station) const;
+    /// True if one is outstanding whose time has not begun to run: see kInTransit.
+    bool is_in_transit(std::uint8_t station) const;
+    /// Time from which no outstanding reply or exception could be taken for the reply to `request`.
+    /// `again`: a retry, for which the reply to its own earlier attempt counts as well.
+    TimePoint clear_at(TimePoint now, std::uint8_t station, const modbus::Request& request,
+                       bool again = false) const;
+    /// True if the normal reply to this read differs from each outstanding reply in function or
+    /// length: that reply proves that the station has served all earlier requests.
+    bool is_proof(TimePoint now, std::uint8_t station, const modbus::Request& read) const;
+    /// The last outstanding read of the station, or null.
+    const Asked* last_read(TimePoint now, std::uint8_t station) const;
+    /// Time from which no reply of any station is outstanding. Requests in transit count as sent
+    /// `window` before their time is over, now.
+    TimePoint all_clear_at(TimePoint now, Duration window) const;
+    /// When the first request left that a reply to `pdu`, sent at `sent`, may answer.
+    TimePoint sampled(TimePoint now, std::uint8_t station, ByteView pdu, TimePoint sent) const;
+
+    // What happens
+
+    /// A request has ended without its reply, or another master's request was heard.
+    void add(std::uint8_t station, Asked asked);
+    /// A broadcast has left: each station that was asked before may answer it, which is wrong.
+    void add_broadcast(const Asked& broadcast);
+    /// A reply to `asked` was accepted. Returns false if an earlier equal request may have been
+    /// answered in its place: then the reply to `asked` itself is outstanding from now on.
+    bool on_reply(TimePoint now, std::uint8_t station, Asked asked, ByteView reply);
+    /// A reply came that nobody waits for. Closes the oldest request that it may answer and, of the
+    /// same connection, those before. Returns that request; empty: the reply answers none.
+    std::optional<Asked> on_late(TimePoint now, std::uint8_t station, ByteView reply);
+    /// A reply came once more, or in place of another one.
+    void on_repeated(TimePoint now, std::uint8_t station, ByteView reply);
+    /// Another master's request has had its reply.
+    void on_other_answered(TimePoint now, std::uint8_t station, ByteView reply);
+    /// A request that left at `sent` was answered: what left before is delivered, and its reply
+    /// comes within `window` from now.
+    void on_delivered(TimePoint now, TimePoint sent, Duration window);
+    /// Requests of other masters are of no interest any more.
+    void forget_other_masters();
+    void forget(std::uint8_t station);
+
+  private:
+    struct Page {
+        PoolVector<Asked> asked;  ///< in the order in which they left
+        Bytes reply;              ///< the last reply PDU
+        TimePoint replied{};
+    };
+    const Page* find(std::uint8_t station) const;
+    Page& page(std::uint8_t station);
+    static void close(Page& page, unsigned epoch, TimePoint sent);
+
+    PoolVector<Page> pages_;  ///< by station
+};
+
+/// The reads that a station is known to answer. Pure.
+class KnownReads {
+  public:
+    void on_answered(const modbus::Request& read);
+    /// A client wants this of a station that has never answered: it may answer nothing else.
+    void on_wanted(const modbus::Request& request) {
+        if (request.span()) wanted_ = request;
+    }
+    bool any() const { return shortest_.has_value(); }
+    /// The shortest read that the station has answered, else the one that was wanted last, else one
+    /// holding register at 0.
+    modbus::Request probe() const;
+    /// The longest read that the station has answered; empty: none.
+    const std::optional<modbus::Request>& longest() const { return longest_; }
+    /// Items of the longest read of this table that the station has answered.
+    std::uint32_t longest(modbus::Table table) const {
+        return items_[static_cast<std::size_t>(table)];
+    }
+
+  private:
+    std::optional<modbus::Request> shortest_;
+    std::optional<modbus::Request> longest_;
+    std::optional<modbus::Request> wanted_;
+    std::array<std::uint32_t, modbus::kTables.size()> items_{};
+};
+
+}  // namespace panelgate::arbiter
