@@ -41,18 +41,9 @@ Quiet quiet_of(const Settings& settings) {
     return Quiet(frame_time(settings.serial, modbus::kMaxRtuAdu), silent_interval(settings.serial));
 }
 
-Attempt::Wire wire_of(const Settings& settings) {
-    return {.serial = settings.serial,
-            .end_of_frame = settings.end_of_frame,
-            .reply_hole = settings.reply_hole,
-            .paced = settings.paced,
-            .may_stall = settings.may_stall};
-}
-
 /// Why this group is sent now.
 Reason reason_of(TimePoint now, const Group& group, const JobQueue& queue) {
     if (group.probe) return {.kind = Reason::Kind::probe};
-    if (!group.confirms.empty()) return {.kind = Reason::Kind::confirms};
     if (group.learns_for != 0) return {.kind = Reason::Kind::learns_echo};
     const Job& leader = group.jobs.front();
     return {.kind = group.attempts > 1 ? Reason::Kind::again : Reason::Kind::turn,
@@ -76,7 +67,6 @@ Arbiter::Arbiter(Settings settings)
       stations_(settings_),
       schedule_(settings_),
       quiet_(quiet_of(settings_)),
-      unsolicited_(settings_.serial, orders_),
       echo_memory_(settings_.echo),
       outbox_(settings_) {}
 
@@ -90,7 +80,6 @@ void Arbiter::apply(Settings settings) {
     if (same_wire) return;
     orders_ = crc_orders(settings_);
     quiet_ = quiet_of(settings_);
-    unsolicited_ = UnsolicitedFrames(settings_.serial, orders_);
     echo_memory_ = EchoMemory(settings_.echo);
     ascii_ = transcript_of(settings_);
 }
@@ -169,7 +158,10 @@ void Arbiter::cancel(TimePoint now, Client client) {
 }
 
 TimePoint Arbiter::clear_at(TimePoint now) const {
-    TimePoint clear = std::max(now, stations_.clear_at(now, settings_.may_stall));
+    Duration window = stations_.latest_reply(kBroadcast);
+    for (const StationSettings& station : settings_.stations)
+        window = std::max(window, stations_.latest_reply(station.id));
+    TimePoint clear = std::max(now, stations_.outstanding().all_clear_at(now, window));
     clear = std::max({clear, rest_, quiet_.free_at(Duration::zero())});
     if (!active_) return clear;
     const TimePoint sent = active_->timing().sent;
@@ -192,7 +184,8 @@ void Arbiter::on_line_left() {
 void Arbiter::forget_line() {
     up_ = suspended_ = resetting_ = false;
     stations_.on_line_down();
-    unsolicited_.forget();
+    idle_.clear();
+    replied_ = 0;
     memory_.clear();
 }
 
@@ -200,33 +193,33 @@ void Arbiter::on_line_up(TimePoint now) {
     up_ = true;
     suspended_ = false;
     resetting_ = false;
-    if (settings_.may_stall) stations_.on_opened(now);
+    mute_.attempts = 0;
+    mute_.ever_heard = false;
+    stations_.outstanding().on_opened();
     if (ascii_) ascii_->cut();
     quiet_.on_open(now);
-    quiet_.rest_until(rest_);
+    quiet_.rest_until(std::max(rest_, now + settings_.connect_pause));
     stations_.on_recovery();
-    pace_ = {};
     echo_memory_.forget();
     step(now);
 }
 
-/// A sent request stays outstanding: a device server may hand its reply to the next connection.
+/// A sent request stays outstanding: a device server may hand its reply to the next connection (T8).
 void Arbiter::on_line_down(TimePoint now) {
     forget_line();
     if (active_) {
-        note(now, active_->take_unsolicited());
+        for (const Attempt::Heard& heard : active_->take_heard())
+            judge_part(now, heard.part, false);
         const Attempt attempt = take_active(now);
         const Group& group = attempt.group();
+        Asked asked = asked_of(attempt, settings_.may_stall);
+        // The computed end may be later than the next connection: it has left over this one.
+        asked.sent = std::min(asked.sent, now);
         if (attempt.is_broadcast()) {
-            stations_.book().on_broadcast(attempt.timing().sent, group.request.pdu());
+            stations_.on_broadcast(asked);
             rest_ = std::max(rest_, attempt.timing().sent + settings_.broadcast_turnaround);
         } else {
-            // Its computed end may be later than the next connection: it has left over this one.
-            const TimePoint sent = attempt.timing().sent;
-            const TimePoint left = sent <= now ? sent : now - Duration{1};
-            stations_.of(group.station)
-                .replies()
-                .on_unanswered(stations_.book(), now, group.request.pdu(), left);
+            stations_.outstanding().add(group.station, std::move(asked));
         }
         outbox_.report(attempt, TransactionEnd::line_down);
         for (const Job& job : group.jobs) outbox_.finish(job, Fault::line_lost);
@@ -250,19 +243,15 @@ void Arbiter::on_rx(TimePoint now, ByteView bytes) {
 }
 
 void Arbiter::hear(TimePoint now, ByteView bytes) {
-    if (!active_ || active_->is_broadcast()) {
-        hear_idle(now, bytes);
-    } else {
-        const bool was_wrong = active_->echo().mismatch();
-        const Verdict verdict = active_->on_rx(now, bytes, ends_attempt(now));
-        quiet_.on_heard(std::max(active_->timing().sent, now));
-        if (active_->echo().mismatch() && !was_wrong) {
-            outbox_.on_echo_mismatch(now, active_->group().station);
-            echo_memory_.on_mismatch();
-        }
-        if (const Bytes stale = active_->take_stale(); !stale.empty()) hear_idle(now, stale);
-        conclude(now, verdict);
+    if (!active_ || active_->is_broadcast()) return hear_idle(now, bytes);
+    const bool was_wrong = active_->echo().mismatch();
+    active_->on_rx(now, bytes);
+    quiet_.on_heard(std::max(active_->timing().sent, now));
+    if (active_->echo().mismatch() && !was_wrong) {
+        outbox_.on_echo_mismatch(now, active_->group().station);
+        echo_memory_.on_mismatch();
     }
+    conclude(now);
 }
 
 /// The piece that has ended may belong to the attempt, to no request, or partly to both.
@@ -272,11 +261,15 @@ void Arbiter::hear_piece(TimePoint now, const modbus::AsciiTranscript::Piece& pi
     if (piece.end == End::none) return;
     const bool good = piece.end == End::frame;
     if (active_ && !active_->is_broadcast()) {
-        const Attempt::Ends ends = ends_attempt(now);
-        conclude(now, piece.end == End::cut ? active_->on_frame_cut(ends)
-                                            : active_->on_frame_end(good, ends));
+        piece.end == End::cut ? active_->on_frame_cut() : active_->on_frame_end(good);
+        conclude(now);
     }
-    if (unsolicited_.pending()) note_idle(now, unsolicited_.take_delimited(quiet_.station(), good));
+    if (idle_.empty()) return;
+    const Bytes bytes = std::exchange(idle_, {});
+    judge_part(now,
+               modbus::classify_frame(bytes, quiet_.station(),
+                                      good && modbus::crc_ok(bytes, orders_)),
+               false);
 }
 
 void Arbiter::on_end(TimePoint now, Duration left) {
@@ -286,17 +279,18 @@ void Arbiter::on_end(TimePoint now, Duration left) {
 }
 
 void Arbiter::step(TimePoint now) {
+    now_ = now;
     check_active(now);
     expire(now);
-    if (!active_ && unsolicited_.pending() && now >= idle_ends()) judge_idle(now);
+    if (!active_ && !idle_.empty() && now >= idle_ends()) judge_idle(now);
     while (up_ && !suspended_ && !resetting_ && !active_ && start_next(now)) check_active(now);
 }
 
 void Arbiter::check_active(TimePoint now) {
     if (!active_ || now < active_->deadline()) return;
     if (active_->is_broadcast()) return end_broadcast(now);
-    expire_active(now);  // the candidate may be too late for some
-    conclude(now, active_->on_deadline(now, ends_attempt(now)));
+    active_->on_silence(now);
+    conclude(now);
     if (ascii_ && ascii_->has_given()) ascii_->cut();
 }
 
@@ -309,8 +303,7 @@ void Arbiter::expire(TimePoint now) {
         outbox_.finish(job, sent ? Fault::timeout : Fault::expired);
     }
     for (const Group& group : schedule_.backlog().take_dropped()) {
-        const bool silent = group.silent_after > Duration::zero();
-        give_up(now, group, silent ? Fault::timeout : Fault::damaged);
+        give_up(now, group, group.silent ? Fault::timeout : Fault::damaged);
     }
 }
 
@@ -321,62 +314,29 @@ void Arbiter::expire_active(TimePoint now) {
     for (const Job& job : active_->group().expire(now)) outbox_.finish(job, Fault::timeout);
 }
 
-Attempt::Ends Arbiter::ends_attempt(TimePoint now) const {
-    return [this, now](ByteView adu) {
-        return unsolicited_.is_wrong_reply(now, adu, stations_, active_->heard_after());
-    };
-}
-
 void Arbiter::hear_idle(TimePoint now, ByteView bytes) {
     quiet_.on_noise(now);
-    unsolicited_.hear(now, bytes);
-    if (unsolicited_.full()) judge_idle(now);
-}
-
-/// When what is heard without a request is over.
-TimePoint Arbiter::idle_ends() const {
-    return quiet_.since() +
-           (unsolicited_.has_begun() ? settings_.reply_hole : settings_.end_of_frame);
+    mute_.ever_heard = true;
+    idle_.insert(idle_.end(), bytes.begin(), bytes.end());
+    if (idle_.size() > modbus::ReplyFramer::kMaxHeard) judge_idle(now);
 }
 
 void Arbiter::judge_idle(TimePoint now) {
-    if (ascii_) ascii_->cut();
-    note_idle(now, unsolicited_.take(quiet_.station()));
-}
-
-/// Our own frame may be among what came while nothing was asked.
-void Arbiter::note_idle(TimePoint now, std::vector<modbus::Unused> heard) {
-    const std::vector<modbus::Unused> parts = unsolicited_.joined(now, std::move(heard), stations_);
-    for (const modbus::Unused& part : parts) {
-        const TimePoint heard_at = std::min(now, quiet_.since());
-        const bool late = unsolicited_.late_echo().on_heard(heard_at, part.bytes);
-        if (late || unsolicited_.is_own_behind_reply(heard_at, part.bytes))
-            hear_again(now, part.bytes[0], modbus::pdu_of(part.bytes));
+    const Bytes bytes = std::exchange(idle_, {});
+    if (ascii_) {
+        ascii_->cut();
+        return judge_part(now, modbus::classify_frame(bytes, quiet_.station(), false), false);
     }
-    note(now, parts);
-}
-
-/// This request came back once more than the line's echo explains.
-void Arbiter::hear_again(TimePoint now, std::uint8_t station, ByteView pdu) {
-    if (echo_memory_.on_again(now, pdu)) outbox_.on_echoed_again(station);
-}
-
-void Arbiter::note(TimePoint now, const std::vector<modbus::Unused>& parts) {
-    const bool idle = !active_;
-    unsolicited_.note(now, parts, idle, stations_, quiet_, outbox_);
+    for (const modbus::Unused& part : modbus::classify_heard(bytes, quiet_.station(), orders_))
+        judge_part(std::min(now, quiet_.since()), part, false);
 }
 
 bool Arbiter::start_next(TimePoint now) {
     if (now < quiet_.free_at(stations_.gap(quiet_.station()))) return false;
-    if (unsolicited_.has_begun() && now < idle_ends()) return false;
-    if (unsolicited_.pending()) judge_idle(now);  // it may show that the line is not free
-    Schedule::Next next = schedule_.next(now, stations_, quiet_, echo_memory_);
-    if (next.reopen) {
-        resetting_ = true;
-        outbox_.reset("nothing was answered since a request: it may still be on its way");
-    }
-    if (!next.group) return false;
-    start(now, std::move(*next.group));
+    if (!idle_.empty()) judge_idle(now);  // it may show that the line is not free
+    auto group = schedule_.next(now, stations_, quiet_, echo_memory_);
+    if (!group) return false;
+    start(now, std::move(*group));
     return true;
 }
 
@@ -391,32 +351,29 @@ void Arbiter::start(TimePoint now, Group group) {
     }
     Bytes wire = ascii_ ? modbus::to_ascii(adu) : adu;
     if (ascii_) ascii_->cut();
-    Attempt::Timing timing = Attempt::timing_of(wire_of(settings_), now, adu.size(), lead_);
+    Attempt::Timing timing = Attempt::timing_of(settings_, now, adu.size(), lead_);
     timing.pause = now - quiet_.since();
     timing.confirm_end = confirm_ends_;
-    timing.steady = timing.steady && (settings_.paced || pace_.kept());
     if (group.station != kBroadcast) {
         Station& station = stations_.of(group.station);
-        if (group.attempts == 1) group.repeatable = station.settings().retry_writes;
-        station.on_asked(stations_.book(), now, group, schedule_.in_transit(stations_, station));
-        if (group.attempts == 1)
-            group.first_silence = !station.missed_last() && !station.health().offline() &&
-                                  !stations_.flaky_beside_others(now, station);
-        timing.is_last = !station.may_retry(group);
-        timing.patience = stations_.patience(now, group) + latency_;
-        timing.usual = std::min(station.usual(stations_.slowest()) + latency_, timing.patience);
-        timing.allow_hole(station.reply_hole());
-        timing.wake_latency = wake_latency_.early();
-        timing.drift = station.clock_drift();
-        timing.echoes = echo_memory_.expects_one() && !echo_memory_.comes_late(now);
-        timing.as_asked = station.answers_as_asked() && echo_memory_.known();
+        if (group.attempts == 1) {
+            group.repeatable = station.settings().retry_writes;
+            group.was_online = station.answers_now(group.request.is_read());
+        }
+        station.on_asked(now, group);
+        timing.patience = station.response_timeout() + timing::kListensAgain + latency_;
+        if (const Duration hole = station.reply_hole(); hole > timing.hole) {
+            timing.longest_reply += hole - timing.hole;
+            timing.hole = hole;
+        }
     }
     if (!group.request.is_read()) memory_.on_write(now, group.station, group.request);
     outbox_.written(group, false);
     const Reason why = reason_of(now, group, schedule_.backlog().queue());
     quiet_.on_sent(timing.sent, group.station);
-    unsolicited_.on_sent(now, adu, settings_.may_stall && echo_memory_.expects_one());
-    EchoFilter echo(adu, echo_memory_.expect(now, group.request));
+    last_frame_ = adu;
+    replied_ = 0;
+    EchoFilter echo(adu, echo_memory_.expect());
     active_.emplace(std::move(group), timing, std::move(echo), orders_);
     outbox_.transmit(now, *active_, std::move(adu), std::move(wire), why);
 }
@@ -431,10 +388,9 @@ std::optional<TimePoint> Arbiter::next_deadline() const {
         }
         return next;
     }
-    if (unsolicited_.pending()) earlier(idle_ends());
+    if (!idle_.empty()) earlier(idle_ends());
     if (!up_ || suspended_ || resetting_) return next;
-    if (unsolicited_.has_begun()) return next;  // nothing starts before
-    if (const auto start = schedule_.next_start(stations_, quiet_)) earlier(*start);
+    if (const auto start = schedule_.next_start(now_, stations_, quiet_)) earlier(*start);
     return next;
 }
 

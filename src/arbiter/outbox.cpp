@@ -1,5 +1,5 @@
 #include "panelgate/arbiter/outbox.hpp"
-#include "panelgate/arbiter/book/timing.hpp"
+#include "panelgate/arbiter/timing.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -27,35 +27,22 @@ struct Shown {
     bool foreign = false;
 };
 constexpr Shown kShown[] = {
+    {Done::contested, FrameKind::foreign, &Symptoms::unasked, false, true},
     {Done::echo, FrameKind::echo, &Symptoms::echoes},
     {Done::request, FrameKind::foreign_request, &Symptoms::requests, true, true},
     {Done::damaged, FrameKind::damaged, &Symptoms::strays, true},
-    {Done::duplicate, FrameKind::copy, &Symptoms::doubled},
+    {Done::copy, FrameKind::copy, &Symptoms::doubled},
     {Done::second, FrameKind::foreign, &Symptoms::doubled},  // of none that was heard
     {Done::late, FrameKind::late, &Symptoms::late},
-    {Done::disorder, FrameKind::late, &Symptoms::late},
     {Done::broadcast, FrameKind::foreign, &Symptoms::broadcast_replies, false, true},
-    {Done::unasked, FrameKind::foreign, &Symptoms::unasked, false, true},
+    {Done::wrong, FrameKind::foreign, &Symptoms::unasked, false, true},
     {Done::nobodys, FrameKind::foreign, &Symptoms::unasked, false, true},
 };
 
-/// A good frame that answers no request that is known to be open: a copy, or nobody's.
-constexpr bool is_surplus(Done done) {
-    return done == Done::duplicate || done == Done::second || done == Done::unasked ||
-           done == Done::nobodys;
-}
-
 ByteView pdu_of(const modbus::Unused& frame) { return modbus::pdu_of(frame.bytes); }
 
-/// True if there is one of the asked station.
-bool holds_own(const std::vector<modbus::Unused>& frames) {
-    return std::ranges::any_of(frames, [](const modbus::Unused& frame) {
-        return frame.kind == modbus::Unused::Kind::own;
-    });
-}
-
 FrameKind kind_of(const Group& group) {
-    if (group.learns_for != 0 || !group.confirms.empty()) return FrameKind::learn_echo;
+    if (group.learns_for != 0) return FrameKind::learn_echo;
     if (group.station == kBroadcast) return FrameKind::broadcast;
     if (group.probe) return FrameKind::probe;
     return group.attempts > 1 ? FrameKind::retry : FrameKind::request;
@@ -90,7 +77,6 @@ void Outbox::transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wi
                       const Reason& why) {
     const Group& group = attempt.group();
     other_frame_.clear();
-    completed_ = false;
     if (group.attempts > 1) ++of(group.station).retries;
     if (group.station == kBroadcast) ++line_.broadcasts;
     actions_.push_back(
@@ -164,61 +150,27 @@ void Outbox::on_echo_mismatch(TimePoint now, std::uint8_t station) {
 }
 
 void Outbox::on_unsolicited(TimePoint now, const modbus::Unused& part, Done done,
-                            std::uint8_t asked, Duration lateness) {
+                            std::uint8_t asked, bool inside, Duration lateness) {
     const Shown& shown = *std::ranges::find(kShown, done, &Shown::done);
-    const bool late = is_late(done);
+    const bool late = done == Done::late;
     of(is_reply(done) ? part.station : asked).discarded_bytes += part.bytes.size();
     if (late) ++of(part.station).late_frames;
     if (shown.foreign) ++of(asked).foreign_frames;
     Symptoms& symptoms = symptoms_of(shown.counts_for_asked ? asked : part.station);
     if (late) symptoms.mute_in_a_row = 0;
     symptoms.worst_lateness = std::max(symptoms.worst_lateness, lateness);
-    const bool in_time = late && lateness <= Duration::zero();  // after a shortened wait
+    // A reply to the first of two attempts is no late one.
+    const bool in_time = late && lateness <= Duration::zero();
     // A copy of a write's reply, which is its request, is no echo.
     const bool unsure = done == Done::echo && modbus::answers(pdu_of(part), pdu_of(part));
-    const bool elsewhere = unsure || (done == Done::damaged && inside_attempt_);
-    const bool old = is_surplus(done) && before_.is_old_reply(part.station, pdu_of(part));
-    if (!in_time && !elsewhere) ++(symptoms.*(old ? &Symptoms::old_replies : shown.symptom));
-    if (done == Done::damaged) {
-        join(part.bytes, asked);
-    } else if (const Bytes begun = std::exchange(cut_, {});
-               !begun.empty() && std::ranges::mismatch(begun, part.bytes).in1 == begun.end()) {
-        ++symptoms_of(cut_for_).torn;  // it was no damage
-    }
-    refused_late_ = refused_late_ || (inside_attempt_ && part.station == asked && is_late(done) &&
-                                      modbus::exception_of(pdu_of(part)));
-    if (inside_attempt_ && is_surplus(done) && !old && part.station != asked)
+    const bool elsewhere = unsure || (done == Done::damaged && inside);
+    if (!in_time && !elsewhere) ++(symptoms.*shown.symptom);
+    if (inside && (done == Done::nobodys || done == Done::wrong) && part.station != asked)
         other_frame_.assign(pdu_of(part).begin(), pdu_of(part).end());
     actions_.push_back(Note{now, shown.kind, part.bytes, {}});
 }
 
 // Symptoms, for diagnosis only: nothing depends on them.
-
-/// Our own request may cut a frame that comes meanwhile in two: no damage, where both pieces are
-/// one good frame.
-void Outbox::join(ByteView bytes, std::uint8_t asked) {
-    Bytes whole = std::exchange(cut_, {});
-    const bool first = whole.empty();
-    whole.insert(whole.end(), bytes.begin(), bytes.end());
-    if (!first && !frames_in(whole, asked).empty()) {
-        ++symptoms_of(cut_for_).torn;
-        if (!inside_attempt_) ++symptoms_of(asked).torn;
-        completed_ = inside_attempt_;
-    } else if (!inside_attempt_ && whole.size() <= modbus::kMaxRtuAdu) {
-        cut_ = std::move(whole);
-        cut_for_ = asked;
-    }
-}
-
-/// Returns the frames, if there is nothing else: good ones, in whatever pieces they came.
-std::vector<modbus::Unused> Outbox::frames_in(ByteView bytes, std::uint8_t asked) const {
-    std::vector<modbus::Unused> parts = modbus::classify_heard(bytes, asked, orders_);
-    const auto damaged = [](const modbus::Unused& part) {
-        return part.kind == modbus::Unused::Kind::damaged;
-    };
-    if (std::ranges::any_of(parts, damaged)) parts.clear();
-    return parts;
-}
 
 namespace {
 
@@ -234,94 +186,59 @@ bool is_search(const Group& group) {
     return !group.jobs.empty() && std::ranges::all_of(group.jobs, &Job::search);
 }
 
-/// False where the normal reply equals the request: what came back may have been that.
-bool is_surely_echoed(const Attempt& attempt) {
-    const modbus::Request& request = attempt.group().request;
-    return attempt.echoed() && (teaches_echo(request) || teaches_echo_of_writes(request));
-}
-
 }  // namespace
 
-void Outbox::on_answered(TimePoint now, const Attempt& attempt, Duration think,
+void Outbox::on_answered(TimePoint now, const Attempt& attempt, ByteView reply,
                          const Station::Replied& replied) {
-    const std::uint8_t station = attempt.group().station;
-    note_reply(now, station, attempt.reply());
+    const Group& group = attempt.group();
+    const std::uint8_t station = group.station;
+    actions_.push_back(
+        Note{now, FrameKind::reply, modbus::encode_adu(station, reply, orders_.of(station)), {}});
+    const std::size_t size = reply.size() + modbus::kAduOverhead;
     StationCounters& counters = of(station);
     Symptoms& symptoms = counters.symptoms;
-    counters.turnaround.observe(think);
+    const Duration silence = silent_interval(attempt.timing().serial);
+    counters.turnaround.observe(std::max(attempt.waited(size) - silence, Duration{}));
     counters.bus_transaction.observe(now - attempt.timing().started);
-    if (const auto code = modbus::exception_of(attempt.reply())) ++counters.exceptions[*code];
+    if (const auto code = modbus::exception_of(reply)) ++counters.exceptions[*code];
     ++(attempt.echo().mismatch() ? symptoms.collided : symptoms.answered);
     ++symptoms.answered_after[pause_class(attempt.timing().pause)];
-    if (attempt.reply().size() + modbus::kAduOverhead >= Symptoms::kLongReply)
-        ++symptoms.long_answered;
-    if (is_surely_echoed(attempt)) ++symptoms.echoes;
-    count_beside(attempt);
+    if (size >= Symptoms::kLongReply) ++symptoms.long_answered;
+    if (attempt.echo().complete()) ++symptoms.echoes;
+    if (!attempt.damaged_bytes().empty()) ++symptoms.strays;
     if (symptoms.mute_in_a_row > 0) ++symptoms.silences;
-    if (before_.on_answered(station, attempt.group().request.pdu(), attempt.reply()))
-        ++symptoms.repeated;
     if (replied.trailed) ++symptoms.trailed;
-    credit_unanswered(attempt.group());
+    credit_unanswered(group);
     if (replied.back) event(StationEvent::Kind::online, station);
     if (replied.drift) event(StationEvent::Kind::drift, station, *replied.drift);
     if (replied.trail) event(StationEvent::Kind::trail, station, *replied.trail);
     symptoms.mute_in_a_row = 0;
 }
 
-/// Counts what came beside the reply.
-void Outbox::count_beside(const Attempt& attempt) {
-    const std::uint8_t station = attempt.group().station;
-    const ByteView bytes = attempt.damaged_bytes();
-    if (bytes.empty()) return;
-    if (!completed_) join(bytes, station);
-    if (completed_) return;
-    const std::vector<modbus::Unused> frames = frames_in(bytes, station);
-    if (frames.empty()) ++symptoms_of(station).strays;
-    for (const modbus::Unused& frame : frames) ++symptoms_of(frame.station).unasked;
-}
-
-void Outbox::on_doubted(TimePoint now, const Attempt& attempt) {
-    note_reply(now, attempt.group().station, attempt.group().doubted);
-}
-
-void Outbox::note_reply(TimePoint now, std::uint8_t station, const Bytes& pdu) {
-    actions_.push_back(
-        Note{now, FrameKind::reply, modbus::encode_adu(station, pdu, orders_.of(station)), {}});
-}
-
 void Outbox::on_failed(const Attempt& attempt, Verdict verdict) {
-    Symptoms& symptoms = symptoms_of(attempt.group().station);
-    const bool damaged = !attempt.damaged_bytes().empty() && !completed_;
-    const std::vector<modbus::Unused> frames =
-        damaged ? frames_in(attempt.damaged_bytes(), attempt.group().station)
-                : std::vector<modbus::Unused>{};
-    if (is_surely_echoed(attempt)) ++symptoms.echoes;
-    if (verdict == Verdict::damaged) ++of(attempt.group().station).damaged_frames;
+    const Group& group = attempt.group();
+    Symptoms& symptoms = symptoms_of(group.station);
+    if (attempt.echo().complete() && teaches_echo(group.request)) ++symptoms.echoes;
+    if (verdict == Verdict::damaged) ++of(group.station).damaged_frames;
     if (verdict != Verdict::silent) symptoms.mute_in_a_row = 0;
     if (attempt.echo().mismatch()) {
         ++symptoms.collided;
         symptoms.mute_in_a_row = 0;
-    } else if ((verdict == Verdict::wrong && !refused_late_) || holds_own(frames)) {
+    } else if (verdict == Verdict::wrong) {
         ++symptoms.wrong;
         if (attempt.refused_other()) ++symptoms.wrong_exceptions;
-    } else if (damaged && frames.empty()) {
+    } else if (!attempt.damaged_bytes().empty()) {
         count_damaged(attempt);
         symptoms.mute_in_a_row = 0;
     } else {
         const bool silent = !attempt.heard() && !attempt.disturbed();
         ++(silent ? symptoms.silent : symptoms.disturbed);
         if (silent) remember_unanswered(attempt, symptoms.mute_in_a_row);
-        if (is_answered_by_other(attempt, frames)) ++symptoms.misaddressed;
-        if (!is_search(attempt.group())) ++symptoms.mute_in_a_row;
+        // A frame with another station's address would have been the answer.
+        if (!other_frame_.empty() && modbus::answers(group.request.pdu(), other_frame_))
+            ++symptoms.misaddressed;
+        if (!is_search(group)) ++symptoms.mute_in_a_row;
     }
-}
-
-/// True if a frame with another station's address would have been the answer.
-bool Outbox::is_answered_by_other(const Attempt& attempt,
-                                  const std::vector<modbus::Unused>& frames) const {
-    const ByteView request = attempt.group().request.pdu();
-    const ByteView pdu = frames.empty() ? ByteView(other_frame_) : pdu_of(frames.front());
-    return !pdu.empty() && modbus::answers(request, pdu);
 }
 
 /// An unanswered read that is answered when asked again gives evidence about the pause before it.
@@ -330,7 +247,6 @@ void Outbox::remember_unanswered(const Attempt& attempt, std::uint64_t mute_befo
     const Group& group = attempt.group();
     constexpr std::uint64_t kMost = 2;  // in a row: a retry may follow another frame closely, too
     if (!group.request.is_read()) return;
-    if (!is_search(group)) before_.on_unanswered(group.station, group.request.pdu());
     if (mute_before >= kMost) {
         unanswered_.erase(group.station);
         return;
@@ -345,6 +261,7 @@ void Outbox::credit_unanswered(const Group& group) {
     const auto found = unanswered_.find(group.station);
     if (found == unanswered_.end() || found->second.pdu != group.request.pdu()) return;
     const Unanswered& unanswered = found->second;
+    ++symptoms_of(group.station).repeated;
     for (std::size_t i = 0; i < unanswered.count; ++i)
         ++symptoms_of(group.station).silent_after[unanswered.pauses[i]];
     unanswered_.erase(found);

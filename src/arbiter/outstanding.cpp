@@ -80,26 +80,44 @@ bool Outstanding::is_in_transit(std::uint8_t station) const {
            });
 }
 
+/// An exception names its function alone.
+bool Outstanding::may_be_taken(const Asked& asked, const modbus::Request& request, bool again) {
+    if (asked.by == By::broadcast) return !request.is_read() && confirms(asked, request);
+    return asked.by == By::us && asked.pdu[0] == request.function() &&
+           !(again && is_same(asked, request.pdu()));
+}
+
 TimePoint Outstanding::clear_at(TimePoint now, std::uint8_t station,
                                 const modbus::Request& request, bool again) const {
     TimePoint clear{};
     const Page* const all = find(station);
     if (all == nullptr) return clear;
     for (const Asked& asked : all->asked) {
-        // An exception names its function alone.
-        const bool may_answer = asked.by == By::broadcast
-                                    ? !request.is_read() && confirms(asked, request)
-                                    : asked.by == By::us && asked.pdu[0] == request.function() &&
-                                          !(again && is_same(asked, request.pdu()));
-        if (may_answer && is_live(asked, now)) clear = std::max(clear, asked.until);
+        if (is_live(asked, now) && may_be_taken(asked, request, again))
+            clear = std::max(clear, asked.until);
     }
     return clear;
 }
 
-bool Outstanding::is_proof(TimePoint now, std::uint8_t station, const modbus::Request& read) const {
+TimePoint Outstanding::earlier_clear_at(TimePoint now, std::uint8_t station,
+                                        const modbus::Request& request) const {
+    TimePoint clear{};
+    const Page* const all = find(station);
+    if (all == nullptr) return clear;
+    for (const Asked& asked : all->asked) {
+        const bool earlier = asked.epoch != epoch_ && asked.until != kInTransit;
+        if (earlier && is_live(asked, now) && may_be_taken(asked, request, false))
+            clear = std::max(clear, asked.until);
+    }
+    return clear;
+}
+
+bool Outstanding::is_proof(TimePoint now, std::uint8_t station, const modbus::Request& read,
+                           bool again) const {
     const Page* const all = find(station);
     return all == nullptr || std::ranges::none_of(all->asked, [&](const Asked& asked) {
                if (!is_ours(asked, now) || asked.pdu[0] != read.function()) return false;
+               if (again && is_same(asked, read.pdu())) return false;
                const auto length = modbus::reply_length_from_request(asked.pdu);
                return !length || length == read.reply_length();
            });
@@ -138,6 +156,7 @@ TimePoint Outstanding::sampled(TimePoint now, std::uint8_t station, ByteView pdu
 /// Beyond the limit of its kind the oldest is forgotten.
 void Outstanding::add(std::uint8_t station, Asked asked) {
     PoolVector<Asked>& all = page(station).asked;
+    asked.epoch = epoch_;
     std::erase_if(all, [&](const Asked& old) { return !is_live(old, asked.sent); });
     const std::size_t most = asked.by == By::us ? kMost : kMostOthers;
     const auto is_of_kind = [&](const Asked& old) { return old.by == asked.by; };
@@ -162,6 +181,7 @@ void Outstanding::close(Page& page, unsigned epoch, TimePoint sent) {
 
 bool Outstanding::on_reply(TimePoint now, std::uint8_t station, Asked asked, ByteView reply) {
     Page& all = page(station);
+    asked.epoch = epoch_;
     all.reply.assign(reply.begin(), reply.end());
     all.replied = now;
     const auto equal = std::ranges::find_if(all.asked, [&](const Asked& old) {
@@ -227,6 +247,19 @@ void KnownReads::on_answered(const modbus::Request& read) {
     items = std::max(items, span.count);
     if (!shortest_ || span.count < shortest_->span()->count) shortest_ = read;
     if (!longest_ || span.count > longest_->span()->count) longest_ = read;
+}
+
+void KnownReads::on_unanswered(const modbus::Request& read) {
+    const auto& span = read.span();
+    if (any() && span && span->count > longest(span->table)) answers_longer_ = false;
+}
+
+std::optional<modbus::Request> KnownReads::longer() const {
+    if (!longest_ || !answers_longer_) return std::nullopt;
+    modbus::Span span = *longest_->span();
+    constexpr std::uint32_t kMost = 100;  // a reply that is not too long for any panel
+    if (++span.count > kMost || span.end() > modbus::kTableItems) return std::nullopt;
+    return modbus::Request::read(span);
 }
 
 modbus::Request KnownReads::probe() const {

@@ -1,10 +1,10 @@
 #include "panelgate/arbiter/schedule.hpp"
-#include "panelgate/arbiter/book/timing.hpp"
 
 #include <algorithm>
 #include <iterator>
 #include <utility>
 
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/function.hpp"
 
 namespace panelgate::arbiter {
@@ -16,24 +16,30 @@ std::uint32_t known_length(const Station& station, const modbus::Span& span) {
     const StationSettings& settings = station.settings();
     const std::uint32_t limit =
         modbus::is_bit_table(span.table) ? settings.max_bits : settings.max_registers;
-    return settings.vouched ? limit
-                            : std::min(limit, station.replies().reads().longest(span.table));
+    return settings.vouched ? limit : std::min(limit, station.reads().longest(span.table));
 }
 
 void append(Jobs& jobs, Jobs more) {
     jobs.insert(jobs.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
 }
 
+/// Makes a read that no client asked for.
+Group internal_read(std::uint8_t station, modbus::Request request) {
+    const std::optional<modbus::Span> span = request.span();
+    return {.station = station, .request = std::move(request), .span = span};
+}
+
 }  // namespace
 
-Group Sharing::gather(Job leader, const Station& station, const OutstandingRequests& book,
-                      JobQueue& queue) const {
+Group Sharing::gather(TimePoint now, Job leader, const Station& station,
+                      const Outstanding& outstanding, JobQueue& queue) const {
     Group group{.station = leader.station, .request = leader.request};
-    if (share_ && !leader.alone) group.span = leader.request.span();
+    const bool shares = share_ && !leader.alone && !station.settings().any_length;
+    if (shares) group.span = leader.request.span();
     group.jobs.push_back(std::move(leader));
-    if (!group.span) return group;
+    if (!group.span || outstanding.any(now, group.station)) return group;
     append(group.jobs, queue.take_reads(group.station, [&](const Job& other) {
-        if (!joins(group, other, station, book)) return false;
+        if (!joins(group, other, station)) return false;
         group.span = join(*group.span, *other.request.span());
         return true;
     }));
@@ -41,14 +47,11 @@ Group Sharing::gather(Job leader, const Station& station, const OutstandingReque
     return group;
 }
 
-bool Sharing::joins(const Group& group, const Job& job, const Station& station,
-                    const OutstandingRequests& book) const {
+bool Sharing::joins(const Group& group, const Job& job, const Station& station) const {
     const auto& span = job.request.span();
     if (!group.span->touches(*span)) return false;
     if (group.span->contains(*span)) return true;
     const modbus::Span both = join(*group.span, *span);
-    if (book.any(job.station) && book.is_ambiguous(job.station, modbus::Request::read(both)))
-        return false;
     // A span that contains all the others was asked for by a client itself.
     if (both != *span && both.count > known_length(station, both)) return false;
     return std::none_of(refused_.begin(), refused_.end(), [&](const ReadSpan& refused) {
@@ -78,11 +81,8 @@ Bytes Sharing::part_for(const Group& group, const Bytes& reply, const Job& job) 
 }
 
 bool Backlog::has(Client client, std::uint8_t station) const {
-    const auto theirs = [&](const Job& job) {
-        return job.client == client && job.station == station;
-    };
     return queue_.has(client, station) || std::ranges::any_of(retries_, [&](const Group& group) {
-               return std::ranges::any_of(group.jobs, theirs);
+               return group.station == station && group.has(client, station);
            });
 }
 
@@ -140,91 +140,79 @@ Jobs Backlog::clear() {
     return removed;
 }
 
-namespace {
-
-/// Makes a read that no client asked for.
-Group internal_read(std::uint8_t station, modbus::Request request) {
-    const std::optional<modbus::Span> span = request.span();
-    return {.station = station, .request = std::move(request), .span = span};
-}
-
-/// P8: it is unknown whether this line has an echo, and this job could be confirmed by its own
-/// echo. A read of the same station decides.
-Group learning_for(const Job& job, const Station& station) {
-    modbus::Request probe = station.replies().reads().probe();
-    if (!teaches_echo(probe))
-        probe = modbus::Request::read({modbus::Table::holding_registers, 0, 1});
-    Group group = internal_read(job.station, std::move(probe));
-    group.learns_for = job.ticket;
-    return group;
-}
-
-}  // namespace
-
 Schedule::Schedule(const Settings& settings)
     : quarantine_(settings.quarantine),
-      may_stall_(settings.may_stall),
       backlog_(settings.queue),
       sharing_(settings.share_reads) {}
 
 void Schedule::apply(const Settings& settings) {
     quarantine_ = settings.quarantine;
-    may_stall_ = settings.may_stall;
     backlog_.queue().apply(settings.queue);
     sharing_.apply(settings.share_reads);
 }
 
-/// Time from which a job may have its turn: it is sent, or, where that is sooner, a read whose
-/// answer proves that nothing else is outstanding (P1). No answer to a broadcast can then be taken
-/// for its reply either (P8). A broadcast itself has no reply.
-TimePoint Schedule::ready_at(const Stations& stations, const Job& job) const {
+/// Time from which this request, or the read that goes before it, may be sent: no outstanding reply
+/// can then be taken for its reply (T2, T8, T11). `may_learn`: a read goes first to show the echo.
+TimePoint Schedule::clear_at(TimePoint now, const Stations& stations, const Station& station,
+                             const modbus::Request& request, bool may_learn) {
+    const Outstanding& outstanding = stations.outstanding();
+    const std::uint8_t id = station.id();
+    TimePoint clear = outstanding.clear_at(now, id, request);
+    TimePoint earlier = outstanding.earlier_clear_at(now, id, request);
+    if (may_learn) {
+        const modbus::Request probe = station.reads().probe();
+        clear = std::max(clear, outstanding.clear_at(now, id, probe));
+        earlier = std::max(earlier, outstanding.earlier_clear_at(now, id, probe));
+    }
+    constexpr int kAnswers = 2;  // silent transactions in a row: more, and a proof is no quicker
+    if (clear <= now || station.health().offline() ||
+        station.health().silent_in_a_row() >= kAnswers)
+        return clear;
+    return stations.proof_for(now, station) ? earlier : clear;
+}
+
+/// Time from which a job may have its turn. A broadcast has no reply.
+TimePoint Schedule::ready_at(TimePoint now, const Stations& stations, const Job& job) const {
     if (job.station == kBroadcast) return {};
-    const Station* station = stations.find(job.station);
-    if (station == nullptr) return stations.broadcasts_over(job.station, job.request);
-    // A write that its echo could confirm is preceded by a read, which may be any.
-    const bool is_learned = echo_known_ || job.request.is_read();
-    const OutstandingRequests& book = stations.book();
-    const ReplyHabits& replies = station->replies();
-    TimePoint clear = is_learned ? replies.clear_at(book, job.request) : replies.rested();
-    if (can_prove(book, *station))
-        clear = std::min(clear, replies.clear_at(book, replies.proof(book)));
-    return std::max({clear, stations.broadcasts_over(job.station, job.request),
-                     stations.throttled_until(job.station)});
+    const TimePoint held = stations.held_until(job);
+    const Station* const station = stations.find(job.station);
+    if (station == nullptr) return held;
+    const bool may_learn = !echo_known_ && !job.request.is_read();
+    const TimePoint clear = clear_at(now, stations, *station, job.request, may_learn);
+    // What may be held back on its way is asked for again.
+    const bool in_transit = clear == Outstanding::kInTransit;
+    const Asked* const last =
+        in_transit ? stations.outstanding().last_read(now, job.station) : nullptr;
+    const TimePoint told = last == nullptr ? TimePoint{} : last->sent + station->latest_reply();
+    return std::max({in_transit ? told : clear, station->rests_until(), held});
 }
 
-/// At once if the outstanding reply is to this very request, else after it (P1).
-TimePoint Schedule::repeat_from(const Group& group, const Stations& stations) const {
+TimePoint Schedule::repeat_from(TimePoint now, const Group& group, const Stations& stations) {
     const Station& station = *stations.find(group.station);
-    return std::max(station.replies().clear_at(stations.book(), group.request, true),
-                    stations.broadcasts_over(group.station, group.request));
+    return std::max(stations.outstanding().clear_at(now, group.station, group.request, true),
+                    station.rests_until());
 }
 
-/// On a connection that may delay outstanding requests, more is sent only while the station is seen
-/// to answer.
-bool Schedule::can_prove(const OutstandingRequests& book, const Station& station) const {
-    return station.may_prove(book) && (!may_stall_ || station.is_answering());
-}
-
-Schedule::Next Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
-                              const EchoMemory& echo) {
+std::optional<Group> Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
+                                    const EchoMemory& echo) {
     const Line line{now, stations, quiet, echo};
-    echo_known_ = echo.known();
+    echo_known_ = echo.state() != EchoState::unknown;
     if (now < quiet.free_at(stations.gap(quiet.station()))) return {};
-    const bool alone = backlog_.has_retries() &&
+    const bool alone = !backlog_.retries().empty() &&
                        (quarantine_ == Quarantine::line || now < quiet.quarantined_until());
     if (alone || !others_go_first(line)) {
-        if (auto group = next_retry(line)) return {std::move(group), false};
+        if (auto group = next_retry(line)) return group;
         if (alone) return {};
     }
-    const auto due = stations.next_probe();
+    const auto due = stations.next_probe(now);
     // Probes have the lowest class, but a busy line must not keep a station offline: its budget
     // limits them.
     if (due && now >= *due + timing::kProbeWaits) {
-        if (auto group = next_probe(line)) return {std::move(group), false};
+        if (auto group = next_probe(line)) return group;
     }
-    if (Next job = next_job(line); job.group || job.reopen) return job;
-    if (auto group = next_retry(line)) return {std::move(group), false};
-    if (due && now >= *due) return {next_probe(line), false};
+    if (auto group = next_job(line)) return group;
+    if (auto group = next_retry(line)) return group;
+    if (due && now >= *due) return next_probe(line);
     return {};
 }
 
@@ -238,53 +226,21 @@ bool Schedule::gap_is_over(const Line& line, std::uint8_t station) {
 }
 
 std::optional<Group> Schedule::next_retry(const Line& line) {
-    auto group = backlog_.take_retry([&](const Group& waiting) {
-        return repeat_from(waiting, line.stations) <= line.now &&
+    return backlog_.take_retry([&](const Group& waiting) {
+        return repeat_from(line.now, waiting, line.stations) <= line.now &&
                gap_is_over(line, waiting.station);
     });
-    if (group) let_others_go_first(line.now, line.stations);
-    return group;
 }
 
-/// Reserves turns for other stations before the next retry: for those that have ever answered, if
-/// any of these waits.
-void Schedule::let_others_go_first(TimePoint now, const Stations& stations) {
-    others_.clear();
-    wrote_.clear();
-    turns_ = 0;
-    others_since_ = now;
-    if (!backlog_.has_retries() || quarantine_ == Quarantine::line) return;
-    for (const bool all : {false, true}) {
-        if (!others_.empty()) break;
-        backlog_.queue().any_first([&](const Job& job) {
-            const bool may_answer = all || stations.condition(job.station) != Condition::unheard;
-            if (may_answer || job.station == kBroadcast) others_.insert(job.station);
-            return false;
-        });
-    }
-    turns_ = patience_ > timing::kDearRetry ? others_.size() : 1;
-}
-
-/// While a retry waits, each of the others has one turn; after a write another one for its reads
-/// (P9).
-bool Schedule::has_turn(const Job& job) const {
-    return others_.contains(job.station) || (job.request.is_read() && wrote_.contains(job.station));
-}
-
-void Schedule::take_turn(const Job& job) {
-    if (turns_ > 0) --turns_;
-    if (others_.erase(job.station) > 0 && !job.request.is_read()) {
-        wrote_.insert(job.station);
-    } else if (job.request.is_read()) {
-        wrote_.erase(job.station);
-    }
-}
-
+/// Behind a silence those who wait go first: the retry may cost them as much again (P4, P9).
 bool Schedule::others_go_first(const Line& line) const {
-    const TimePoint until = others_since_ + std::max(patience_, timing::kOthersFirst);
-    if (turns_ == 0 || !backlog_.has_retries() || line.now >= until) return false;
+    if (backlog_.retries().empty()) return false;
+    const Group& retry = backlog_.retries().front();
+    const Duration most = line.stations.response_timeout(retry.station);
+    if (!retry.silent || line.now >= retry.retry_since + most) return false;
     return backlog_.queue().any_first([&](const Job& job) {
-        return has_turn(job) && may_run(line, job) && line.stations.may_spend(line.now, job);
+        return job.arrived <= retry.retry_since && may_run(line, job) &&
+               line.stations.may_spend(line.now, job);
     });
 }
 
@@ -292,143 +248,110 @@ std::optional<Group> Schedule::next_probe(const Line& line) const {
     if (line.now < line.quiet.quarantined_until()) return std::nullopt;
     const auto station = line.stations.next_to_probe(line.now);
     if (!station || !gap_is_over(line, *station)) return std::nullopt;
-    Group group = internal_read(*station, line.stations.find(*station)->replies().reads().probe());
+    Group group = internal_read(
+        *station, line.stations.probe_for(line.now, *line.stations.find(*station)));
     group.probe = true;
     return group;
 }
 
-/// Not while a late reply could be taken for the answer (P1).
 bool Schedule::may_run(const Line& line, const Job& job) const {
-    return line.now >= line.quiet.quarantined_until() && line.now >= ready_at(line.stations, job) &&
-           !backlog_.has_retry(job.station);
+    return line.now >= line.quiet.quarantined_until() &&
+           line.now >= ready_at(line.now, line.stations, job) && !backlog_.has_retry(job.station);
 }
 
-/// P1: an outstanding reply of its station could be taken for the answer to this job. Stations
-/// serve in order: the answer to a read of another length proves that none can come. If the
-/// transport may delay frames and the station does not answer, the connection that the request was
-/// sent on proves nothing: a new one is needed.
-std::optional<Schedule::Next> Schedule::proof_before(const Line& line, const Job& job) const {
-    const Station* station = line.stations.find(job.station);
-    if (station == nullptr) return std::nullopt;
-    const OutstandingRequests& book = line.stations.book();
-    const ReplyHabits& replies = station->replies();
-    if (!book.is_ambiguous(job.station, job.request)) return std::nullopt;
-    const bool is_in_transit = in_transit(line.stations, *station);
-    if (!is_in_transit && line.now >= replies.clear_at(book, job.request)) return std::nullopt;
-    if (is_in_transit && !can_prove(book, *station) && book.any_since(job.station, book.opened()))
-        return Next{std::nullopt, true};
-    Group proof = internal_read(job.station, replies.proof(book));
-    proof.probe = true;
-    proof.distinct_length = proof.request != replies.reads().probe();
-    return Next{std::move(proof), false};
-}
-
-/// A read that no client asked for and that goes before this job: a proof (P1), or one that shows
-/// whether the line has an echo (P8).
-std::optional<Schedule::Next> Schedule::read_before(const Line& line, const Job& job) {
-    if (job.station == kBroadcast) return std::nullopt;
-    if (auto proof = proof_before(line, job)) return proof;
-    if (!line.echo.must_be_learned_before(job.request, job.ticket == learned_for_))
-        return std::nullopt;
+/// A read that no client asked for and that goes before this job: a proof (T2), or a read that shows
+/// whether the line has an echo (T6).
+std::optional<Group> Schedule::read_before(const Line& line, const Job& job) {
+    const Station* const station = line.stations.find(job.station);
+    if (job.station == kBroadcast || station == nullptr) return std::nullopt;
+    const Outstanding& outstanding = line.stations.outstanding();
+    const bool learns = job.ticket != learned_for_ && line.echo.must_be_learned_before(job.request);
+    modbus::Request probe = station->reads().probe();
+    TimePoint clear = outstanding.clear_at(line.now, job.station, job.request);
+    if (learns) clear = std::max(clear, outstanding.clear_at(line.now, job.station, probe));
+    if (clear > line.now) {
+        Group proof = internal_read(job.station, line.stations.probe_for(line.now, *station));
+        proof.probe = true;
+        return proof;
+    }
+    if (!learns) return std::nullopt;
     learned_for_ = job.ticket;
-    return Next{learning_for(job, line.stations.of(job.station)), false};
+    if (!teaches_echo(probe))
+        probe = modbus::Request::read({modbus::Table::holding_registers, 0, 1});
+    Group group = internal_read(job.station, std::move(probe));
+    group.learns_for = job.ticket;
+    return group;
 }
 
-/// P9: in the turn of a station's write its read goes first, and the write is next; now and then
-/// its poll goes before its read.
-JobQueue::Choice Schedule::own_turn(const Line& line, JobQueue::Choice next,
-                                    const JobQueue::Test& may_run) const {
-    const Station* const station = line.stations.find(next.job()->station);
-    if (station == nullptr) return next;
-    const auto prefer = [&](bool (*is)(const Job&)) {
-        const auto own = backlog_.queue().choose([&, is](const Job& job) {
-            return job.station == station->id() && is(job) && may_run(job);
-        });
-        if (own.job() != nullptr) next = own;
-    };
-    if (!next.job()->request.is_read() && station->has_read_turn())
-        prefer([](const Job& job) { return job.request.is_read(); });
-    if (next.job()->priority == PriorityClass::read && station->has_poll_turn())
-        prefer([](const Job& job) { return job.priority == PriorityClass::poll; });
-    return next;
-}
-
-Schedule::Next Schedule::next_job(const Line& line) {
+std::optional<Group> Schedule::next_job(const Line& line) {
     struct {
-        bool others;
+        TimePoint since;
         bool in_budget = true;
-    } wanted{others_go_first(line)};
-    const Station* const last = line.stations.find(line.quiet.station());
-    const bool is_dear = last != nullptr && last->usual() > timing::kDearRetry;
+    } wanted{others_go_first(line) ? backlog_.retries().front().retry_since : TimePoint::max()};
     const JobQueue::Test test = [&](const Job& job) {
-        const bool lets_others = is_dear && job.station == last->id();
-        return (!wanted.others || has_turn(job)) && may_run(line, job) &&
-               (!wanted.in_budget || (!lets_others && line.stations.may_spend(line.now, job)));
+        return job.arrived <= wanted.since && may_run(line, job) &&
+               (!wanted.in_budget || line.stations.may_spend(line.now, job));
     };
     const JobQueue& queue = backlog_.queue();
     JobQueue::Choice next = queue.choose(test);
-    // One that fails or needs long waits, for its share or a turn, only while others want the line.
+    // A suspect waits for its share only while others want the line.
     wanted.in_budget = next.job() != nullptr;
     if (next.job() == nullptr) next = queue.choose(test);
-    if (next.job() == nullptr) return {};
-    next = own_turn(line, next, test);
-    if (!gap_is_over(line, next.job()->station)) return {};
-    if (auto read = read_before(line, *next.job())) return std::move(*read);
+    if (next.job() == nullptr || !gap_is_over(line, next.job()->station)) return std::nullopt;
+    if (auto before = read_before(line, *next.job())) return before;
     Job job = backlog_.queue().take(next);
-    take_turn(job);
     if (job.station == kBroadcast) {
         Group group{.request = job.request};
         group.jobs.push_back(std::move(job));
-        return {std::move(group), false};
+        return group;
     }
-    const OutstandingRequests& book = line.stations.book();
     const Station& asked = line.stations.of(job.station);
-    return {sharing_.gather(std::move(job), asked, book, backlog_.queue()), false};
+    return sharing_.gather(line.now, std::move(job), asked, line.stations.outstanding(),
+                           backlog_.queue());
 }
 
-std::optional<TimePoint> Schedule::next_start(const Stations& stations, const Quiet& quiet) const {
-    const TimePoint free = quiet.free_at(stations.gap(quiet.station()));
+std::optional<TimePoint> Schedule::next_start(TimePoint now, const Stations& stations,
+                                              const Quiet& quiet) const {
+    const struct {
+        TimePoint now;
+        TimePoint free;
+        TimePoint quarantined;
+    } line{now, quiet.free_at(stations.gap(quiet.station())), quiet.quarantined_until()};
     std::optional<TimePoint> next;
     const auto earlier = [&](TimePoint t) {
-        next = next ? std::min(*next, std::max(free, t)) : std::max(free, t);
+        if (t == Outstanding::kInTransit) return;
+        t = std::max(line.free, t);
+        next = next ? std::min(*next, t) : t;
     };
-    for (const Group& group : backlog_.retries()) earlier(repeat_from(group, stations));
+    for (const Group& group : backlog_.retries()) earlier(repeat_from(now, group, stations));
     // Usually the first may start at once: then nothing can start sooner.
     const bool at_once = backlog_.queue().any_first([&](const Job& job) {
         if (backlog_.has_retry(job.station)) return false;
-        earlier(std::max(quiet.quarantined_until(), ready_at(stations, job)));
-        return *next <= free;
+        earlier(std::max(line.quarantined, ready_at(line.now, stations, job)));
+        return *next <= line.free;
     });
     if (at_once) return next;
-    if (const auto probe = stations.next_probe())
-        earlier(std::max(quiet.quarantined_until(), *probe));
+    if (const auto probe = stations.next_probe(now)) earlier(std::max(line.quarantined, *probe));
     return next;
 }
 
 std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& failed,
                                                     TimePoint sent, const Station& station) const {
     const StationSettings& own = station.settings();
-    const TimePoint rested = station.replies().rested();
-    if (quarantine_ == Quarantine::line && !failed.probe) {
+    const TimePoint rested = sent + station.latest_reply();
+    if (quarantine_ == Quarantine::line && !failed.probe)
         return own.adaptive_timeout ? std::min(rested, now + station.response_timeout()) : rested;
-    }
     // A rest longer than another timeout is not worth it: a collision costs that much.
-    const Duration worst = station.replies().worst_lateness();
+    const Duration worst = station.lateness();
     const bool is_late =
-        failed.first_silence && worst > Duration::zero() && worst <= own.response_timeout;
+        failed.was_online && worst > Duration::zero() && worst <= own.response_timeout;
     if (quarantine_ != Quarantine::automatic || !is_late) return std::nullopt;
     return std::min(rested, sent + own.response_timeout + worst * 5 / 4);
 }
 
-void Schedule::retry(TimePoint now, Group group, Duration patience, const Stations& stations) {
-    const bool begins = !backlog_.has_retries() || group.attempts > group.doubts + 1;
-    const bool at_once = !group.confirms.empty();
-    if (!backlog_.has_retries()) patience_ = {};
-    // A retried write has had its turn among the writes.
-    if (group.request.is_read()) patience_ += patience;
+void Schedule::retry(TimePoint now, Group group) {
+    group.retry_since = now;
     backlog_.retry(std::move(group));
-    if (begins) let_others_go_first(now, stations);
-    if (at_once) turns_ = 0;
 }
 
 Jobs Schedule::give_back(Group& group) {

@@ -29,7 +29,7 @@ void StationHealth::on_damaged() {
     known_ = last_heard_.has_value();
 }
 
-bool StationHealth::on_silence(TimePoint now, bool at_once) {
+bool StationHealth::on_silence(TimePoint now) {
     ++silent_;
     known_ = true;
     if (offline()) {
@@ -37,7 +37,7 @@ bool StationHealth::on_silence(TimePoint now, bool at_once) {
         next_probe_ = now + pause_;
         return false;
     }
-    if (silent_ < settings_.after && !at_once) {
+    if (silent_ < settings_.after) {
         state_ = Health::suspect;
         return false;
     }

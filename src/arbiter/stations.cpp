@@ -1,9 +1,8 @@
 #include "panelgate/arbiter/stations.hpp"
-#include "panelgate/arbiter/book/timing.hpp"
 
 #include <algorithm>
 
-#include "panelgate/modbus/request.hpp"
+#include "panelgate/arbiter/timing.hpp"
 
 namespace panelgate::arbiter {
 
@@ -11,17 +10,15 @@ namespace {
 constexpr std::size_t kUsualReply = 45;  // bytes: 20 registers
 }
 
-Stations::Stations(const Settings& settings) { apply(settings); }
-
 void Stations::apply(const Settings& settings) {
-    offline_ = settings.offline;
+    offline_settings_ = settings.offline;
     unlisted_ = settings.unlisted;
     standard_gap_ = silent_interval(settings.serial);
     frame_ = frame_time(settings.serial, kUsualReply);
     configured_.clear();
     for (const StationSettings& station : settings.stations) configured_[station.id] = station;
     for (auto& [id, station] : stations_)
-        station.apply(own_settings(id), offline_, configured_.contains(id));
+        station.apply(own_settings(id), offline_settings_, configured_.contains(id));
 }
 
 const StationSettings& Stations::settings(std::uint8_t id) const {
@@ -39,10 +36,16 @@ Station& Stations::of(std::uint8_t id) {
     const auto found = stations_.find(id);
     if (found != stations_.end()) return found->second;
     const bool listed = configured_.contains(id);
-    return stations_.try_emplace(id, own_settings(id), offline_, listed, frame_).first->second;
+    return stations_.try_emplace(id, own_settings(id), offline_settings_, listed, frame_)
+        .first->second;
 }
 
 const Station* Stations::find(std::uint8_t id) const {
+    const auto found = stations_.find(id);
+    return found == stations_.end() ? nullptr : &found->second;
+}
+
+Station* Stations::find(std::uint8_t id) {
     const auto found = stations_.find(id);
     return found == stations_.end() ? nullptr : &found->second;
 }
@@ -51,144 +54,96 @@ Duration Stations::gap(std::uint8_t id) const {
     return settings(id).frame_gap.value_or(standard_gap_);
 }
 
-Duration Stations::patience(TimePoint now, const Group& group) {
-    const Station& station = of(group.station);
-    const bool over = station.over_budget(now, group.request) && others_active(now, station);
-    // Not a write: it may need longer, and its outcome is worth waiting for.
-    const bool urgent = (now < urgent_until_ && group.request.is_read()) || over;
-    Duration wait = station.patience(group, slowest(), urgent, flaky_beside_others(now, station));
-    const Duration whole = settings(group.station).response_timeout;
-    for (const Job& job : group.jobs) wait = std::max(wait, std::min(job.patience, whole));
-    return wait;
-}
-
-TimePoint Stations::others_active_until(const Station& station) const {
-    TimePoint until{};
-    const TimePoint failed =
-        station.health().last_heard() > station.failed() ? TimePoint{} : station.failed();
-    for (const auto& [id, other] : stations_) {
-        const auto answered = other.health().last_heard();
-        if (&other != &station && answered && *answered > failed)
-            until = std::max(until, *answered + timing::kOthersActive);
+std::optional<Duration> Stations::slowest() const {
+    std::optional<Duration> slowest;
+    for (const auto& [id, station] : stations_) {
+        if (station.health().last_heard())
+            slowest = std::max(slowest.value_or(Duration{}), station.think_times().quantile(1));
     }
-    return until;
+    return slowest;
 }
 
-TimePoint Stations::throttled_until(std::uint8_t id) const {
-    const Station* station = find(id);
-    if (station == nullptr || !station->failing()) return {};
-    return std::min(station->affordable_at(), others_active_until(*station));
+Duration Stations::latest_reply(std::uint8_t id) const {
+    const Station* const found = find(id);
+    if (found != nullptr) return found->latest_reply();
+    const StationSettings& own = settings(id);
+    return own.response_timeout + own.late_window.value_or(own.response_timeout);
 }
 
-bool Stations::is_speculative(std::uint8_t id) const {
-    const Station* station = find(id);
-    return id != kBroadcast &&
-           (station == nullptr ? !configured_.contains(id) : station->speculative());
+Duration Stations::response_timeout(std::uint8_t id) const {
+    const Station* const found = find(id);
+    return found == nullptr ? settings(id).response_timeout : found->response_timeout();
 }
 
-bool Stations::may_spend(TimePoint now, const Job& job) const {
-    if (is_speculative(job.station)) return unheard_.allows(now, timeout_cost());
-    const Station* station = find(job.station);
-    if (station == nullptr) return true;
-    // An ignored write says nothing about reads while these are answered.
-    const bool is_read = job.request.is_read();
-    const bool is_missed = station->missed_last() && !(is_read && station->answers_reads());
-    return (!is_missed || newly_silent_.allows(now)) &&
-           station->may_spend(now, is_read ? nullptr : &job.request);
+StationHealth Stations::health(std::uint8_t id) const {
+    const Station* const found = find(id);
+    return found == nullptr ? StationHealth(offline_settings_) : found->health();
 }
 
-/// A client's request may be the probe once an interval, within the budget.
+Condition Stations::condition(std::uint8_t id) const {
+    const Station* const found = find(id);
+    return found == nullptr ? Condition::unheard : found->condition();
+}
+
 bool Stations::refuses(TimePoint now, const Job& job) {
     if (job.station == kBroadcast) return false;
     forget_unheard(now);
     Station& station = of(job.station);
-    if (station.speculative()) station.on_wanted(now);
-    if (!station.health().offline()) return false;
-    if (station.speculative() && job.search) return false;
+    station.on_wanted(now, job.request);
+    if (!station.health().offline() || (station.speculative() && job.search)) return false;
     const bool may_wake = station.speculative() || !job.request.is_read();
-    const ProbeBudget& budget = station.speculative() ? asked_unheard_ : probes();
-    if (may_wake && budget.allows(now) && station.take_half_open(now, job.request.is_read()))
-        return false;
-    station.replies().on_wanted(job.request);
-    return true;
+    return !may_wake || !probes(now).allows(now) || !station.take_half_open(now);
 }
 
-TimePoint Stations::clear_at(TimePoint now, bool may_stall) const {
-    TimePoint clear{};
-    for (const auto& [id, station] : stations_) {
-        if (!book_.any(id)) continue;
-        clear = std::max(clear, station.replies().rested());
-        if (may_stall) clear = std::max(clear, now + station.replies().latest_reply());
+bool Stations::may_spend(TimePoint now, const Job& job) const {
+    const Station* const station = find(job.station);
+    if (station == nullptr || !station->is_doubtful(job.request.is_read())) return true;
+    return suspects_.allows(now, credit());
+}
+
+TimePoint Stations::held_until(const Job& job) const {
+    const Station* const station = find(job.station);
+    if (station == nullptr) return {};
+    if (!station->is_suspect(job.request.is_read()) && !station->speculative()) return {};
+    return std::min(suspects_.next() - credit(), others_active_until(job.station));
+}
+
+TimePoint Stations::others_active_until(std::uint8_t id) const {
+    const Station* const station = find(id);
+    const TimePoint failed = station == nullptr ? TimePoint{} : station->failed();
+    TimePoint until{};
+    for (const auto& [other_id, other] : stations_) {
+        const auto heard = other.health().last_heard();
+        if (other_id != id && heard && *heard > failed)
+            until = std::max(until, *heard + timing::kOthersActive);
     }
-    return clear;
+    return until;
 }
 
-Duration Stations::latest_reply(std::uint8_t id) const {
-    const Station* found = find(id);
-    return found == nullptr ? 2 * settings(id).response_timeout : found->replies().latest_reply();
-}
-
-StationHealth Stations::health(std::uint8_t id) const {
-    const Station* found = find(id);
-    return found == nullptr ? StationHealth(offline_) : found->health();
-}
-
-Condition Stations::condition(std::uint8_t id) const {
-    const Station* found = find(id);
-    return found == nullptr ? Condition::unheard : found->condition();
-}
-
-Duration Stations::response_timeout(std::uint8_t id) const {
-    const Station* found = find(id);
-    return found == nullptr ? settings(id).response_timeout : found->response_timeout();
-}
-
-void Stations::on_failed(TimePoint now, const Group& group, Verdict verdict, Duration cost,
-                         bool disturbed) {
-    Station& station = of(group.station);
-    station.on_failed(now, verdict, cost, group.request.is_read() ? nullptr : &group.request);
-    if (station.speculative()) {
-        unheard_.spend(now, cost, 2 * timeout_cost());
-        if (station.health().offline()) asked_unheard_.spend(now, cost, timing::kOthersActive);
-    } else if (station.health().offline()) {
-        probes_.spend(now, cost);
+void Stations::on_failed(TimePoint now, std::uint8_t id, Duration cost) {
+    constexpr int kMemory = 3;  // whole timeouts, or failures of this cost
+    if (of(id).health().offline()) {
+        offline_.spend(now, cost);
         alone_.spend(now, cost);
-    } else if (station.missed_last()) {
-        newly_silent_.spend(now, cost);
-    } else if (verdict == Verdict::silent && !disturbed) {
-        // Several stations may have failed together: for five times what this one took, the others
-        // are not waited for longer than they have ever needed. Who was disturbed had not.
-        const Duration urgent = static_cast<int>(1 / ProbeBudget::kFailing) * cost;
-        urgent_until_ = std::max(urgent_until_, now + std::min<Duration>(urgent, timing::kUrgent));
+        return;
     }
+    const Duration most = kMemory * suspects_.time_for(std::max(unlisted_.response_timeout, cost));
+    suspects_.spend(now, cost, most);
 }
 
-/// Probes of offline stations must be within their budget.
-std::optional<TimePoint> Stations::probe_at(const Station& station) const {
-    if (station.wants_check()) return station.probe_due(book_);
-    if (!station.health().offline() || station.speculative()) return std::nullopt;
-    return std::max(station.probe_due(book_), probes().next());
+void Stations::on_broadcast(const Asked& broadcast) {
+    outstanding_.add_broadcast(broadcast);
+    for (auto& [id, station] : stations_) station.on_broadcast(broadcast.sent);
 }
 
-std::optional<std::uint8_t> Stations::next_to_probe(TimePoint now) const {
-    std::optional<std::uint8_t> best;
-    TimePoint earliest = TimePoint::max();
-    for (const auto& [id, station] : stations_) {
-        const auto at = probe_at(station);
-        if (!at || *at > now || station.probe_due(book_) >= earliest) continue;
-        earliest = station.probe_due(book_);
-        best = id;
-    }
-    return best;
+void Stations::on_line_down() {
+    outstanding_.forget_other_masters();
+    for (auto& [id, station] : stations_) station.on_line_down();
 }
 
-std::optional<TimePoint> Stations::next_probe() const {
-    std::optional<TimePoint> next;
-    for (const auto& [id, station] : stations_) {
-        const auto at = probe_at(station);
-        if (at && (!next || *at < *next)) next = at;
-    }
-    return next;
+/// While no station is online, and that has only just begun, nobody is hurt by more probes.
+const ProbeBudget& Stations::probes(TimePoint now) const {
+    return now < heard_ + timing::kYoungOutage && !any_online() ? alone_ : offline_;
 }
 
 bool Stations::any_online() const {
@@ -198,10 +153,67 @@ bool Stations::any_online() const {
     });
 }
 
+std::optional<TimePoint> Stations::probe_at(TimePoint now, const Station& station) const {
+    const bool offline = station.health().offline() && !station.speculative();
+    if (!offline && !station.wants_check()) return std::nullopt;
+    const modbus::Request probe = probe_for(now, station);
+    const TimePoint clear = outstanding_.is_proof(now, station.id(), probe, true)
+                                ? TimePoint{}
+                                : outstanding_.clear_at(now, station.id(), probe, true);
+    const TimePoint asked = std::max(clear, station.rests_until());
+    if (!offline) return asked;
+    return std::max({asked, station.health().next_probe(), probes(now).next()});
+}
+
+modbus::Request Stations::probe_for(TimePoint now, const Station& station) const {
+    if (auto proof = proof_for(now, station)) return std::move(*proof);
+    modbus::Request probe = station.reads().probe();
+    const Asked* const read = outstanding_.last_read(now, station.id());
+    if (read == nullptr || outstanding_.is_proof(now, station.id(), probe, true)) return probe;
+    return modbus::Request::read(*modbus::read_span(read->pdu));
+}
+
+std::optional<modbus::Request> Stations::proof_for(TimePoint now, const Station& station) const {
+    if (!station.reads().longest()) return std::nullopt;
+    const modbus::Request shortest = station.reads().probe();
+    if (outstanding_.is_proof(now, station.id(), shortest)) return shortest;
+    modbus::Span span = *station.reads().longest()->span();
+    for (; span.count > 0; --span.count) {
+        modbus::Request part = modbus::Request::read(span);
+        if (outstanding_.is_proof(now, station.id(), part)) return part;
+    }
+    auto longer = station.reads().longer();
+    if (longer && !outstanding_.is_proof(now, station.id(), *longer)) longer.reset();
+    return longer;
+}
+
+std::optional<std::uint8_t> Stations::next_to_probe(TimePoint now) const {
+    std::optional<std::uint8_t> best;
+    TimePoint earliest = TimePoint::max();
+    for (const auto& [id, station] : stations_) {
+        const auto at = probe_at(now, station);
+        if (!at || *at > now || station.health().next_probe() >= earliest) continue;
+        earliest = station.health().next_probe();
+        best = id;
+    }
+    return best;
+}
+
+std::optional<TimePoint> Stations::next_probe(TimePoint now) const {
+    std::optional<TimePoint> next;
+    for (const auto& [id, station] : stations_) {
+        const auto at = probe_at(now, station);
+        if (at && (!next || *at < *next)) next = at;
+    }
+    return next;
+}
+
 void Stations::forget_unheard(TimePoint now) {
     std::erase_if(stations_, [&](const auto& entry) {
-        const bool forgotten = entry.second.forgettable(book_, now);
-        if (forgotten) book_.forget(entry.first);
+        const auto& [id, station] = entry;
+        const bool forgotten = station.speculative() && !outstanding_.any(now, id) &&
+                               now >= station.asked() + timing::kForgetUnheard;
+        if (forgotten) outstanding_.forget(id);
         return forgotten;
     });
 }

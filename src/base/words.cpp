@@ -12,8 +12,6 @@ std::string_view label(EchoState state) {
             return "absent";
         case EchoState::present:
             return "present";
-        case EchoState::unclear:
-            return "unclear";
     }
     std::abort();
 }

@@ -27,11 +27,9 @@ namespace panelgate::scenario {
 /// What has nothing on the wire to be told by no arbiter can mend. It is known by what the world
 /// knows, and nothing else passes:
 ///   - A good CRC by chance: nobody has said these bytes (Truth::is_chance()).
-///   - The first copy of all of a reply, which comes when the very same has just been asked again,
-///     or other values are written to the same place: byte for byte the answer of a panel whose
-///     values have not changed, or that has done it, in its time. The answer that it displaces
-///     comes one late (on_copy()). From the next copy on the panel is known: to another
-///     question it would be asked for once more, and a confirmation be read back.
+///   - A copy of a reply that has the form of the awaited one, before a copy came while its panel
+///     was not asked: from then on the panel is known (T12). The answer that the copy displaces
+///     comes one late (on_copy()).
 ///   - A reply with more values than were asked for, right count and good CRC: byte for byte the
 ///     late one to an earlier request of that length, or the answer to the present one
 ///     (is_padded(), looks_late()).

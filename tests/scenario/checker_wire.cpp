@@ -99,9 +99,9 @@ void Checker::on_copy(TimePoint now, ByteView adu) {
     doublers_.insert(station);
     const auto said = said_.find(station);
     if (said == said_.end() || !std::ranges::equal(said->second, adu)) return;
-    if (!known_doublers_.insert(station).second || !awaited) return;
+    if (!awaited) known_doublers_.insert(station);
+    if (!awaited || known_doublers_.contains(station)) return;
     ++first_copies_;
-    if (!attempt_.same) return;
     ++excused_;
     excused_from_[station] = now;
 }

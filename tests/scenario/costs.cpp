@@ -28,14 +28,9 @@ Duration Costs::surprise() const {
            2 * silent_interval(settings_.serial) + 25ms;
 }
 
+/// Each silence is waited for as long as the user has said (T1).
 Duration Costs::limit(const Attempt& attempt) const {
-    const Duration timeout = settings_.unlisted.response_timeout;
-    const auto slowest = watch_.slowest(attempt.station);
-    const bool first = !attempt.was_silent && watch_.is_known(attempt.station);
-    // Of one that is listed and has never answered, nobody knows how long it needs.
-    const bool unknown = watch_.is_known(attempt.station) && !watch_.has_answered(attempt.station);
-    if (first || unknown || !slowest) return timeout + frames(attempt);
-    return std::min(timeout, 3 * (*slowest + 10ms)) + frames(attempt);
+    return settings_.unlisted.response_timeout + frames(attempt);
 }
 
 std::string Costs::on_unanswered(TimePoint now, const Attempt& attempt, bool wanted) {

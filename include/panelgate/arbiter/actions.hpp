@@ -21,7 +21,6 @@ struct Reason {
     enum class Kind : std::uint8_t {
         none,         ///< explain is off, or the frame is not ours
         learns_echo,  ///< a read that detects the line's echo before a write
-        confirms,     ///< a read that shows whether the answer to a write is its own
         probe,
         again,  ///< a retry
         turn,   ///< next in turn
@@ -74,7 +73,6 @@ struct Decision {
         offline,     ///< refused; the next probe is due in `time`
         full,        ///< refused: so many wait
         shed,        ///< given up for a newcomer
-        doubted,     ///< asked once more: its answer may be a duplicate
         expired,     ///< given up after `time`: it could not end before its deadline
         unanswered,  ///< given up after `time`: it was sent, and not answered before its deadline
         // Of a station.

@@ -7,11 +7,10 @@
 #include <utility>
 
 #include "panelgate/arbiter/actions.hpp"
-#include "panelgate/arbiter/attempt/attempt.hpp"
-#include "panelgate/arbiter/book/judge.hpp"
+#include "panelgate/arbiter/attempt.hpp"
 #include "panelgate/arbiter/counters.hpp"
-#include "panelgate/arbiter/habits/echo.hpp"
-#include "panelgate/arbiter/habits/reply_times.hpp"
+#include "panelgate/arbiter/echo.hpp"
+#include "panelgate/arbiter/judge.hpp"
 #include "panelgate/arbiter/outbox.hpp"
 #include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/arbiter/queue/job_queue.hpp"
@@ -21,7 +20,6 @@
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/arbiter/stations.hpp"
-#include "panelgate/arbiter/unsolicited.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/modbus/ascii.hpp"
@@ -127,46 +125,41 @@ class Arbiter {
     void check_invariants() const;
 
   private:
+    // Requests (arbiter.cpp)
     std::optional<ReadCache::Hit> from_memory(TimePoint now, const Job& job) const;
     void forget_line();
     void step(TimePoint now);
     bool start_next(TimePoint now);
     void start(TimePoint now, Group group);
-
     void check_active(TimePoint now);
-    void conclude(TimePoint now, Verdict verdict);
-    void end_broadcast(TimePoint now);
-    Facts facts_of_reply(TimePoint now, const Station& station, bool early) const;
-    Facts facts_of_others(TimePoint now, const Claims& claims) const;
-    Facts facts_of_equals(TimePoint now, const Station& station, bool early) const;
-    bool takes_reply(TimePoint now, Station& station, bool early);
-    Duration holds_answer(TimePoint now, const ReplyHabits& habits) const;
-    void learn_pace(bool early);
-    void settle(TimePoint now);
-    void doubt_as_early(TimePoint now);
-    void ask_again(TimePoint now);
-    void confirm(TimePoint now, const Group& group, ByteView reply, bool shows_echo);
-    bool is_confirmed(TimePoint now, const Group& group, ByteView reply, bool shows_echo);
-    bool has_values(const Group& group, ByteView reply);
-    static Group confirming(Group& write, const Station& station);
-    void learn_from_failure(TimePoint now, const Attempt& attempt, Verdict verdict);
-    void fail(TimePoint now, Verdict verdict);
-    void give_back(Group& group);
-    void finish_barred(Group& group);
-    void give_up(TimePoint now, const Group& group, Fault fault);
-    void explain_condition(TimePoint now, std::uint8_t station, Condition before);
-    Attempt take_active(TimePoint now);
     void expire(TimePoint now);
     void expire_active(TimePoint now);
-    Attempt::Ends ends_attempt(TimePoint now) const;
     void hear(TimePoint now, ByteView bytes);
     void hear_piece(TimePoint now, const modbus::AsciiTranscript::Piece& piece);
     void hear_idle(TimePoint now, ByteView bytes);
-    TimePoint idle_ends() const;
+    TimePoint idle_ends() const { return quiet_.since() + settings_.end_of_frame; }
     void judge_idle(TimePoint now);
-    void note(TimePoint now, const std::vector<modbus::Unused>& parts);
-    void note_idle(TimePoint now, std::vector<modbus::Unused> heard);
-    void hear_again(TimePoint now, std::uint8_t station, ByteView pdu);
+
+    // Frames (frames.cpp): what is true of one, and what is done with it
+    void conclude(TimePoint now);
+    Facts facts_of(TimePoint now, const modbus::Unused& part, bool answers) const;
+    Facts facts_of_answer(TimePoint now, ByteView pdu) const;
+    void judge_part(TimePoint now, const modbus::Unused& part, bool answers);
+    Duration carry_out(TimePoint now, const modbus::Unused& part, Done done);
+    Duration take_late(TimePoint now, const modbus::Unused& part);
+    void let_reply_pass(TimePoint now, ByteView request);
+
+    // Ends of attempts (verdict.cpp)
+    Asked asked_of(const Attempt& attempt, bool in_transit = false) const;
+    void settle(TimePoint now, const Bytes& reply);
+    void fail(TimePoint now, Verdict verdict);
+    void end_broadcast(TimePoint now);
+    void reopen_if_mute(TimePoint now, const Attempt& attempt, Verdict verdict);
+    void give_back(Group& group);
+    void give_up(TimePoint now, const Group& group, Fault fault);
+    void finish_barred(Group& group);
+    void explain_condition(TimePoint now, std::uint8_t station, Condition before);
+    Attempt take_active(TimePoint now);
 
     Settings settings_;
     modbus::CrcOrders orders_;
@@ -174,19 +167,27 @@ class Arbiter {
     Stations stations_;
     Schedule schedule_;
     Quiet quiet_;
-    UnsolicitedFrames unsolicited_;
-    Pace pace_;
-    WakeLatency wake_latency_;
     ReadCache memory_;
-    Ticket last_ticket_ = 0;
     EchoMemory echo_memory_;
     Outbox outbox_;
     std::optional<Attempt> active_;
-    TimePoint rest_{};  ///< of the wire; kept when the line is reopened
+    Bytes idle_;                ///< heard without a request, until a silence ends it (MST-04)
+    Bytes last_frame_;          ///< sent last: its echo may come when nobody waits for it
+    std::uint8_t replied_ = 0;  ///< the station that answered the last frame; 0: none, or not yet
+    Ticket last_ticket_ = 0;
+    Transaction transactions_ = 0;
+    TimePoint now_{};   ///< of the last call
+    TimePoint rest_{};  ///< of the wire; kept when the line is opened anew
     bool up_ = false;
     bool suspended_ = false;  ///< the line is being replaced, or about to be
-    bool resetting_ = false;  ///< the line is to be reopened: nothing is sent
-    Transaction transactions_ = 0;
+    bool resetting_ = false;  ///< the line is to be opened anew: nothing is sent
+    /// T8: how long the connection has been mute.
+    struct {
+        int attempts = 0;        ///< silent ones in a row, without a byte from any station
+        bool ever_heard = false;  ///< over this connection
+        Duration pause{};         ///< between two openings for silence alone; doubles
+        TimePoint next{};         ///< the next opening, at the earliest
+    } mute_;
     Duration latency_{};
     Duration lead_{};
     bool confirm_ends_ = false;

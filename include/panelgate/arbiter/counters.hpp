@@ -36,14 +36,11 @@ struct Symptoms {
     std::uint64_t unasked = 0;  ///< unsolicited good frames
     std::uint64_t broadcast_replies = 0;  ///< good frames that answer a broadcast, which is wrong
     std::uint64_t echoes = 0;             ///< requests that came back as sent
-    std::uint64_t echoed_again = 0;       ///< ... once more, behind their echo or their reply
     std::uint64_t requests = 0;           ///< good requests of another master
     std::uint64_t crc_swapped = 0;        ///< replies with swapped CRC bytes, otherwise right
     std::uint64_t lower_case = 0;         ///< damaged frames of ASCII in lower-case digits
     std::uint64_t trailed = 0;            ///< replies followed by bytes or a duplicate
     std::uint64_t beheaded = 0;           ///< of all damaged: right but for lost first bytes
-    std::uint64_t torn = 0;          ///< of strays: pieces of a good frame that our request has cut
-    std::uint64_t old_replies = 0;   ///< a reply once more that is not the last one
     std::uint64_t misaddressed = 0;  ///< of silent and disturbed: answered by another address
     std::uint64_t repeated = 0;      ///< answered reads that went unanswered a while ago
     std::uint64_t silences = 0;      ///< runs of unanswered attempts that an answer ended

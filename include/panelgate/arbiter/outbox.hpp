@@ -9,10 +9,9 @@
 #include <vector>
 
 #include "panelgate/arbiter/actions.hpp"
-#include "panelgate/arbiter/attempt/attempt.hpp"
-#include "panelgate/arbiter/book/judge.hpp"
+#include "panelgate/arbiter/attempt.hpp"
 #include "panelgate/arbiter/counters.hpp"
-#include "panelgate/arbiter/heard_before.hpp"
+#include "panelgate/arbiter/judge.hpp"
 #include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station.hpp"
@@ -57,23 +56,17 @@ class Outbox {
     /// The whole line rested for `rest`: that time could not be used either.
     void on_rested(Duration rest) { line_.busy += rest; }
     void on_client_gone(Client client) { shares_.forget(client); }
-    void on_answered(TimePoint now, const Attempt& attempt, Duration think,
+    /// `reply`: without address and CRC.
+    void on_answered(TimePoint now, const Attempt& attempt, ByteView reply,
                      const Station::Replied& replied);
     void on_failed(const Attempt& attempt, Verdict verdict);
-    /// Its answer is asked for again, or a read is to show whether it was true.
-    void on_doubted(TimePoint now, const Attempt& attempt);
     /// Emits an event at most every 10 seconds: each would be a log line.
     void on_echo_mismatch(TimePoint now, std::uint8_t station);
-    void on_echoed_again(std::uint8_t station) { ++symptoms_of(station).echoed_again; }
 
     /// Traces and counts a frame, or damaged bytes, that answers no open request; `asked`: the
-    /// station asked last. Damage inside an attempt is counted there.
+    /// station asked last. `inside`: an attempt is open; damage is then counted when it ends.
     void on_unsolicited(TimePoint now, const modbus::Unused& part, Done done, std::uint8_t asked,
-                        Duration lateness = {});
-    void inside_attempt(bool inside) {
-        inside_attempt_ = inside;
-        refused_late_ = false;
-    }
+                        bool inside, Duration lateness = {});
 
     const LineCounters& line() const { return line_; }
     const std::map<std::uint8_t, StationCounters>& stations() const { return stations_; }
@@ -82,20 +75,12 @@ class Outbox {
   private:
     StationCounters& of(std::uint8_t station);
     Symptoms& symptoms_of(std::uint8_t station) { return of(station).symptoms; }
-    void note_reply(TimePoint now, std::uint8_t station, const Bytes& pdu);
     void count_damaged(const Attempt& attempt);
-    void count_beside(const Attempt& attempt);
-    void join(ByteView bytes, std::uint8_t asked);
-    std::vector<modbus::Unused> frames_in(ByteView bytes, std::uint8_t asked) const;
-    bool is_answered_by_other(const Attempt& attempt,
-                              const std::vector<modbus::Unused>& frames) const;
     void remember_unanswered(const Attempt& attempt, std::uint64_t mute_before);
     void credit_unanswered(const Group& group);
 
     bool explain_ = false;
     modbus::CrcOrders orders_;
-    bool inside_attempt_ = false;
-    bool refused_late_ = false;  ///< ... the refusal of an earlier request has come
     std::optional<TimePoint> reported_collision_;
     PoolDeque<Action> actions_;
     LineCounters line_;
@@ -107,11 +92,7 @@ class Outbox {
         std::size_t count = 0;
     };
     std::map<std::uint8_t, Unanswered> unanswered_;  ///< at most one per station
-    HeardBefore before_;
-    Bytes other_frame_;         ///< PDU that came from another station inside this attempt
-    Bytes cut_;                 ///< the last damaged bytes outside an attempt: may go on
-    std::uint8_t cut_for_ = 0;  ///< where they were counted
-    bool completed_ = false;    ///< ... did so inside this attempt
+    Bytes other_frame_;  ///< PDU that came from another station inside this attempt
     std::map<std::uint8_t, StationCounters> stations_;
 };
 

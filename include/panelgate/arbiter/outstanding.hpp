@@ -23,7 +23,7 @@ struct Asked {
     By by = By::us;
     TimePoint sent{};    ///< last bit out; of another master's request: last byte in
     TimePoint until{};   ///< no reply comes later than this, as far as the late window tells
-    unsigned epoch = 0;  ///< number of the connection that carried the request (T8)
+    unsigned epoch = 0;  ///< number of the connection that carried the request (T8); set by add()
     Bytes pdu{};
 };
 
@@ -63,9 +63,15 @@ class Outstanding {
     /// `again`: a retry, for which the reply to its own earlier attempt counts as well.
     TimePoint clear_at(TimePoint now, std::uint8_t station, const modbus::Request& request,
                        bool again = false) const;
+    /// The same of requests that left over an earlier connection and are delivered: no reply over
+    /// this connection proves anything about them.
+    TimePoint earlier_clear_at(TimePoint now, std::uint8_t station,
+                               const modbus::Request& request) const;
     /// True if the normal reply to this read differs from each outstanding reply in function or
-    /// length: that reply proves that the station has served all earlier requests.
-    bool is_proof(TimePoint now, std::uint8_t station, const modbus::Request& read) const;
+    /// length: that reply proves that the station has served all earlier requests. `again`: the very
+    /// same read does not count, though its reply proves only that the station is there.
+    bool is_proof(TimePoint now, std::uint8_t station, const modbus::Request& read,
+                  bool again = false) const;
     /// The last outstanding read of the station, or null.
     const Asked* last_read(TimePoint now, std::uint8_t station) const;
     /// Time from which no reply of any station is outstanding. Requests in transit count as sent
@@ -76,6 +82,8 @@ class Outstanding {
 
     // What happens
 
+    /// The line was opened: what leaves from now on leaves over a new connection.
+    void on_opened() { ++epoch_; }
     /// A request has ended without its reply, or another master's request was heard.
     void add(std::uint8_t station, Asked asked);
     /// A broadcast has left: each station that was asked before may answer it, which is wrong.
@@ -106,8 +114,10 @@ class Outstanding {
     const Page* find(std::uint8_t station) const;
     Page& page(std::uint8_t station);
     static void close(Page& page, unsigned epoch, TimePoint sent);
+    static bool may_be_taken(const Asked& asked, const modbus::Request& request, bool again);
 
     PoolVector<Page> pages_;  ///< by station
+    unsigned epoch_ = 0;
 };
 
 /// The reads that a station is known to answer. Pure.
@@ -118,12 +128,17 @@ class KnownReads {
     void on_wanted(const modbus::Request& request) {
         if (request.span()) wanted_ = request;
     }
+    /// A read that is longer by one item than any known was not answered: the panel has its own
+    /// bounds (T14).
+    void on_unanswered(const modbus::Request& read);
     bool any() const { return shortest_.has_value(); }
     /// The shortest read that the station has answered, else the one that was wanted last, else one
     /// holding register at 0.
     modbus::Request probe() const;
     /// The longest read that the station has answered; empty: none.
     const std::optional<modbus::Request>& longest() const { return longest_; }
+    /// The longest read, with one item more; empty: none is known, or the panel does not answer more.
+    std::optional<modbus::Request> longer() const;
     /// Items of the longest read of this table that the station has answered.
     std::uint32_t longest(modbus::Table table) const {
         return items_[static_cast<std::size_t>(table)];
@@ -134,6 +149,7 @@ class KnownReads {
     std::optional<modbus::Request> longest_;
     std::optional<modbus::Request> wanted_;
     std::array<std::uint32_t, modbus::kTables.size()> items_{};
+    bool answers_longer_ = true;
 };
 
 }  // namespace panelgate::arbiter

@@ -38,7 +38,7 @@ class Quiet {
         since_ = std::max(since_, now);
         noise_ = {};
     }
-    /// On a line that does not keep its rate, the reply came before our frame can have left.
+    /// The reply came before our frame can have left (T7): the gap follows the reply.
     void on_answered_early(TimePoint now) { since_ = now; }
     /// Unsolicited bytes were heard.
     void on_noise(TimePoint now) {
@@ -94,70 +94,6 @@ class Quiet {
     TimePoint rested_until_{};  ///< accounted for by take_rested()
     std::uint8_t station_ = 0;
     std::uint8_t quarantined_ = 0;
-};
-
-/// Whether a line that is no real UART behaves like one: replies never begin before the request has
-/// left, and bytes come no faster than the line's rate. One early reply disproves it until the line
-/// is reopened, as does one that comes again whenever it is asked for again; after several in a row
-/// the line does not keep its rate at all. Bytes that come too fast may have been delayed by a busy
-/// sender: that must happen repeatedly, and is forgotten. Pure.
-class Pace {
-  public:
-    void on_reply(bool early) {
-        doubted_ = 0;
-        in_time_ = early ? 0 : std::min(in_time_ + 1, kAgain);
-        if (early) {
-            kept_ = false;
-            ++early_;
-        } else {
-            ++timely_;
-            early_ = 0;
-        }
-    }
-    /// An early reply was all that came.
-    void on_doubted() { ++doubted_; }
-    /// Asked again, the same came as the early one, or in time another one, where the early one was
-    /// all that came and is no other request's as far as is known: `was_reply`, since values
-    /// change. One alone proves neither.
-    void on_asked_again(bool was_reply) {
-        shown_ = std::clamp(shown_ + (was_reply ? 1 : -1), -kEnough, kEnough);
-        if (shown_ < kEnough) return;
-        kept_ = false;
-        comes_early_ = true;
-    }
-    /// The reply came behind an early one, which was none: here are such.
-    void on_followed() { shown_ = -kEnough; }
-    /// `hasty`: bytes of a reply came faster than the line's rate allows.
-    void on_rate(bool hasty) {
-        hasty_ = hasty ? std::min(hasty_ + kWeight, kHasty * kWeight) : std::max(hasty_ - 1, 0);
-    }
-    /// True if nothing comes faster than the line's rate, except in one of kWeight replies.
-    bool kept() const { return kept_ && hasty_ <= (kHasty - 1) * kWeight; }
-    bool believed() const { return kept_ && timely_ >= kEnough; }
-    /// True if an early frame is no reply, as far as the last ones show: then only asking again
-    /// tells. Twice in a row nothing else came: it may be one.
-    bool expects_none_early() const {
-        return !comes_early_ && (believed() || in_time_ >= kAgain) && doubted_ < kDoubts;
-    }
-    /// True if the line does not keep its rate. A single early reply may be a late one to an
-    /// earlier attempt.
-    bool unbound() const { return early_ >= kEnough; }
-
-  private:
-    static constexpr int kEnough = 3;
-    static constexpr int kHasty = 3;
-    static constexpr int kAgain = 8;
-    static constexpr int kDoubts = 2;
-    static constexpr int kWeight = 8;
-
-    int timely_ = 0;
-    int early_ = 0;    // in a row
-    int in_time_ = 0;  // in a row
-    int doubted_ = 0;  // early ones in a row
-    int shown_ = 0;    // early ones that were the reply, less those that were not
-    bool kept_ = true;
-    bool comes_early_ = false;
-    int hasty_ = 0;  // +kWeight for each hasty reply, -1 for any other
 };
 
 }  // namespace panelgate::arbiter

@@ -7,13 +7,12 @@
 #include <utility>
 #include <vector>
 
-#include "panelgate/arbiter/attempt/attempt.hpp"
-#include "panelgate/arbiter/habits/echo.hpp"
+#include "panelgate/arbiter/echo.hpp"
+#include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/queue/job_queue.hpp"
 #include "panelgate/arbiter/queue/read_cache.hpp"
 #include "panelgate/arbiter/quiet.hpp"
 #include "panelgate/arbiter/settings.hpp"
-#include "panelgate/arbiter/station.hpp"
 #include "panelgate/arbiter/stations.hpp"
 #include "panelgate/base/inline_function.hpp"
 #include "panelgate/base/pool.hpp"
@@ -31,18 +30,17 @@ class Sharing {
     /// Returns the leader and the jobs that the same transaction can answer: contained reads
     /// always; touching ones up to the length that the panel is known to answer. Joining adjacent
     /// reads saves a request, a reply header and two gaps.
-    Group gather(Job leader, const Station& station, const OutstandingRequests& book,
+    Group gather(TimePoint now, Job leader, const Station& station, const Outstanding& outstanding,
                  JobQueue& queue) const;
-    /// The joined read failed: its parts are sent alone from now on. Returns them in the order in
-    /// which to put them back; jobs that asked for the whole, and jobs of clients that have left,
+    /// The joined read failed: its parts are sent alone from now on. Returns the parts in the order
+    /// in which to put them back; jobs that asked for the whole, and jobs of clients that have left,
     /// stay in the group.
     Jobs split(Group& group);
     /// Returns the part of `reply` that answers this job of the group.
     static Bytes part_for(const Group& group, const Bytes& reply, const Job& job);
 
   private:
-    bool joins(const Group& group, const Job& job, const Station& station,
-               const OutstandingRequests& book) const;
+    bool joins(const Group& group, const Job& job, const Station& station) const;
 
     bool share_;
     PoolDeque<ReadSpan> refused_;
@@ -62,7 +60,6 @@ class Backlog {
 
     /// Queues a retry of the same request. At most one per station.
     void retry(Group group) { retries_.push_back(std::move(group)); }
-    bool has_retries() const { return !retries_.empty(); }
     bool has_retry(std::uint8_t station) const {
         return std::ranges::any_of(retries_,
                                    [&](const Group& group) { return group.station == station; });
@@ -91,41 +88,31 @@ class Backlog {
     std::vector<Group> dropped_;
 };
 
-/// Decides what is sent next on a free line: a retry, a probe, or a request in turn, with the jobs
-/// that it also answers. Changes only the backlog. Pure.
+/// Decides what is sent next on a free line: a retry, a probe, a proof, or a request in turn with the
+/// jobs that the same transaction answers. Changes only the backlog. Pure.
 class Schedule {
   public:
     explicit Schedule(const Settings& settings);
 
     void apply(const Settings& settings);
 
-    struct Next {
-        std::optional<Group> group;  ///< empty: nothing now
-        bool reopen = false;         ///< the line must be reopened first
-    };
-    Next next(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo);
+    std::optional<Group> next(TimePoint now, Stations& stations, Quiet& quiet,
+                              const EchoMemory& echo);
     /// When next() may decide otherwise; empty: only after an event.
-    std::optional<TimePoint> next_start(const Stations& stations, const Quiet& quiet) const;
+    std::optional<TimePoint> next_start(TimePoint now, const Stations& stations,
+                                        const Quiet& quiet) const;
 
-    /// P1: time until which the whole line rests, because late replies occurred before or the
-    /// configuration says so: one would collide with requests to other stations. Probes never make
-    /// the line rest; with an adaptive timeout the rest is shorter.
+    /// T2: time until which the whole line rests behind a request that left at `sent` and was not
+    /// answered, because the station has been late before, or the configuration says so: its late
+    /// reply would collide with requests to other stations. Probes never make the line rest.
     std::optional<TimePoint> line_rests_until(TimePoint now, const Group& failed, TimePoint sent,
                                               const Station& station) const;
 
-    /// True if the station's outstanding requests or replies may still be in transit, however long
-    /// ago, where the transport may stall (Settings::may_stall).
-    bool in_transit(const Stations& stations, const Station& station) const {
-        return may_stall_ && stations.book().any_since(station.id(), stations.book().proved()) &&
-               !station.replies().answered_since_reopen();
-    }
-
     Backlog& backlog() { return backlog_; }
     const Backlog& backlog() const { return backlog_; }
-    /// Queues a retry that may cost others `patience`. While only its station rests, other stations
-    /// go first, for no longer than that: one request, or one per waiting station if all retries
-    /// that wait may take long.
-    void retry(TimePoint now, Group group, Duration patience, const Stations& stations);
+    /// Queues a retry. Behind a silence the jobs that wait by now go first, for as long as the
+    /// station's timeout.
+    void retry(TimePoint now, Group group);
     /// Puts the parts of a joined read back, each alone. Returns the jobs whose client has left:
     /// they are not sent again.
     Jobs give_back(Group& group);
@@ -141,31 +128,20 @@ class Schedule {
     static bool gap_is_over(const Line& line, std::uint8_t station);
     std::optional<Group> next_retry(const Line& line);
     std::optional<Group> next_probe(const Line& line) const;
-    Next next_job(const Line& line);
-    JobQueue::Choice own_turn(const Line& line, JobQueue::Choice next,
-                              const JobQueue::Test& may_run) const;
-    std::optional<Next> proof_before(const Line& line, const Job& job) const;
-    std::optional<Next> read_before(const Line& line, const Job& job);
+    std::optional<Group> next_job(const Line& line);
+    std::optional<Group> read_before(const Line& line, const Job& job);
     bool may_run(const Line& line, const Job& job) const;
-    TimePoint ready_at(const Stations& stations, const Job& job) const;
-    TimePoint repeat_from(const Group& group, const Stations& stations) const;
-    bool can_prove(const OutstandingRequests& book, const Station& station) const;
+    TimePoint ready_at(TimePoint now, const Stations& stations, const Job& job) const;
+    static TimePoint clear_at(TimePoint now, const Stations& stations, const Station& station,
+                              const modbus::Request& request, bool may_learn);
+    static TimePoint repeat_from(TimePoint now, const Group& group, const Stations& stations);
     bool others_go_first(const Line& line) const;
-    void let_others_go_first(TimePoint now, const Stations& stations);
-    bool has_turn(const Job& job) const;
-    void take_turn(const Job& job);
 
     Quarantine quarantine_;
-    bool may_stall_;
     bool echo_known_ = false;
     Backlog backlog_;
     Sharing sharing_;
-    Ticket learned_for_ = 0;        ///< a read was sent for it to detect the echo (P8)
-    PoolSet<std::uint8_t> others_;  ///< stations that waited when a retry was due
-    PoolSet<std::uint8_t> wrote_;   ///< those of them whose turn was a write
-    std::size_t turns_ = 0;         ///< turns that the retry leaves to them, at most
-    Duration patience_{};           ///< time that retries may cost them, since one waits
-    TimePoint others_since_{};      ///< begin of the time that the retry leaves to them
+    Ticket learned_for_ = 0;  ///< a read was sent for it to show the echo (P8)
 };
 
 }  // namespace panelgate::arbiter

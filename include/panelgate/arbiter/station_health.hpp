@@ -16,8 +16,9 @@ struct OfflineSettings {
     friend bool operator==(const OfflineSettings&, const OfflineSettings&) = default;
 };
 
-/// Health of one station. Pure. A transaction in which anything of the station is heard, damaged or
-/// an exception, is a sign of life; only silence counts towards offline (P4).
+/// Health of one station: online, suspect, offline. A transaction in which anything of the station
+/// is heard, damaged or an exception, is a sign of life; only silence counts towards offline (P4,
+/// T1). Pure.
 class StationHealth {
   public:
     explicit StationHealth(OfflineSettings settings = {}) : settings_(settings) {}
@@ -29,6 +30,7 @@ class StationHealth {
     /// line until it was asked again.
     Health state() const { return known_ ? state_ : Health::unknown; }
     bool offline() const { return state_ == Health::offline; }
+    bool online() const { return state_ == Health::online; }
     /// Time of its last answer in time. A late reply is a sign of life but no success.
     std::optional<TimePoint> last_success() const { return last_success_; }
     /// Time of its last good frame, in time or late.
@@ -47,16 +49,16 @@ class StationHealth {
     /// Only damaged bytes came: alive, though not well.
     void on_damaged();
     /// A whole transaction (all its attempts) passed in silence. Returns true if that took it
-    /// offline: `at_once`, or after as many in a row as configured.
-    bool on_silence(TimePoint now, bool at_once = false);
-    /// The same for a write, at a station that answers reads: it may ignore only this write. Counts
-    /// to one silence short of offline at most; an offline station stays so. Returns true if a read
-    /// must decide, because another silent transaction would have taken it offline.
+    /// offline, after as many in a row as configured.
+    bool on_silence(TimePoint now);
+    /// The same for a write, at a station that answers reads: it may ignore only this write (T14).
+    /// Counts to one silence short of offline at most; an offline station stays so. Returns true if
+    /// a read must decide, because another silent transaction would have taken it offline.
     bool on_silent_write();
 
     /// When an offline station may be asked again; the line's budget may postpone it.
     TimePoint next_probe() const { return next_probe_; }
-    /// Returns true if a client's write may be the probe now, once per interval.
+    /// Returns true if a client's request may be the probe now, once per interval.
     bool take_half_open(TimePoint now);
 
   private:
@@ -72,18 +74,13 @@ class StationHealth {
     std::optional<TimePoint> last_heard_;
 };
 
-/// Keeps the spent time below a share of the line's time: after a cost d nothing more is allowed
-/// for d * (1 / share - 1). Unforeseen costs may exceed it, and are paid off later. Pure.
+/// Keeps the spent time below a share of the line's time (P4, T1): after a cost d nothing more is
+/// allowed for d * (1 / share - 1). Unforeseen costs may exceed it, and are paid off later. Pure.
 class ProbeBudget {
   public:
-    /// Of offline stations, together (P4: at most 5 %, aiming at 3 %).
-    static constexpr double kOffline = 0.03;
-    /// ... while an outage of all has only just begun: a network may hang.
-    static constexpr double kAlone = 0.5;
-    /// Of stations that have just fallen silent, together; and of each failing one.
-    static constexpr double kFailing = 0.2;
-    /// Of unheard unlisted ids, together, after each was asked once.
-    static constexpr double kUnheard = 0.02;
+    static constexpr double kSuspect = 0.2;   ///< of stations whose last requests failed, together
+    static constexpr double kOffline = 0.03;  ///< of offline stations, together
+    static constexpr double kAlone = 0.5;     ///< ... while an outage of all has only just begun
 
     explicit ProbeBudget(double share) : share_(share) {}
 
@@ -98,17 +95,14 @@ class ProbeBudget {
         const TimePoint began = now - cost;
         next_ = std::max(began + whole, std::min(std::max(next_, began) + whole, now + most));
     }
-    /// Adds to the last cost.
-    void add(Duration cost) { next_ += time_for(cost); }
     void clear() { next_ = {}; }
-
-  private:
     /// Time of which `cost` is the share.
     Duration time_for(Duration cost) const {
         const std::chrono::duration<double> time(to_seconds(cost) / share_);
         return std::chrono::duration_cast<Duration>(time);
     }
 
+  private:
     double share_;
     TimePoint next_{};
 };

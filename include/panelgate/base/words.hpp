@@ -22,7 +22,6 @@ enum class EchoState : std::uint8_t {
     unknown,
     absent,
     present,
-    unclear,  ///< part of a read came back before its reply: whole echoes may follow
 };
 std::string_view label(EchoState state);
 

@@ -211,7 +211,7 @@ TEST(Words, AreThoseOfMetricsRestAndTheTrace) {
         EXPECT_EQ(static_cast<std::size_t>(kAllOutcomes[i]), i) << "counted by its place";
     EXPECT_EQ(words<PriorityClass>(kPriorityClasses), "write,read,poll,probe");
     EXPECT_EQ(words<Health>(5), "unknown,online,suspect,heard,offline");
-    EXPECT_EQ(words<EchoState>(4), "unknown,absent,present,unclear");
+    EXPECT_EQ(words<EchoState>(3), "unknown,absent,present");
     EXPECT_EQ(words<FrameKind>(13),
               "request,retry,probe,learn echo,broadcast,reply,heard request,damaged,echo,"
               "foreign request,late,copy,foreign");

@@ -59,10 +59,8 @@ struct Job {
     /// The function the client asked for, where the request uses another one instead; 0: the same.
     std::uint8_t asked_function = 0;
     Duration within = Duration::max();  ///< its time limit, if sooner than the queue's
-    /// Minimum wait for its reply (within the response timeout), also from an unknown station.
-    Duration patience{};
-    /// A scan with its own budget: unheard stations are asked outside theirs, and their silence
-    /// says nothing about the line.
+    /// A scan: unheard stations are asked though they are offline, and their silence says nothing
+    /// about the line.
     bool search = false;
     TimePoint arrived{};
     TimePoint deadline{};

@@ -1,0 +1,95 @@
+#include "panelgate/arbiter/echo.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+namespace panelgate::arbiter {
+
+bool teaches_echo(const modbus::Request& request) {
+    const auto reply = request.reply_length();
+    return reply && (*reply != request.pdu().size() + modbus::kAduOverhead ||
+                     modbus::distinct_byte_count(request.pdu()).has_value());
+}
+
+bool begins_with_request(ByteView heard, ByteView own, const modbus::CrcOrders& orders) {
+    const std::size_t size = modbus::request_adu_length(heard);
+    return size != 0 && size <= heard.size() && modbus::crc_ok(heard.first(size), orders) &&
+           !std::ranges::equal(heard.first(size), own);
+}
+
+bool holds_fragment(ByteView heard, ByteView frame) {
+    for (std::size_t i = 0; i + 1 < heard.size(); ++i) {
+        if (!std::ranges::search(frame, heard.subspan(i, 2)).empty()) return true;
+    }
+    return false;
+}
+
+ByteView EchoFilter::feed(ByteView bytes) {
+    if (expect_ == Expect::nothing) return bytes;
+    std::size_t taken = 0;
+    while (taken < bytes.size() && matched_ < frame_.size() && bytes[taken] == frame_[matched_]) {
+        ++matched_;
+        ++taken;
+    }
+    const bool certain = expect_ == Expect::certainly;
+    if (matched_ == frame_.size()) {
+        complete_ = true;
+    } else if (taken == bytes.size()) {
+        return {};
+    } else {
+        mismatch_ = certain;
+        released_.assign(frame_.begin(), frame_.begin() + static_cast<std::ptrdiff_t>(matched_));
+        released_.insert(released_.end(), bytes.begin() + static_cast<std::ptrdiff_t>(taken),
+                         bytes.end());
+    }
+    expect_ = Expect::nothing;
+    matched_ = 0;
+    return complete_ ? bytes.subspan(taken) : ByteView(released_);
+}
+
+std::size_t EchoFilter::missing() const {
+    constexpr std::size_t kOpen = 3;  // a reply begins like the request, up to its byte count
+    if (expect_ == Expect::nothing || matched_ == 0) return 0;
+    const bool open = expect_ == Expect::perhaps && matched_ < kOpen;
+    return (open ? kOpen : frame_.size()) - matched_;
+}
+
+Bytes EchoFilter::release() {
+    if (!pending()) return {};
+    expect_ = Expect::nothing;
+    return {frame_.begin(),
+            frame_.begin() + static_cast<std::ptrdiff_t>(std::exchange(matched_, 0))};
+}
+
+void EchoMemory::forget() {
+    missed_ = 0;
+    state_ = mode_ == EchoMode::on    ? EchoState::present
+             : mode_ == EchoMode::off ? EchoState::absent
+                                      : EchoState::unknown;
+}
+
+EchoFilter::Expect EchoMemory::expect() const {
+    switch (state_) {
+        case EchoState::present:
+            return EchoFilter::Expect::certainly;
+        case EchoState::absent:
+            return EchoFilter::Expect::nothing;
+        case EchoState::unknown:
+            return EchoFilter::Expect::perhaps;
+    }
+    std::abort();
+}
+
+bool EchoMemory::on_echo() {
+    missed_ = 0;
+    if (mode_ == EchoMode::off) return false;
+    return std::exchange(state_, EchoState::present) != EchoState::present;
+}
+
+void EchoMemory::on_no_echo() {
+    if (mode_ != EchoMode::automatic || state_ == EchoState::absent) return;
+    if (state_ == EchoState::unknown || ++missed_ >= kNoMore) state_ = EchoState::absent;
+}
+
+}  // namespace panelgate::arbiter
