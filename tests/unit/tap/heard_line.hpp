@@ -107,8 +107,6 @@ class Line {
         }
         now_ = until;
     }
-    /// Another answer to the last request would have come by now.
-    void settle() { wait(100ms); }
     TimePoint now() const { return now_; }
     /// The transactions since the last call: "31: read -> value; 5: write -> silent ?".
     std::string told() { return std::exchange(told_, {}); }
