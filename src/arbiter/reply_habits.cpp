@@ -61,13 +61,13 @@ bool ReplyHabits::may_be_duplicate(TimePoint now, const Attempt& attempt, const 
            (attempt.may_have_collided() && claims.repeats && !group.is_values(attempt.reply()));
 }
 
-const Asked* ReplyHabits::earlier_write(const OutstandingRequests& book, TimePoint now,
-                                        ByteView write, ByteView confirmation) const {
+const BookEntry* ReplyHabits::earlier_write(const OutstandingRequests& book, TimePoint now,
+                                            ByteView write, ByteView confirmation) const {
     if (!duplicates_.suspected(now)) return nullptr;
     if (modbus::exception_of(confirmation) || modbus::returns_values(write)) return nullptr;
     const TimePoint given = book.given(id_, now, confirmation, now);
     if (given == TimePoint{}) return nullptr;
-    const Asked* const earlier = book.last_reply(id_, given + Duration{1});
+    const BookEntry* const earlier = book.last_reply(id_, given + Duration{1});
     return std::ranges::equal(earlier->pdu, write) ? nullptr : earlier;
 }
 
@@ -157,11 +157,11 @@ void ReplyHabits::judge_doubted(const OutstandingRequests& book, ByteView reques
 /// where the last reply may have been its reply.
 bool ReplyHabits::follows_refusal(const OutstandingRequests& book, TimePoint now,
                                   ByteView pdu) const {
-    const auto was_refused = [&](const Asked* one) {
+    const auto was_refused = [&](const BookEntry* one) {
         return one != nullptr && now - one->replied <= latest_reply() &&
                AnnouncedReplies::may_be_followed(one->reply) && modbus::answers(one->pdu, pdu);
     };
-    const Asked* const last = book.last_reply(id_);
+    const BookEntry* const last = book.last_reply(id_);
     return !modbus::exception_of(pdu) &&
            (was_refused(last) ||
             (last != nullptr && was_refused(book.last_reply(id_, last->replied))));
@@ -228,7 +228,7 @@ ReplyHabits::Heard ReplyHabits::on_unsolicited(OutstandingRequests& book, TimePo
         return {};
     }
     // Right behind the last reply and answering the same: one of the two is surplus.
-    const Asked* const last = book.last_reply(id_);
+    const BookEntry* const last = book.last_reply(id_);
     if ((done == Done::second || done == Done::disorder) && last != nullptr &&
         modbus::answers(last->pdu, pdu))
         duplicates_.on_surplus(now, now - last->replied);
@@ -241,7 +241,7 @@ ReplyHabits::Heard ReplyHabits::on_unsolicited(OutstandingRequests& book, TimePo
 /// Neither requested nor outstanding.
 void ReplyHabits::on_unasked(OutstandingRequests& book, TimePoint now, Done done, ByteView pdu) {
     if (const TimePoint given = book.given(id_, now, pdu); given != TimePoint{}) {
-        // Asked twice, answered twice: values that rarely change make no copy of the second.
+        // BookEntry twice, answered twice: values that rarely change make no copy of the second.
         if (!book.take_first_of_two(id_, pdu, now - kClosedMemory * late_.timeout()))
             duplicates_.on_copy(now, given, book.last_reply(id_)->replied);
     } else if (done == Done::second && book.on_followed(id_)) {
@@ -254,7 +254,7 @@ ReplyHabits::Heard ReplyHabits::on_late(OutstandingRequests& book, TimePoint now
                                         bool asked, bool may_repeat) {
     Heard heard;
     // The oldest one whose reply could still come: an older one would overstate the lateness.
-    const Asked answered = *book.first(id_, pdu, now - latest_reply());
+    const BookEntry answered = *book.first(id_, pdu, now - latest_reply());
     const TimePoint due = answered.sent + late_.timeout();
     if (answered.announced) announced_.on_kept();
     const bool may_be_meant = asked && modbus::exception_of(pdu);  // for the request on the wire
@@ -286,7 +286,7 @@ ReplyHabits::Heard ReplyHabits::on_late(OutstandingRequests& book, TimePoint now
 ReplyHabits::Heard ReplyHabits::on_disorder(OutstandingRequests& book, TimePoint now,
                                             ByteView pdu) {
     disordered_at_ = now;
-    const Asked answered = book.take_closed(id_, pdu, now - kClosedMemory * late_.timeout());
+    const BookEntry answered = book.take_closed(id_, pdu, now - kClosedMemory * late_.timeout());
     Heard heard;
     heard.lateness = std::max(now - answered.sent - late_.timeout(), Duration::zero());
     if (heard.lateness > Duration::zero()) late_.on_late(heard.lateness);

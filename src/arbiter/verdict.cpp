@@ -258,7 +258,7 @@ bool Arbiter::is_confirmed(TimePoint now, const Group& group, ByteView reply, bo
     if (echo_memory_.comes_again(now, group.station) ||
         habits.may_repeat_confirmation(now, group.confirms, timing::kForgetDuplicates))
         return holds;
-    const Asked* const earlier =
+    const BookEntry* const earlier =
         habits.earlier_write(book, group.doubted_at, group.written, group.confirms);
     const bool repeats = earlier || habits.may_repeat_confirmation(now, group.confirms);
     if (broadcast || !repeats)

@@ -31,7 +31,7 @@ class ReplyHabits {
     void apply(const StationSettings& settings) {
         late_.apply(settings.late_window, settings.response_timeout);
     }
-    const KnownReads& reads() const { return reads_; }
+    const LearnedReads& reads() const { return reads_; }
 
     // Admission
 
@@ -116,13 +116,13 @@ class ReplyHabits {
     }
     /// The write of other values that had this confirmation just before, where copies may come from
     /// this station; null: none. A read tells whether the place still holds those.
-    const Asked* earlier_write(const OutstandingRequests& book, TimePoint now, ByteView write,
-                               ByteView confirmation) const;
+    const BookEntry* earlier_write(const OutstandingRequests& book, TimePoint now, ByteView write,
+                                   ByteView confirmation) const;
     /// Time of the latest request that this reply proves to have reached the station: an attempt
     /// started at `started`, or the first outstanding one that the reply fits.
     TimePoint surely_answered(const OutstandingRequests& book, TimePoint started,
                               ByteView reply) const {
-        const Asked* const other = book.first(id_, reply);
+        const BookEntry* const other = book.first(id_, reply);
         return other != nullptr ? std::min(other->sent, started) : started;
     }
     /// Not before this was sampled what answers the group now: an equal request of before may have
@@ -227,7 +227,7 @@ class ReplyHabits {
     LateWindow late_;
     DuplicateHabit duplicates_;
     ReconnectState reconnect_;
-    KnownReads reads_;
+    LearnedReads reads_;
     struct {
         std::optional<Duration> delay;  ///< the longest, of its answers
         bool refused = false;

@@ -13,40 +13,40 @@ namespace panelgate::arbiter {
 namespace {
 
 using modbus::kBroadcast;
-using State = Asked::State;
+using State = BookEntry::State;
 
-bool is_outstanding(const Asked& one) { return one.state == State::outstanding; }
+bool is_outstanding(const BookEntry& one) { return one.state == State::outstanding; }
 
 /// What was announced has had its exception.
-bool may_answer(const Asked& one, ByteView reply) {
+bool may_answer(const BookEntry& one, ByteView reply) {
     return !(one.announced && modbus::exception_of(reply)) && modbus::answers(one.pdu, reply);
 }
 
-bool is_closed(const Asked& one) {
+bool is_closed(const BookEntry& one) {
     return one.state == State::passed || one.state == State::lapsed;
 }
 
 /// One of ours without its reply, whatever is believed of that.
-bool is_unanswered(const Asked& one) { return is_outstanding(one) || is_closed(one); }
+bool is_unanswered(const BookEntry& one) { return is_outstanding(one) || is_closed(one); }
 
-bool is_recent_reply(const Asked& one, TimePoint now) {
+bool is_recent_reply(const BookEntry& one, TimePoint now) {
     return one.state == State::answered && now - one.replied <= timing::kLatestRepetition;
 }
 
 /// True if it may be answered by this, as an outstanding request.
 auto outstanding_for(ByteView reply) {
-    return [reply](const Asked& one) { return is_outstanding(one) && may_answer(one, reply); };
+    return [reply](const BookEntry& one) { return is_outstanding(one) && may_answer(one, reply); };
 }
 
 auto closed_for(ByteView reply, TimePoint open) {
-    return [reply, open](const Asked& one) {
+    return [reply, open](const BookEntry& one) {
         return is_closed(one) && one.sent > open && modbus::answers(one.pdu, reply);
     };
 }
 
 /// One of ours that is closed. An earlier attempt of the same read may answer it, unless that was
 /// written since; a write is not repeated.
-void add_closed(Claims& claims, const Asked& one, ByteView reply,
+void add_closed(Claims& claims, const BookEntry& one, ByteView reply,
                 const OutstandingRequests::Windows& windows, bool is_same_read) {
     const bool closed = one.sent > windows.closed;
     const bool passed =
@@ -58,7 +58,7 @@ void add_closed(Claims& claims, const Asked& one, ByteView reply,
 }
 
 /// A reply that was given before.
-void add_reply(Claims& claims, const Asked& one, TimePoint now, ByteView reply, bool is_same) {
+void add_reply(Claims& claims, const BookEntry& one, TimePoint now, ByteView reply, bool is_same) {
     if (!std::ranges::equal(one.reply, reply)) return;
     const bool values = modbus::returns_values(one.pdu) && reply[0] == one.pdu[0];
     const bool recent = is_recent_reply(one, now);
@@ -70,7 +70,7 @@ void add_reply(Claims& claims, const Asked& one, TimePoint now, ByteView reply, 
 }
 
 /// One entry's part of the claims.
-void add_claim(Claims& claims, const Asked& one, TimePoint now, ByteView reply,
+void add_claim(Claims& claims, const BookEntry& one, TimePoint now, ByteView reply,
                const OutstandingRequests::Windows& windows, ByteView open) {
     const bool same = !open.empty() && std::ranges::equal(one.pdu, open);
     const auto fits = [&](TimePoint since) {
@@ -109,9 +109,10 @@ void add_claim(Claims& claims, const Asked& one, TimePoint now, ByteView reply,
 Claims OutstandingRequests::claims(TimePoint now, std::uint8_t station, ByteView reply,
                                    const Windows& windows, ByteView open) const {
     Claims claims;
-    for (const Asked& one : of(station).asked) add_claim(claims, one, now, reply, windows, open);
+    for (const BookEntry& one : of(station).asked)
+        add_claim(claims, one, now, reply, windows, open);
     if (!open.empty()) return claims;
-    const Asked* const last = last_reply(station);
+    const BookEntry* const last = last_reply(station);
     claims.has_last_form = last != nullptr && is_recent_reply(*last, now) &&
                            reply.size() == last->reply.size() && reply[0] == last->reply[0];
     return claims;
@@ -119,7 +120,7 @@ Claims OutstandingRequests::claims(TimePoint now, std::uint8_t station, ByteView
 
 std::optional<Duration> OutstandingRequests::behind_broadcast(TimePoint now, ByteView reply) const {
     std::optional<Duration> delay;
-    for (const Asked& one : of(kBroadcast).asked) {
+    for (const BookEntry& one : of(kBroadcast).asked) {
         if (now >= one.sent + timing::kLatestBroadcastAnswer) continue;
         if (!modbus::answers(one.pdu, reply)) continue;
         delay = std::min(delay.value_or(timing::kLatestBroadcastAnswer), now - one.sent);
@@ -127,11 +128,11 @@ std::optional<Duration> OutstandingRequests::behind_broadcast(TimePoint now, Byt
     return delay;
 }
 
-const Asked* OutstandingRequests::first(std::uint8_t station, ByteView reply,
-                                        TimePoint open) const {
+const BookEntry* OutstandingRequests::first(std::uint8_t station, ByteView reply,
+                                            TimePoint open) const {
     if (!any(station)) return nullptr;
-    const Asked* last = nullptr;
-    for (const Asked& one : of(station).asked) {
+    const BookEntry* last = nullptr;
+    for (const BookEntry& one : of(station).asked) {
         if (!outstanding_for(reply)(one)) continue;
         last = &one;
         if (one.sent > open) break;
@@ -140,7 +141,7 @@ const Asked* OutstandingRequests::first(std::uint8_t station, ByteView reply,
 }
 
 bool OutstandingRequests::has_other_function(std::uint8_t station, std::uint8_t function) const {
-    return std::ranges::any_of(of(station).asked, [&](const Asked& one) {
+    return std::ranges::any_of(of(station).asked, [&](const BookEntry& one) {
         return is_outstanding(one) && one.pdu[0] != function;
     });
 }
@@ -148,7 +149,7 @@ bool OutstandingRequests::has_other_function(std::uint8_t station, std::uint8_t 
 TimePoint OutstandingRequests::given(std::uint8_t station, TimePoint now, ByteView reply,
                                      TimePoint before) const {
     TimePoint given{};
-    for (const Asked& one : of(station).asked) {
+    for (const BookEntry& one : of(station).asked) {
         if (is_recent_reply(one, now) && one.replied < before &&
             std::ranges::equal(one.reply, reply))
             given = std::max(given, one.replied);
@@ -156,9 +157,9 @@ TimePoint OutstandingRequests::given(std::uint8_t station, TimePoint now, ByteVi
     return given;
 }
 
-const Asked* OutstandingRequests::last_reply(std::uint8_t station, TimePoint before) const {
-    const Asked* last = nullptr;
-    for (const Asked& one : of(station).asked) {
+const BookEntry* OutstandingRequests::last_reply(std::uint8_t station, TimePoint before) const {
+    const BookEntry* last = nullptr;
+    for (const BookEntry& one : of(station).asked) {
         if (one.state == State::answered && one.replied < before &&
             (last == nullptr || one.replied >= last->replied))
             last = &one;
@@ -168,7 +169,7 @@ const Asked* OutstandingRequests::last_reply(std::uint8_t station, TimePoint bef
 
 const Bytes* OutstandingRequests::given_in(TimePoint now, std::uint8_t station, ByteView bytes,
                                            modbus::CrcOrder order) const {
-    for (const Asked& one : of(station).asked) {
+    for (const BookEntry& one : of(station).asked) {
         if (!is_recent_reply(one, now)) continue;
         const Bytes earlier = modbus::encode_adu(station, one.reply, order);
         if (!std::ranges::search(bytes, earlier).empty()) return &one.reply;
@@ -190,7 +191,7 @@ ByteView OutstandingRequests::late_in(ByteView bytes, const modbus::CrcOrders& o
 }
 
 bool OutstandingRequests::any_announced(std::uint8_t station) const {
-    return any(station) && std::ranges::any_of(of(station).asked, [](const Asked& one) {
+    return any(station) && std::ranges::any_of(of(station).asked, [](const BookEntry& one) {
                return is_outstanding(one) && one.announced;
            });
 }
@@ -200,13 +201,13 @@ TimePoint OutstandingRequests::first_sent(std::uint8_t station) const {
 }
 
 TimePoint OutstandingRequests::last_sent(std::uint8_t station) const {
-    const PoolVector<Asked>& all = of(station).asked;
+    const PoolVector<BookEntry>& all = of(station).asked;
     return std::find_if(all.rbegin(), all.rend(), is_outstanding)->sent;
 }
 
 std::optional<TimePoint> OutstandingRequests::first_asked(std::uint8_t station, ByteView pdu,
                                                           TimePoint open) const {
-    for (const Asked& one : of(station).asked) {
+    for (const BookEntry& one : of(station).asked) {
         if (is_unanswered(one) && one.sent > open && std::ranges::equal(one.pdu, pdu))
             return one.sent;
     }
@@ -214,7 +215,7 @@ std::optional<TimePoint> OutstandingRequests::first_asked(std::uint8_t station, 
 }
 
 bool OutstandingRequests::is_only(std::uint8_t station, const Bytes& pdu) const {
-    return any(station) && std::ranges::all_of(of(station).asked, [&](const Asked& one) {
+    return any(station) && std::ranges::all_of(of(station).asked, [&](const BookEntry& one) {
                return !is_outstanding(one) || one.pdu == pdu;
            });
 }
@@ -226,7 +227,7 @@ bool OutstandingRequests::is_ambiguous(std::uint8_t station, const modbus::Reque
     const bool is_echoed = modbus::is_broadcastable(pdu[0]);
     const Bytes reply = is_echoed ? modbus::normal_write_reply(pdu) : Bytes{};
     const auto length = modbus::reply_length_from_request(pdu);
-    return std::ranges::any_of(of(station).asked, [&](const Asked& one) {
+    return std::ranges::any_of(of(station).asked, [&](const BookEntry& one) {
         if (!is_outstanding(one) || one.pdu[0] != pdu[0] || (again && one.pdu == pdu)) return false;
         return is_echoed ? modbus::answers(one.pdu, reply)
                          : modbus::reply_length_from_request(one.pdu) == length;
@@ -234,7 +235,7 @@ bool OutstandingRequests::is_ambiguous(std::uint8_t station, const modbus::Reque
 }
 
 bool OutstandingRequests::came_damaged(std::uint8_t station, const Bytes& pdu) const {
-    return std::ranges::any_of(of(station).asked, [&](const Asked& one) {
+    return std::ranges::any_of(of(station).asked, [&](const BookEntry& one) {
         return one.state == State::damaged && one.pdu == pdu;
     });
 }
@@ -243,7 +244,7 @@ TimePoint OutstandingRequests::broadcasts_over(const modbus::Request& request, D
                                                bool refuses) const {
     TimePoint over{};
     if (request.is_read()) return over;
-    for (const Asked& one : of(kBroadcast).asked) {
+    for (const BookEntry& one : of(kBroadcast).asked) {
         const bool same = refuses && one.pdu[0] == request.function();
         if (same || modbus::answers(request.pdu(), one.reply))
             over = std::max(over, one.sent + window);
@@ -257,7 +258,7 @@ void OutstandingRequests::on_unanswered(std::uint8_t station, TimePoint sent, co
 }
 
 void OutstandingRequests::announce(std::uint8_t station, ByteView exception) {
-    PoolVector<Asked>& all = at(station).asked;
+    PoolVector<BookEntry>& all = at(station).asked;
     const auto found = std::ranges::find_if(all, outstanding_for(exception));
     if (found != all.end()) found->announced = true;
 }
@@ -265,7 +266,7 @@ void OutstandingRequests::announce(std::uint8_t station, ByteView exception) {
 void OutstandingRequests::on_written(std::uint8_t station, ByteView write) {
     const std::optional<modbus::Span> items = modbus::access_of(write).write;
     const auto mark = [&](Page& page) {
-        for (Asked& one : page.asked) {
+        for (BookEntry& one : page.asked) {
             if (!is_unanswered(one)) continue;
             const auto read = modbus::read_span(one.pdu);
             one.outdated = one.outdated || !read || modbus::may_change(items, *read);
@@ -280,17 +281,18 @@ void OutstandingRequests::on_damaged(std::uint8_t station, TimePoint sent, const
 }
 
 void OutstandingRequests::forget_damaged(std::uint8_t station) {
-    std::erase_if(at(station).asked, [](const Asked& one) { return one.state == State::damaged; });
+    std::erase_if(at(station).asked,
+                  [](const BookEntry& one) { return one.state == State::damaged; });
 }
 
 void OutstandingRequests::on_reply(std::uint8_t station, TimePoint now, const Bytes& pdu,
                                    ByteView reply) {
-    Asked one{.state = State::answered,
-              .pdu = pdu,
-              .replied = now,
-              .reply = Bytes(reply.begin(), reply.end())};
+    BookEntry one{.state = State::answered,
+                  .pdu = pdu,
+                  .replied = now,
+                  .reply = Bytes(reply.begin(), reply.end())};
     Page& page = at(station);
-    if (Asked* const old = oldest_reply(page, pdu[0])) {
+    if (BookEntry* const old = oldest_reply(page, pdu[0])) {
         *old = std::move(one);
     } else {
         page.asked.push_back(std::move(one));
@@ -299,29 +301,30 @@ void OutstandingRequests::on_reply(std::uint8_t station, TimePoint now, const By
 
 /// The reply that is forgotten for one to `function`; null: there is room. Beyond the last ones the
 /// last to each function is kept: a panel may have a buffer for each, and says that once more.
-Asked* OutstandingRequests::oldest_reply(Page& page, std::uint8_t function) {
+BookEntry* OutstandingRequests::oldest_reply(Page& page, std::uint8_t function) {
     std::size_t count = 0;
-    Asked* oldest = nullptr;
-    Asked* oldest_repeated = nullptr;  // a later one has its function
-    const auto take_older = [](Asked*& old, Asked& other) {
+    BookEntry* oldest = nullptr;
+    BookEntry* oldest_repeated = nullptr;  // a later one has its function
+    const auto take_older = [](BookEntry*& old, BookEntry& other) {
         if (old == nullptr || other.replied < old->replied) old = &other;
     };
-    const auto is_later = [](const Asked& one, const Asked& other) {
+    const auto is_later = [](const BookEntry& one, const BookEntry& other) {
         return one.state == State::answered && one.pdu[0] == other.pdu[0] &&
                one.replied > other.replied;
     };
-    for (Asked& other : page.asked) {
+    for (BookEntry& other : page.asked) {
         if (other.state != State::answered) continue;
         ++count;
         take_older(oldest, other);
         const bool repeated =
-            other.pdu[0] == function ||
-            std::ranges::any_of(page.asked, [&](const Asked& one) { return is_later(one, other); });
+            other.pdu[0] == function || std::ranges::any_of(page.asked, [&](const BookEntry& one) {
+                return is_later(one, other);
+            });
         if (repeated) take_older(oldest_repeated, other);
     }
     if (count < kReplies) return nullptr;
-    const auto is_recent = [&](const Asked& which) {
-        return std::ranges::count_if(page.asked, [&](const Asked& one) {
+    const auto is_recent = [&](const BookEntry& which) {
+        return std::ranges::count_if(page.asked, [&](const BookEntry& one) {
                    return one.state == State::answered && one.replied > which.replied;
                }) < static_cast<std::ptrdiff_t>(kReplies) - 1;
     };
@@ -330,15 +333,15 @@ Asked* OutstandingRequests::oldest_reply(Page& page, std::uint8_t function) {
 }
 
 bool OutstandingRequests::on_followed(std::uint8_t station) {
-    const Asked* const last = last_reply(station);
-    PoolVector<Asked>& all = at(station).asked;
-    for (Asked& one : all) one.followed = one.followed || &one == last;
-    return std::ranges::count_if(all, &Asked::followed) >= 2;
+    const BookEntry* const last = last_reply(station);
+    PoolVector<BookEntry>& all = at(station).asked;
+    for (BookEntry& one : all) one.followed = one.followed || &one == last;
+    return std::ranges::count_if(all, &BookEntry::followed) >= 2;
 }
 
 void OutstandingRequests::on_refusal(std::uint8_t station, TimePoint now, ByteView reply) {
     Page& page = at(station);
-    if (std::ranges::any_of(page.asked, [&](const Asked& one) {
+    if (std::ranges::any_of(page.asked, [&](const BookEntry& one) {
             return one.state == State::refused && std::ranges::equal(one.reply, reply) &&
                    now < one.replied + timing::kLatestRepetition;
         }))
@@ -360,8 +363,8 @@ void OutstandingRequests::on_foreign(TimePoint now, ByteView bytes, bool maybe) 
 }
 
 bool OutstandingRequests::on_foreign_answered(std::uint8_t station, ByteView reply) {
-    Asked* oldest = nullptr;
-    for (Asked& one : at(station).asked) {
+    BookEntry* oldest = nullptr;
+    for (BookEntry& one : at(station).asked) {
         if (one.state != State::foreign || one.followed || !modbus::answers(one.pdu, reply))
             continue;
         if (oldest == nullptr || one.sent < oldest->sent) oldest = &one;
@@ -371,7 +374,8 @@ bool OutstandingRequests::on_foreign_answered(std::uint8_t station, ByteView rep
 }
 
 void OutstandingRequests::on_foreign_over(std::uint8_t station) {
-    for (Asked& one : at(station).asked) one.followed = one.followed || one.state == State::foreign;
+    for (BookEntry& one : at(station).asked)
+        one.followed = one.followed || one.state == State::foreign;
 }
 
 void OutstandingRequests::on_broadcast(TimePoint sent, const Bytes& pdu) {
@@ -389,9 +393,9 @@ void OutstandingRequests::pass(std::uint8_t station, TimePoint sent) {
 }
 
 void OutstandingRequests::close(std::uint8_t station, ByteView reply, bool asked) {
-    const Asked* const oldest = first(station, reply);
+    const BookEntry* const oldest = first(station, reply);
     if (oldest == nullptr) return;
-    const auto is_present = [&, fits = outstanding_for(reply)](const Asked& one) {
+    const auto is_present = [&, fits = outstanding_for(reply)](const BookEntry& one) {
         return one.sent >= opened_ && fits(one);
     };
     if (oldest->sent < opened_ && (asked || std::ranges::any_of(of(station).asked, is_present)))
@@ -408,25 +412,25 @@ void OutstandingRequests::take(std::uint8_t station, ByteView reply) {
     --page.outstanding;
 }
 
-Asked OutstandingRequests::take_closed(std::uint8_t station, ByteView reply, TimePoint open) {
+BookEntry OutstandingRequests::take_closed(std::uint8_t station, ByteView reply, TimePoint open) {
     Page& page = at(station);
     const auto found = std::ranges::find_if(page.asked, closed_for(reply, open));
-    Asked taken = std::move(*found);
+    BookEntry taken = std::move(*found);
     page.asked.erase(found);
     return taken;
 }
 
 bool OutstandingRequests::take_first_of_two(std::uint8_t station, ByteView reply, TimePoint open) {
-    PoolVector<Asked>& all = at(station).asked;
-    const auto was_answered_so = [&](const Asked& first) {
-        const auto second = std::ranges::find_if(all, [&](const Asked& one) {
+    PoolVector<BookEntry>& all = at(station).asked;
+    const auto was_answered_so = [&](const BookEntry& first) {
+        const auto second = std::ranges::find_if(all, [&](const BookEntry& one) {
             return one.state == State::answered && first.sent < one.replied && one.pdu == first.pdu;
         });
         return second != all.end() && std::ranges::equal(second->reply, reply);
     };
     const auto is_closed = closed_for(reply, open);
     const auto found = std::ranges::find_if(
-        all, [&](const Asked& one) { return is_closed(one) && was_answered_so(one); });
+        all, [&](const BookEntry& one) { return is_closed(one) && was_answered_so(one); });
     if (found == all.end()) return false;
     all.erase(found);
     return true;
@@ -444,7 +448,7 @@ void OutstandingRequests::settle(std::uint8_t station) {
 
 void OutstandingRequests::forget_foreign() {
     for (Page& page : pages_)
-        std::erase_if(page.asked, [](const Asked& one) { return one.state == State::foreign; });
+        std::erase_if(page.asked, [](const BookEntry& one) { return one.state == State::foreign; });
 }
 
 void OutstandingRequests::forget(std::uint8_t station) { at(station) = {}; }
@@ -459,10 +463,10 @@ OutstandingRequests::Page& OutstandingRequests::at(std::uint8_t station) {
     return pages_[station];
 }
 
-void OutstandingRequests::enter(Page& page, Asked one, std::size_t most) {
+void OutstandingRequests::enter(Page& page, BookEntry one, std::size_t most) {
     std::size_t count = 0;
-    Asked* oldest = nullptr;
-    for (Asked& other : page.asked) {
+    BookEntry* oldest = nullptr;
+    for (BookEntry& other : page.asked) {
         if (other.state != one.state) continue;
         ++count;
         if (oldest == nullptr || other.since() < oldest->since()) oldest = &other;
@@ -482,7 +486,7 @@ void OutstandingRequests::take_first(Page& page) {
 }
 
 void OutstandingRequests::close(Page& page, State state, TimePoint since, TimePoint before) {
-    for (Asked& one : page.asked) {
+    for (BookEntry& one : page.asked) {
         if (!is_outstanding(one) || one.sent < since || one.sent >= before) continue;
         if (one.announced && state == State::passed) continue;
         one.state = state;

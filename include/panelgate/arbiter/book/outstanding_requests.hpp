@@ -13,7 +13,7 @@
 namespace panelgate::arbiter {
 
 /// A request that was asked on the line, by whomever, and what became of it.
-struct Asked {
+struct BookEntry {
     enum class State : std::uint8_t {
         outstanding,    ///< its attempt has ended without its reply, which may still come
         passed,         ///< ... but a later one was answered, and stations serve in order
@@ -92,8 +92,8 @@ class OutstandingRequests {
     std::optional<Duration> behind_broadcast(TimePoint now, ByteView reply) const;
     /// The first outstanding request that this reply may answer and that left later than `open`,
     /// else the last that it may answer; null: it answers none.
-    const Asked* first(std::uint8_t station, ByteView reply,
-                       TimePoint open = TimePoint::min()) const;
+    const BookEntry* first(std::uint8_t station, ByteView reply,
+                           TimePoint open = TimePoint::min()) const;
     /// True if a request of another function is outstanding.
     bool has_other_function(std::uint8_t station, std::uint8_t function) const;
     /// When this reply last came before `before`, of those that are recent at `now`; {}: it did
@@ -101,7 +101,7 @@ class OutstandingRequests {
     TimePoint given(std::uint8_t station, TimePoint now, ByteView reply,
                     TimePoint before = TimePoint::max()) const;
     /// The last reply that came before `before`; null: none is known.
-    const Asked* last_reply(std::uint8_t station, TimePoint before = TimePoint::max()) const;
+    const BookEntry* last_reply(std::uint8_t station, TimePoint before = TimePoint::max()) const;
     /// Returns a recent reply that occurs again, as a good frame, inside damaged bytes; or nullptr.
     const Bytes* given_in(TimePoint now, std::uint8_t station, ByteView bytes,
                           modbus::CrcOrder order) const;
@@ -191,7 +191,7 @@ class OutstandingRequests {
     void take(std::uint8_t station, ByteView reply);
     /// Takes out the first that has passed or lapsed, left later than `open` and may be answered by
     /// this; there must be one.
-    Asked take_closed(std::uint8_t station, ByteView reply, TimePoint open);
+    BookEntry take_closed(std::uint8_t station, ByteView reply, TimePoint open);
     /// True if a request that left later than `open` has passed or lapsed, and the very same was
     /// then answered with this: it may be the first one's reply. Takes that out.
     bool take_first_of_two(std::uint8_t station, ByteView reply, TimePoint open);
@@ -207,17 +207,17 @@ class OutstandingRequests {
 
   private:
     struct Page {
-        PoolVector<Asked> asked;
+        PoolVector<BookEntry> asked;
         std::size_t outstanding = 0;
     };
     const Page& of(std::uint8_t station) const;
     Page& at(std::uint8_t station);
     /// Enters one; of its state the page keeps `most`, and forgets the oldest beyond that.
-    static void enter(Page& page, Asked one, std::size_t most);
+    static void enter(Page& page, BookEntry one, std::size_t most);
     static void take_first(Page& page);
-    static Asked* oldest_reply(Page& page, std::uint8_t function);
+    static BookEntry* oldest_reply(Page& page, std::uint8_t function);
     /// The outstanding ones that left before `before`, and not before `since`, are so now.
-    static void close(Page& page, Asked::State state, TimePoint since, TimePoint before);
+    static void close(Page& page, BookEntry::State state, TimePoint since, TimePoint before);
 
     std::size_t most_;
     PoolVector<Page> pages_;  ///< by station; 0: broadcasts

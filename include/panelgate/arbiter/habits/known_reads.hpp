@@ -12,7 +12,7 @@
 namespace panelgate::arbiter {
 
 /// The reads that a station is known to answer: one of them tells whether it is there. Pure.
-class KnownReads {
+class LearnedReads {
   public:
     void on_answered(const modbus::Request& read, const modbus::Span& span) {
         std::uint32_t& longest = longest_[static_cast<std::size_t>(span.table)];
