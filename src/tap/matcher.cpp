@@ -146,7 +146,9 @@ void Matcher::on_echo(const Piece& piece) {
 void Matcher::on_damaged(const Piece& piece) {
     if (open_) {
         open_->damaged += piece.bytes.size();
-        open_->came_damaged = is_damaged_reply(open_->request, piece.bytes);
+        // On a line that returns requests (T6) the bytes may be the request.
+        open_->came_damaged =
+            piece.begin >= may_echo_until_ && is_damaged_reply(open_->request, piece.bytes);
     } else {
         damage_ = true;
     }
