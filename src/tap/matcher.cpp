@@ -241,16 +241,18 @@ bool Matcher::may_answer_older(const Open& open, const Piece& piece) const {
 /// window, because one reply of the two may still come.
 void Matcher::remember(const Transaction& made) {
     arbiter::Asked request = asked(made);
+    const bool announced = announces_reply(made.reply);
     const auto* const oldest = outstanding_.answered_by(made.ended, made.station, made.reply);
     if (oldest != nullptr) request.until = oldest->until;
     if (!made.doubtful) {
         outstanding_.on_reply(made.ended, made.station, request, made.reply);
     } else {
-        if (!outstanding_.on_late(made.ended, made.station, made.reply))
-            outstanding_.on_repeated(made.ended, made.station, made.reply);
+        const auto late = outstanding_.on_late(made.ended, made.station, made.reply);
+        if (!late) outstanding_.on_repeated(made.ended, made.station, made.reply);
+        if (late && announced) expect_announced(made.station, *late, made.ended);
         outstanding_.add(made.station, request);
     }
-    if (!announces_reply(made.reply)) return;
+    if (!announced) return;
     request.sent = made.sampled;  // of equal requests the first may be announced
     expect_announced(made.station, std::move(request), made.ended);
 }

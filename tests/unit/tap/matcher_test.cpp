@@ -220,6 +220,8 @@ constexpr Row kThreats[] = {
     // T10: the reply may follow these exceptions.
     {"10 31:read, 3 31:8305, 10 31:other, 3 31:value", "31: read -> 8305; 31: other -> value ?"},
     {"10 31:read, 3 31:8302, 10 31:other, 3 31:value", "31: read -> 8302; 31: other -> value"},
+    {"10 31:read, 200 31:other, 3 31:8305, 10 31:other, 3 31:value",
+     "31: read -> silent; 31: other -> 8305 ?; 31: other -> value ?"},
     // T11: the reply may be to a broadcast; not another place, later, or behind another reply.
     {"10 9:read, 3 9:value, 9 0:100064000102000a, 280 9:100064000102000b, 8 9:1000640001",
      "9: read -> value; 0: 100064000102000a -> unasked; 9: 100064000102000b -> 1000640001 ?"},
