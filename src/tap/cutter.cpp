@@ -14,11 +14,11 @@ namespace {
 
 using modbus::ReplyLength;
 
-/// The longest request that a panel accepts: 0F with 255 data bytes.
+/// Bytes of the longest request that a panel accepts: 0F with 255 data bytes.
 constexpr std::size_t kLongest = modbus::kMaxLongRequestPdu + modbus::kAduOverhead;
 
-/// For a function without a length rule. The more sizes are tried, the more often a CRC fits by
-/// chance.
+/// Bytes of the longest frame of a function without a length rule. The more sizes are tried, the
+/// more often a CRC fits by chance.
 constexpr std::size_t kLongestUnknown = 128;
 
 /// True if the reply repeats the request's bytes after the function.
@@ -33,7 +33,7 @@ bool begins_like(ByteView frame, ByteView pdu) {
                       pdu.begin());
 }
 
-/// Length of the answer that begins here; empty if it cannot be one.
+/// Length of the answer at the front of `frame`; empty if these bytes begin no answer.
 std::optional<ReplyLength> answer_length(const PendingRequest& pending, ByteView frame) {
     if (frame[0] != pending.station || modbus::plain_function(frame[1]) != pending.pdu[0])
         return std::nullopt;
@@ -47,7 +47,8 @@ std::optional<ReplyLength> answer_length(const PendingRequest& pending, ByteView
     return ReplyLength{ReplyLength::Kind::known, *expected};
 }
 
-/// True if a master could send this. Checked only after damage, where a CRC may fit by chance.
+/// True if a master could send this request. Checked only after damage (T3), where a CRC may fit by
+/// chance.
 bool makes_sense(std::uint8_t station, ByteView pdu) {
     if (!modbus::is_known(pdu[0])) return false;
     if (station == 0 && !modbus::is_broadcastable(pdu[0])) return false;
@@ -97,7 +98,7 @@ std::optional<Piece> Cutter::next(const PendingRequest* pending, bool silence) {
     return std::nullopt;
 }
 
-/// With `silence` the result is never open.
+/// What begins at `start`. With `silence` the result is never open.
 Cutter::Verdict Cutter::judge(std::size_t start, const PendingRequest* pending,
                               bool silence) const {
     const ByteView frame = ByteView(heard_).subspan(start);
@@ -128,7 +129,7 @@ Cutter::Verdict Cutter::judge(std::size_t start, const PendingRequest* pending,
     return open ? waits : Verdict{};
 }
 
-/// Size of the good frame; 0: none. `open`: it may become one.
+/// Size of the good frame; 0: there is no good frame. `open`: more bytes may complete a frame.
 std::size_t Cutter::size_of(std::size_t start, const ReplyLength& length, bool silence,
                             bool& open) const {
     const ByteView frame = ByteView(heard_).subspan(start);
@@ -149,8 +150,8 @@ std::size_t Cutter::size_of(std::size_t start, const ReplyLength& length, bool s
     return modbus::crc_ok(frame.first(length.length)) ? length.length : 0;
 }
 
-/// Size of a frame of unknown length: it ends at a gap, at the beginning of a certain other frame,
-/// or at a silence. Only at the front, where a frame is due.
+/// Size of a frame of unknown length, which ends at a gap, at the beginning of a frame of known
+/// length, or at a silence. Only at the front, where a frame is due.
 std::size_t Cutter::size_by_gap(bool silence, bool& open) const {
     const ByteView all(heard_);
     const std::vector<std::size_t> ends = good_ends(0);
@@ -171,7 +172,7 @@ std::size_t Cutter::size_by_gap(bool silence, bool& open) const {
     return ends[end];
 }
 
-/// Possible ends of a good frame that begins here.
+/// Possible ends of a good frame that begins at `start`.
 std::vector<std::size_t> Cutter::good_ends(std::size_t start) const {
     const ByteView frame = ByteView(heard_).subspan(start);
     std::vector<std::size_t> ends;
@@ -183,7 +184,8 @@ std::vector<std::size_t> Cutter::good_ends(std::size_t start) const {
     return ends;
 }
 
-/// True if a frame of known length begins here, or one that is followed by such a frame.
+/// True if a frame of known length begins at `start`, or, `through_another`, behind a frame of any
+/// length at `start`.
 bool Cutter::goes_on_well(std::size_t start, bool through_another) const {
     const ByteView frame = ByteView(heard_).subspan(start);
     if (frame.size() < modbus::kMinAdu || frame[0] > modbus::kMaxStation) return false;
@@ -198,12 +200,12 @@ bool Cutter::goes_on_well(std::size_t start, bool through_another) const {
 }
 
 bool Cutter::is_gap_behind(std::size_t place) const {
-    constexpr int kCharacters = 3;  // t1.5 (serial line V1.02, 2.5.1.1), and the next one itself
+    constexpr int kCharacters = 3;  // t1.5 (serial line V1.02, 2.5.1.1), and the next character
     return place + 1 < times_.size() &&
            times_[place + 1] - times_[place] >= kCharacters * character_;
 }
 
-/// True if this good frame has the form of a request, too.
+/// True if this good frame has the form of a request as well.
 bool Cutter::is_request(std::size_t start, std::size_t size) const {
     const ByteView frame = ByteView(heard_).subspan(start, size);
     if (is_exception(frame)) return false;

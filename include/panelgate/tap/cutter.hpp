@@ -23,7 +23,7 @@ struct Piece {
     enum class Kind : std::uint8_t {
         request,
         answer,  ///< answers the pending request
-        reply,   ///< has a reply's form only, and does not answer the pending request
+        reply,   ///< has the form of a reply only, and does not answer the pending request
         damaged
     };
     Kind kind = Kind::damaged;
@@ -33,19 +33,20 @@ struct Piece {
     TimePoint end;
 };
 
-/// Cuts what both sides of a line send into frames. Function and header give the length (of a
-/// request, of a reply, and of the answer to the pending request), the CRC decides; no silence is
-/// needed between frames, and one inside does no harm unless it is a hole. A possible start that
-/// waits for bytes delays the later ones. After damage a frame needs a sensible content besides a
-/// matching CRC. Buffers less than a kilobyte; work is linear in the input.
+/// Cuts the bytes of both sides of a line into frames. Function and header give the length (of a
+/// request, of a reply, and of the answer to the pending request), the CRC decides. No silence is
+/// needed between frames, and a silence inside a frame does no harm up to Settings::hole (T4). A
+/// possible start that waits for bytes delays the later frames. After damage (T3) a frame needs a
+/// sensible content besides a matching CRC. Buffers less than a kilobyte; work is linear in the
+/// input.
 class Cutter {
   public:
     explicit Cutter(const Settings& settings);
 
-    /// Adds bytes received by `now`, the last of them just then.
+    /// Adds bytes; the last byte was received at `now`.
     void hear(TimePoint now, ByteView bytes);
-    /// Returns the next piece, while `pending` (or no request) is open. `silence`: incomplete
-    /// frames will not continue.
+    /// Returns the next piece. `pending`: the request that waits for its reply, or null. `silence`:
+    /// incomplete frames will not continue.
     std::optional<Piece> next(const PendingRequest* pending, bool silence);
 
     bool empty() const { return heard_.empty(); }
@@ -72,10 +73,10 @@ class Cutter {
     Duration character_;
     std::size_t damaged_run_;
     Bytes heard_;
-    std::vector<TimePoint> times_;  ///< when each byte had come, by the line's rate
+    std::vector<TimePoint> times_;  ///< end of each byte, at the latest, by the line's rate
     TimePoint last_{};
     std::size_t looked_ = 0;  ///< no frame begins before this index
-    bool aligned_ = true;     ///< the front is the beginning of a frame, if there is one
+    bool aligned_ = true;     ///< a frame or a silence precedes the front: a frame is due
 };
 
 }  // namespace panelgate::tap

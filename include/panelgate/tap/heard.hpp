@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <variant>
 
 #include "panelgate/base/bytes.hpp"
@@ -15,7 +14,7 @@ namespace panelgate::tap {
 struct Frame {
     TimePoint at;  ///< last byte in
     FrameKind kind = FrameKind::damaged;
-    /// The station; for damaged bytes the one asked last, else the first byte.
+    /// The station; of damaged bytes the station of the open request, else the first byte.
     std::uint8_t station = 0;
     Bytes bytes;  ///< address to CRC
 };
@@ -26,7 +25,7 @@ enum class End : std::uint8_t {
     silent,
     damaged,  ///< bytes came, but no good reply
     unasked,  ///< no reply is expected: a broadcast, or 08/0004
-    wrong,    ///< good frames of the station came that do not answer it
+    wrong,    ///< good frames of the station came that do not answer the request
 };
 
 /// A request and its outcome.
@@ -35,17 +34,17 @@ struct Transaction {
     Bytes request;  ///< PDU
     Bytes reply;    ///< PDU; empty unless answered
     End end = End::silent;
-    /// The reply may belong to another request, or the request may be an echo or a duplicate: do
-    /// not use its values.
+    /// The reply may belong to another request, or the request may be a late reply: the values of
+    /// this transaction are not to be used.
     bool doubtful = false;
     TimePoint asked;    ///< first bit of the request
-    TimePoint sent;     ///< its last bit
+    TimePoint sent;     ///< last bit of the request
     TimePoint replied;  ///< first bit of the reply
-    TimePoint ended;    ///< its last bit; without a reply, when that was known
-    /// The values are not older than this: the first of the equal requests that the reply may
-    /// answer.
+    TimePoint ended;    ///< last bit of the reply; without a reply, when the request was closed
+    /// The values are not older than this: when the first of the equal requests began that the
+    /// reply may answer.
     TimePoint sampled;
-    std::size_t damaged = 0;  ///< bytes that came and were no good frame
+    std::size_t damaged = 0;  ///< bytes behind the request that were no good frame
 };
 
 using Event = std::variant<Frame, Transaction>;

@@ -1,5 +1,5 @@
-// A line in virtual time: a master, panels with faults, and a tap that misses some frames. Each
-// reply is known with its request, which the tap has to find out.
+// A line in virtual time: a master, panels with the faults of docs/how/threats.md, and a tap. The
+// world knows the request of each reply, which the tap has to find out.
 #pragma once
 
 #include <algorithm>
@@ -20,17 +20,20 @@
 
 namespace panelgate::tap::test {
 
-/// Chances per request, and what the tap hears of it.
+/// Chances per request, each with its threat.
 struct Manner {
-    double silent = 0;    ///< the panel does not answer
-    double late = 0;      ///< ... or answers after its master has given up
-    double damaged = 0;   ///< on the wire, for all
-    double doubled = 0;   ///< the reply comes twice
-    double slow = 0;      ///< within its master's timeout, but slowly
-    double noise = 0;     ///< in front of the reply
-    double misheard = 0;  ///< a frame that only the tap hears damaged
-    double unheard = 0;   ///< a frame that the tap does not hear at all
-    Duration latency{};   ///< interval at which the tap's adapter delivers bytes
+    double silent = 0;     ///< T1: the panel does not answer
+    double late = 0;       ///< T2: the panel answers after the master has given up
+    double damaged = 0;    ///< T3: on the wire, for all
+    double noise = 0;      ///< T3: two bytes in front of the reply
+    double misheard = 0;   ///< T3: a frame that only the tap hears damaged
+    double holes = 0;      ///< T4: a pause inside the reply
+    double announced = 0;  ///< T10: an exception 05, and the reply later
+    double broadcast = 0;  ///< T11: a panel answers a broadcast
+    double doubled = 0;    ///< T12: the reply comes once more directly behind itself
+    double slow = 0;       ///< T14: the panel answers slowly, but before the master gives up
+    bool echo = false;     ///< T6: a repeater returns each request
+    Duration latency{};    ///< T4: interval at which the tap's adapter delivers bytes
     Duration give_up = 200ms;
     unsigned seed = 1;
 };
@@ -39,7 +42,7 @@ struct Asked {
     std::uint8_t station = 0;
     Bytes pdu;
     TimePoint begin;
-    std::set<Bytes> replies{};  ///< PDUs that its panel has really sent for it
+    std::set<Bytes> replies{};  ///< PDUs that the panel has sent for it, damaged or not
 };
 
 class World {
@@ -79,7 +82,8 @@ class World {
         Bytes bytes;
         std::size_t to = 0;  ///< the request that it answers
         bool good = true;
-        TimePoint end() const { return begin + wire_time(kSerial, bytes.size()); }
+        Duration hole{};  ///< a pause behind the third byte
+        TimePoint end() const { return begin + wire_time(kSerial, bytes.size()) + hole; }
     };
 
     bool chance(double p) { return std::uniform_real_distribution<>(0, 1)(random_) < p; }
@@ -144,9 +148,15 @@ class World {
         if (chance(manner_.damaged / 4)) request.good = false;
         collide(request);
         const bool taken = request.good;
-        const TimePoint end = request.end();
-        put(std::move(request));
+        TimePoint end = request.end();
+        put(request);
+        if (manner_.echo) {
+            request.begin = end + between(0ms, 2ms);
+            end = request.end();
+            put(std::move(request));
+        }
         if (taken && station != 0) let_answer(which, end);
+        if (taken && station == 0) let_answer_broadcast(which, end);
         const TimePoint until = end + (station == 0 ? Duration(20ms) : manner_.give_up);
         const auto done = station == 0 ? std::nullopt : listen(which, until);
         now_ = done ? *done + between(2ms, chance(0.05) ? 400ms : 12ms) : until + between(1ms, 5ms);
@@ -160,7 +170,13 @@ class World {
         Duration think = between(2ms, 6ms);
         if (chance(manner_.slow)) think = between(6ms, manner_.give_up / 2);
         if (chance(manner_.late)) think = manner_.give_up + between(5ms, manner_.give_up);
+        if (chance(manner_.announced)) {
+            const Bytes wait{static_cast<std::uint8_t>(asked.pdu[0] | 0x80), 5};
+            coming_.push_back({heard + think, modbus::encode_adu(asked.station, wait), which});
+            think += between(20ms, manner_.give_up);
+        }
         Speech reply{heard + think, modbus::encode_adu(asked.station, reply_to(asked.pdu)), which};
+        if (chance(manner_.holes)) reply.hole = between(2ms, 100ms);
         if (chance(manner_.damaged)) reply.good = false;
         busy_[asked.station] = reply.end();
         if (chance(manner_.noise))
@@ -174,7 +190,18 @@ class World {
         std::ranges::sort(coming_, {}, &Speech::begin);
     }
 
-    /// When the master has its answer, or what it takes for it.
+    void let_answer_broadcast(std::size_t which, TimePoint heard) {
+        const Bytes reply = modbus::normal_write_reply(asked_[which].pdu);
+        for (std::uint8_t station = 1; station <= 4; ++station) {
+            if (!chance(manner_.broadcast)) continue;
+            const TimePoint begin = heard + between(2ms, 100ms);
+            coming_.push_back({begin, modbus::encode_adu(station, reply), which});
+            busy_[station] = coming_.back().end();
+        }
+        std::ranges::sort(coming_, {}, &Speech::begin);
+    }
+
+    /// When the master has a frame that it takes for the answer.
     std::optional<TimePoint> listen(std::size_t which, TimePoint until) {
         const Asked& asked = asked_[which];
         while (!coming_.empty() && coming_.front().begin < until) {
@@ -189,7 +216,7 @@ class World {
             const Bytes pdu(speech.bytes.begin() + 1, speech.bytes.end() - 2);
             const bool fits =
                 speech.good && speech.bytes[0] == asked.station && modbus::answers(asked.pdu, pdu);
-            if (speech.good) asked_[speech.to].replies.insert(pdu);
+            asked_[speech.to].replies.insert(pdu);  // a reply cut in its CRC is still true
             put(std::move(speech));
             if (fits && asked.station != 0) return end;
         }
@@ -208,7 +235,6 @@ class World {
 
     void put(Speech speech) {
         said_until_ = std::max(said_until_, speech.end());
-        const bool unheard = chance(manner_.unheard);
         const bool misheard = chance(manner_.misheard);
         if (!speech.good || misheard) {
             const std::size_t first = number(static_cast<unsigned>(speech.bytes.size()));
@@ -216,11 +242,12 @@ class World {
                  ++i)
                 speech.bytes[i] = static_cast<std::uint8_t>(speech.bytes[i] ^ (1 + number(255)));
             if (chance(0.3)) speech.bytes.resize(first);
+            if (modbus::crc_ok(speech.bytes)) speech.bytes.back() ^= 1;
         }
         TimePoint at = speech.begin;
-        for (const std::uint8_t byte : speech.bytes) {
-            at += character_time(kSerial);
-            if (!unheard) heard_.emplace(at, byte);
+        for (std::size_t i = 0; i < speech.bytes.size(); ++i) {
+            at += character_time(kSerial) + (i == 3 ? speech.hole : Duration{});
+            heard_.emplace(at, speech.bytes[i]);
         }
     }
 

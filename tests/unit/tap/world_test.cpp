@@ -12,6 +12,7 @@
 #include <string>
 #include <variant>
 
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/tap/matcher.hpp"
 
 namespace panelgate::tap::test::world_test {
@@ -19,7 +20,7 @@ namespace {
 
 struct Score {
     std::size_t asked = 0;
-    std::size_t answerable = 0;  ///< to which the panel has sent a reply that the master took
+    std::size_t answerable = 0;  ///< to which the panel has sent a reply, damaged or not
     std::size_t right = 0;
     std::size_t doubtful = 0;
     std::size_t wrong = 0;
@@ -55,9 +56,12 @@ class Judge {
             return;
         }
         const Asked* asked = find(made);
+        if (made.end == End::unasked) return;  // a broadcast has no values
         if (asked == nullptr) return complain(score.invented, "invented", made);
         if (made.end != End::answered) return;
-        if (!asked->replies.contains(made.reply) && !answers_same(made))
+        // A function without a length rule has no values, and such frames may be lost when joined.
+        const bool has_values = modbus::is_known(made.request[0]);
+        if (has_values && !asked->replies.contains(made.reply) && !answers_same(made))
             return complain(score.wrong, "wrong", made);
         ++score.right;
     }
@@ -131,33 +135,42 @@ TEST(TapWorld, EachPairIsFoundOnAHealthyLine) {
     for (const Duration latency : {0ms, 4ms, 16ms}) {
         const Score score = play({.latency = latency}, 20'000);
         EXPECT_EQ(score.wrong + score.invented, 0u) << score;
-        // A write behind a broadcast to the same place, until one has had no answer.
-        const std::size_t unlearned = 40;
-        EXPECT_LE(score.doubtful, unlearned) << score;
-        // Frames of no known length, joined: only a silence or what follows can end them.
+        // T11: a write behind a broadcast to the same place.
+        EXPECT_LE(score.doubtful * 80, score.asked) << score;
+        // Frames of no known length, joined: only a silence or the next frame can end them.
         const std::size_t least =
-            latency == 0ms ? score.answerable - 2 : score.answerable * 97 / 100;
-        EXPECT_GE(score.right + unlearned, least) << score;
+            latency == 0ms ? score.answerable - 2 : score.answerable * 96 / 100;
+        EXPECT_GE(score.right + score.doubtful, least) << score;
     }
 }
 
+TEST(TapWorld, EachReadIsFoundOnALineThatReturnsRequests) {
+    const Score score = play({.echo = true}, 20'000);
+    EXPECT_EQ(score.wrong + score.invented, 0u) << score;
+    EXPECT_GT(score.right * 100, score.answerable * 60) << score;
+}
+
 TEST(TapWorld, NoPairIsWrongAmongPanelsWithFaults) {
-    Manner manner{.silent = 0.02, .late = 0.02, .damaged = 0.02, .doubled = 0.01, .slow = 0.02};
-    manner.noise = 0.01;
+    Manner manner{.silent = 0.02, .late = 0.02, .damaged = 0.02, .noise = 0.01};
+    manner.holes = manner.doubled = 0.01;
+    manner.announced = 0.002;
+    manner.broadcast = 0.05;
+    manner.slow = 0.02;
     for (const Duration latency : {0ms, 16ms}) {
         manner.latency = latency;
         const Score score = play(manner, turns());
         EXPECT_EQ(score.wrong, 0u) << score;
         EXPECT_LT(score.invented * 2000, score.asked) << score;
         EXPECT_LT(score.doubtful * 20, score.asked) << score;
-        EXPECT_GT(score.right * 20, score.answerable * 18) << score;
+        EXPECT_GT(score.right * 20, score.answerable * 17) << score;
         std::cout << score << '\n';
     }
 }
 
-/// A frame that the tap does not hear at all it cannot miss: then an echo is taken for the request.
+/// A request that only the tap has not heard is no threat of the list: the late reply to such a
+/// request is taken for the reply to an equal request.
 TEST(TapWorld, HardlyAPairIsWrongForATapThatMishears) {
-    Manner manner{.silent = 0.01, .late = 0.01, .misheard = 0.02, .unheard = 0.002};
+    Manner manner{.silent = 0.01, .late = 0.01, .misheard = 0.02};
     for (const unsigned seed : {1u, 2u}) {
         manner.seed = seed;
         const Score score = play(manner, turns());

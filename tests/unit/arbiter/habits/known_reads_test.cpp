@@ -15,10 +15,10 @@ Span holding(std::uint32_t first, std::uint32_t count) {
     return {Table::holding_registers, first, count};
 }
 
-void answer(KnownReads& reads, const Span& span) { reads.on_answered(Request::read(span), span); }
+void answer(LearnedReads& reads, const Span& span) { reads.on_answered(Request::read(span), span); }
 
-TEST(KnownReads, BeforeAnyAnswerTheProbeIsWhatAClientWantedLast) {
-    KnownReads reads;
+TEST(LearnedReads, BeforeAnyAnswerTheProbeIsWhatAClientWantedLast) {
+    LearnedReads reads;
     EXPECT_EQ(reads.probe().pdu(), Request::read(holding(0, 1)).pdu());
     reads.on_wanted(Request::read(holding(7, 4)));
     EXPECT_FALSE(reads.any());
@@ -26,8 +26,8 @@ TEST(KnownReads, BeforeAnyAnswerTheProbeIsWhatAClientWantedLast) {
     EXPECT_EQ(reads.largest(), holding(7, 4));
 }
 
-TEST(KnownReads, TheProbeIsTheCheapestThatWasAnsweredAndItsPartsComeOfTheLargest) {
-    KnownReads reads;
+TEST(LearnedReads, TheProbeIsTheCheapestThatWasAnsweredAndItsPartsComeOfTheLargest) {
+    LearnedReads reads;
     answer(reads, holding(100, 10));
     answer(reads, holding(300, 2));
     answer(reads, holding(200, 60));
