@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace panelgate::scenario {
+namespace panelgate::sound {
 namespace {
 
 unsigned word(const Bytes& pdu, std::size_t at) { return pdu[at] * 256u + pdu[at + 1]; }
@@ -30,25 +30,25 @@ std::vector<Bytes> draw_questions(Random& random, std::size_t client) {
 
 /// libmodbus's server waits for the reply of a panel that it hears being asked, and takes whatever
 /// begins within 500 ms for that reply: a request to the server itself is lost.
-bool PanelOfPlant::hears_request(const Bytes& adu, TimePoint start, TimePoint end) {
+bool Panel::hears_request(const Bytes& adu, TimePoint start, TimePoint end) {
     constexpr Duration kPatience = 500ms;
-    if (plan_.kind == Sound::libmodbus) {
+    if (plan_.kind == Kind::libmodbus) {
         const bool taken_for_reply = start < expects_until_;
         expects_until_ = {};
         if (taken_for_reply) return false;
         if (adu[0] != plan_.id) expects_until_ = end + kPatience;
     }
-    if (adu[0] != plan_.id || plan_.kind == Sound::dead || thinking_) return false;
+    if (adu[0] != plan_.id || plan_.kind == Kind::dead || thinking_) return false;
     if (start < replied_ + plan_.deaf) return false;
     thinking_ = true;
     return true;
 }
 
-void PanelOfPlant::hears_reply(TimePoint start) {
+void Panel::hears_reply(TimePoint start) {
     if (start < expects_until_) expects_until_ = {};
 }
 
-Bytes PanelOfPlant::serve(const Bytes& pdu) {
+Bytes Panel::serve(const Bytes& pdu) {
     Served next;
     if (!past_.empty()) next.memory = past_.back().memory;
     if (is_write(pdu)) {
@@ -59,15 +59,15 @@ Bytes PanelOfPlant::serve(const Bytes& pdu) {
     return reply_at(pdu, past_.size() - 1);
 }
 
-void PanelOfPlant::store(const Bytes& pdu, Memory& memory) const {
+void Panel::store(const Bytes& pdu, Memory& memory) const {
     const unsigned count = pdu[0] == 16 ? word(pdu, 3) : 1;
     for (unsigned i = 0; i < count; ++i)
         memory.at(word(pdu, 1) + i - kMemory) =
             static_cast<std::uint16_t>(word(pdu, pdu[0] == 16 ? 6 + 2 * i : 3));
-    if (plan_.kind == Sound::resetting) memory[kCommand - kMemory] = 0;
+    if (plan_.kind == Kind::resetting) memory[kCommand - kMemory] = 0;
 }
 
-bool PanelOfPlant::has_said(const Bytes& pdu, const Bytes& reply, std::size_t since) const {
+bool Panel::has_said(const Bytes& pdu, const Bytes& reply, std::size_t since) const {
     for (std::size_t turn = since; turn < past_.size(); ++turn) {
         if (is_write(pdu) && past_[turn].write != pdu) continue;
         if (reply_at(pdu, turn) == reply) return true;
@@ -75,12 +75,12 @@ bool PanelOfPlant::has_said(const Bytes& pdu, const Bytes& reply, std::size_t si
     return false;
 }
 
-Bytes PanelOfPlant::reply_at(const Bytes& pdu, std::size_t turn) const {
+Bytes Panel::reply_at(const Bytes& pdu, std::size_t turn) const {
     if (is_write(pdu)) return {pdu.begin(), pdu.begin() + 5};
     const unsigned from = word(pdu, 1);
     const unsigned count = word(pdu, 3);
     const bool refused = from + count > kRefused && from < kMemory;
-    if (plan_.kind == Sound::refusing && refused) return Writer().u8(pdu[0] | 0x80u).u8(2).take();
+    if (plan_.kind == Kind::refusing && refused) return Writer().u8(pdu[0] | 0x80u).u8(2).take();
     Writer out;
     out.u8(pdu[0]);
     if (pdu[0] <= 2) {
@@ -97,12 +97,12 @@ Bytes PanelOfPlant::reply_at(const Bytes& pdu, std::size_t turn) const {
     return out.take();
 }
 
-std::uint16_t PanelOfPlant::value(unsigned address, std::size_t turn) const {
+std::uint16_t Panel::value(unsigned address, std::size_t turn) const {
     if (address >= kMemory && address < kMemory + kCells)
         return past_[turn].memory[address - kMemory];
-    if (plan_.values == Sound::equal) return 0;
-    const std::size_t moved = plan_.values == Sound::moving ? turn * 11 : 0;
+    if (plan_.values == Kind::equal) return 0;
+    const std::size_t moved = plan_.values == Kind::moving ? turn * 11 : 0;
     return static_cast<std::uint16_t>(address * 31 + plan_.id * 257u + 7 + moved);
 }
 
-}  // namespace panelgate::scenario
+}  // namespace panelgate::sound

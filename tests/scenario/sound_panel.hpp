@@ -8,7 +8,7 @@
 #include "random.hpp"
 #include "sound_plant.hpp"
 
-namespace panelgate::scenario {
+namespace panelgate::sound {
 
 inline constexpr std::uint16_t kRefused = 48;  ///< a refusing panel refuses reads from here on
 inline constexpr std::uint16_t kMemory = 100;  ///< the first register that clients write
@@ -20,13 +20,12 @@ inline constexpr std::uint16_t kCommand = kMemory + kCells - 1;  ///< of a reset
 std::vector<Bytes> draw_questions(Random& random, std::size_t client);
 
 /// A panel of a sound plant: the requests that the panel hears, and its replies.
-class PanelOfPlant {
+class Panel {
   public:
-    PanelOfPlant(const SoundPanel& plan, std::uint64_t seed)
-        : plan_(plan), random_(seed * 100 + plan.id) {}
+    Panel(const PanelPlan& plan, std::uint64_t seed) : plan_(plan), random_(seed * 100 + plan.id) {}
 
-    const SoundPanel& plan() const { return plan_; }
-    Sound kind() const { return plan_.kind; }
+    const PanelPlan& plan() const { return plan_; }
+    Kind kind() const { return plan_.kind; }
     Duration think() { return random_.between(plan_.least_think, plan_.most_think); }
 
     /// A request has come whole. True if the panel answers it.
@@ -59,7 +58,7 @@ class PanelOfPlant {
     std::uint16_t value(unsigned address, std::size_t turn) const;
     void store(const Bytes& pdu, Memory& memory) const;
 
-    SoundPanel plan_;
+    PanelPlan plan_;
     Random random_;
     std::vector<Served> past_;
     bool thinking_ = false;
@@ -68,4 +67,4 @@ class PanelOfPlant {
     TimePoint expects_until_{};
 };
 
-}  // namespace panelgate::scenario
+}  // namespace panelgate::sound

@@ -9,12 +9,16 @@
 #include <algorithm>
 #include <iomanip>
 #include <iostream>
+#include <optional>
+#include <utility>
+#include <variant>
 #include <vector>
 
+#include "sound_plain.hpp"
 #include "sound_plant.hpp"
 #include "support/environment.hpp"
 
-namespace panelgate::scenario {
+namespace panelgate::sound {
 namespace {
 
 constexpr Duration kLength = 40s;
@@ -27,8 +31,8 @@ struct Worse {
 };
 
 struct Sums {
-    SoundTally panelgate{};
-    SoundTally plain{};
+    Tally panelgate{};
+    Tally plain{};
     std::vector<Worse> worse;
 };
 
@@ -37,23 +41,25 @@ std::uint64_t more_than(std::uint64_t one, std::uint64_t other) {
 }
 
 /// All kinds but dead panels.
-SoundCount sound_sum(const SoundTally& tally) {
-    SoundCount sum;
-    for (const Sound kind : kSounds)
-        if (kind != Sound::dead) sum.add(tally[static_cast<std::size_t>(kind)]);
+Count sound_sum(const Tally& tally) {
+    Count sum;
+    for (const Kind kind : kKinds)
+        if (kind != Kind::dead) sum.add(tally[static_cast<std::size_t>(kind)]);
     return sum;
 }
 
 void play_one(std::uint64_t seed, bool with_history, Sums& sums) {
-    const SoundPlant plant = draw_sound(seed);
-    const SoundOutcome gateway = play_sound(plant, SoundGateway::panelgate, kLength, with_history);
-    const SoundOutcome plain = play_sound(plant, SoundGateway::plain, kLength);
-    for (std::size_t i = 0; i < kSounds.size(); ++i) {
+    const Plant plant = draw(seed);
+    scenario::Subject panelgate(plant.settings);
+    PlainGateway other_gateway(plant.settings);
+    const Outcome gateway = play(plant, panelgate, kLength, with_history);
+    const Outcome plain = play(plant, other_gateway, kLength);
+    for (std::size_t i = 0; i < kKinds.size(); ++i) {
         sums.panelgate[i].add(gateway.tally[i]);
         sums.plain[i].add(plain.tally[i]);
     }
-    const SoundCount one = sound_sum(gateway.tally);
-    const SoundCount other = sound_sum(plain.tally);
+    const Count one = sound_sum(gateway.tally);
+    const Count other = sound_sum(plain.tally);
     const Worse worse{seed, more_than(one.requests - one.answered, other.requests - other.answered),
                       more_than(one.frames, one.alone)};
     if (worse.lost + worse.extra + one.wrong + one.offline > 0) sums.worse.push_back(worse);
@@ -63,9 +69,9 @@ void play_one(std::uint64_t seed, bool with_history, Sums& sums) {
 void print(const Sums& sums) {
     std::cout << "  kind        requests  answered     plain  frames/request  offline  wrong\n"
               << std::fixed;
-    for (const Sound kind : kSounds) {
-        const SoundCount& one = sums.panelgate[static_cast<std::size_t>(kind)];
-        const SoundCount& plain = sums.plain[static_cast<std::size_t>(kind)];
+    for (const Kind kind : kKinds) {
+        const Count& one = sums.panelgate[static_cast<std::size_t>(kind)];
+        const Count& plain = sums.plain[static_cast<std::size_t>(kind)];
         std::cout << "  " << std::left << std::setw(10) << label(kind) << std::right
                   << std::setw(10) << one.requests << std::setprecision(2) << std::setw(8)
                   << 100 * one.share() << " %" << std::setw(8) << 100 * plain.share() << " %"
@@ -87,8 +93,8 @@ void print_worst(std::vector<Worse> worse) {
 }
 
 /// `more_frames`: for each request. `fewer_answers`: as a share of the requests.
-void expect_sound(std::string_view what, const SoundCount& one, const SoundCount& plain,
-                  double more_frames, double fewer_answers) {
+void expect_sound(std::string_view what, const Count& one, const Count& plain, double more_frames,
+                  double fewer_answers) {
     EXPECT_LE(one.asked(), 1 + more_frames) << what << ": frames for each request";
     EXPECT_GE(one.share(), plain.share() - fewer_answers) << what << ": share answered";
     EXPECT_EQ(one.offline, 0u) << what << ": taken offline";
@@ -106,20 +112,49 @@ TEST(Sound, APlantWithoutAFaultIsAskedOnceAndAnsweredAsByAPlainGateway) {
     }
     print(sums);
     print_worst(sums.worse);
-    const SoundCount all = sound_sum(sums.panelgate);
-    const SoundCount plain = sound_sum(sums.plain);
+    const Count all = sound_sum(sums.panelgate);
+    const Count plain = sound_sum(sums.plain);
     EXPECT_GT(all.requests, 0u);
     // The plants are sound: a plain gateway has no trouble with them.
     EXPECT_GE(plain.share(), 0.999);
     expect_sound("plain gateway", plain, plain, 0, 0);
     expect_sound("all kinds", all, plain, 0.01, 0.002);
-    for (const Sound kind : kSounds) {
+    for (const Kind kind : kKinds) {
         const auto at = static_cast<std::size_t>(kind);
         // The panels of one kind have fewer requests: chance moves their figures further.
-        if (kind != Sound::dead)
+        if (kind != Kind::dead)
             expect_sound(label(kind), sums.panelgate[at], sums.plain[at], 0.02, 0.005);
     }
 }
 
+/// Changes each hundredth answer, and sends each hundredth frame twice.
+class BrokenGateway : public scenario::Subject {
+  public:
+    using Subject::Subject;
+    std::optional<arbiter::Action> poll_action(TimePoint now) override {
+        if (again_) return std::exchange(again_, std::nullopt);
+        std::optional<arbiter::Action> action = Subject::poll_action(now);
+        if (!action) return action;
+        if (auto* finish = std::get_if<arbiter::Finish>(&*action); finish && finish->pdu)
+            if (++finished_ % 100 == 0) finish->pdu->back() ^= 1;
+        if (std::holds_alternative<arbiter::Transmit>(*action) && ++sent_ % 100 == 0)
+            again_ = action;
+        return action;
+    }
+
+  private:
+    std::optional<arbiter::Action> again_;
+    unsigned finished_ = 0;
+    unsigned sent_ = 0;
+};
+
+TEST(Sound, AGatewayThatChangesAnswersAndSendsFramesTwiceIsFound) {
+    const Plant plant = draw(1);
+    BrokenGateway broken(plant.settings);
+    const Count count = sound_sum(play(plant, broken, kLength).tally);
+    EXPECT_GT(count.wrong, 0u);
+    EXPECT_GT(count.asked(), 1.009);
+}
+
 }  // namespace
-}  // namespace panelgate::scenario
+}  // namespace panelgate::sound
