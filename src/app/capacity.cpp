@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "panelgate/arbiter/habits/reply_times.hpp"
+#include "panelgate/arbiter/learned.hpp"
 #include "panelgate/base/text.hpp"
 #include "panelgate/plan/line_plan.hpp"
 #include "panelgate/yaml/map_reader.hpp"

@@ -17,9 +17,6 @@ namespace {
 
 constexpr const char* kName = "discovery";
 constexpr int kHundred = 100;
-/// The initial timeout of a scan: most panels answer sooner. A slower panel's reply falls into the
-/// next transaction and may or may not be recognized there.
-constexpr Duration kScanPatience = 100ms;
 
 using Reply = scan::Discovery::Reply;
 
@@ -87,7 +84,6 @@ void LineDiscovery::ask(const scan::ReadRequest& request) {
         .client = client_,
         .who = who_,
         .poll = true,
-        .patience = kScanPatience,
         .search = true};
     asked_ = clock_.now();
     paid_ = used();

@@ -92,7 +92,6 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
                      .priority = priority,
                      .asked_function = entry.sent_as == 0 ? std::uint8_t{0} : entry.function,
                      .within = request.within,
-                     .patience = request.patience,
                      .search = request.search,
                      .who = std::move(request.who),
                      .raw = request.raw};

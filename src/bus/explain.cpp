@@ -48,13 +48,13 @@ std::string means(Condition condition) {
         case Condition::well:
             return "its reads are retried as configured";
         case Condition::unheard:
-            return "it has the whole response timeout";
+            return "it has not been heard yet";
         case Condition::missed:
-            return "it has as long as it has ever needed, and no retry";
+            return "its next request is not retried";
         case Condition::flaky:
-            return "it has no retry beside others, who do not wait long for it";
+            return "half of its last attempts were silent; others who wait go first";
         case Condition::failing:
-            return "no retries, and a fifth of the line's time at most";
+            return "no retries, and with other suspects a fifth of the line's time at most";
         case Condition::offline:
             return "only probes are sent";
     }
@@ -69,8 +69,6 @@ std::string text_of(const Reason& reason, const ClientName& client) {
             return "";
         case Reason::Kind::learns_echo:
             return "a write is next and it is unknown whether this line has an echo";
-        case Reason::Kind::confirms:
-            return "the answer to a write may be none, and this shows what the station holds";
         case Reason::Kind::probe:
             return "the station is offline and its probe is due";
         case Reason::Kind::again:
@@ -96,10 +94,6 @@ std::string text_of(const Decision& decision, const ClientName& client,
                    " of one client";
         case Decision::Kind::shed:
             return request + " given up: the queue is full, and its host has the most waiting";
-        case Decision::Kind::doubted:
-            return request +
-                   " asked once more: its answer repeats an earlier one and may be a duplicate of "
-                   "it";
         case Decision::Kind::expired:
             return request + " given up after " + ms(decision.time) +
                    ": it could not end before its deadline";

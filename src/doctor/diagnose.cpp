@@ -56,7 +56,7 @@ constexpr Causes kSenders = causes(echo, other_master, collision);
 /// found; how much of a count it needs, and what of it they explain, is in its function.
 constexpr Row kRows[] = {
     station(repeats_requests, {&S::echoes}, {}, find_repeated_requests),
-    line(echo, {&S::echoes, &S::collided, &S::echoed_again}, {}, find_echo,
+    line(echo, {&S::echoes, &S::collided}, {}, find_echo,
          causes(repeats_requests)),
     line(no_answer_at_all, kUnanswered, {}, find_no_answer),
     line(other_master, {&S::requests, &S::unasked}, {}, find_other_master),
@@ -75,7 +75,7 @@ constexpr Row kRows[] = {
             find_damage),
     station(timeout_too_short, {&S::late}, causes(other_master), find_short_timeout),
     station(gap_too_short, kUnanswered, causes(timeout_too_short), find_short_gap),
-    station(unasked_frames, {&S::unasked, &S::old_replies}, kSenders | causes(duplicate_address),
+    station(unasked_frames, {&S::unasked}, kSenders | causes(duplicate_address),
             find_unasked_frames),
     station(station_silent, kUnanswered,
             causes(no_answer_at_all, wrong_reply, wrong_exception, timeout_too_short),

@@ -19,8 +19,7 @@ constexpr std::array kCounts = {
     &Symptoms::late,          &Symptoms::unasked,          &Symptoms::echoes,
     &Symptoms::wrong,         &Symptoms::requests,         &Symptoms::crc_swapped,
     &Symptoms::trailed,       &Symptoms::wrong_exceptions, &Symptoms::broadcast_replies,
-    &Symptoms::lower_case,    &Symptoms::echoed_again,     &Symptoms::beheaded,
-    &Symptoms::torn,          &Symptoms::old_replies,      &Symptoms::misaddressed,
+    &Symptoms::lower_case,    &Symptoms::beheaded,         &Symptoms::misaddressed,
     &Symptoms::repeated,      &Symptoms::silences,
 };
 constexpr std::size_t kOthers = 2;  // mute_in_a_row, worst_lateness

@@ -19,14 +19,6 @@ void find_echo(Case& c) {
             std::to_string(c.all.echoes) + " requests came back as they were sent",
             {{"echoes", c.all.echoes}});
     }
-    if (c.all.echoed_again >= bar.enough(3)) {
-        c.add(
-            Cause::echo, {}, "Requests come back more than once, or behind the reply.",
-            "Look for a second converter or a repeater that returns what is sent, and switch that "
-            "off: until then writes are read back before they count as done.",
-            std::to_string(c.all.echoed_again) + " requests came back once more",
-            {{"echoed_again", c.all.echoed_again}});
-    }
     if (c.facts.echo == EchoMode::on && c.all.echoes == 0 &&
         c.all.collided + c.all.silent >= bar.enough(5) && c.all.collided >= bar.enough(3)) {
         c.add(Cause::echo, {}, "No request comes back, although `echo: on` says so.",
@@ -222,18 +214,15 @@ bool hits_long_replies(const Symptoms& s) {
 
 /// Good frames that came beside the replies: as many may have met others, and come in pieces.
 std::uint64_t surplus_frames(const Case& c) {
-    return c.all.unasked + c.all.doubled + c.all.old_replies;
+    return c.all.unasked + c.all.doubled;
 }
-
-/// The bytes around and between frames, as far as they are of none.
-std::uint64_t loose_bytes(const Symptoms& s) { return beyond(s.strays, s.torn); }
 
 /// They come around the replies of one of several stations only: of that panel, not of the line.
 bool are_of_one_station(const Case& c, const Symptoms& s) {
     constexpr std::uint64_t kFew = 8;  // of which four fifths of all come by chance
     bool one = false, others = false;
     for (const auto& [id, symptoms] : c.window.stations) {
-        const bool most = loose_bytes(symptoms) * 5 >= loose_bytes(s) * 4;
+        const bool most = symptoms.strays * 5 >= s.strays * 4;
         one = one || most;
         others = others || (!most && symptoms.answered >= kFew);
     }
@@ -386,7 +375,7 @@ void find_noise(Case& c) {
     const std::uint64_t damaged = beyond(c.facts.over_tcp ? s.damaged_exact : s.damaged(), late);
     Noise noise;
     noise.damage = is_too_often(c, bar, s, damaged);
-    noise.around = beyond(loose_bytes(s), late + surplus_frames(c));
+    noise.around = beyond(s.strays, late + surplus_frames(c));
     noise.strays = !c.facts.over_tcp && noise.around >= bar.enough(5) &&
                    noise.around * 20 >= s.answered && !are_of_one_station(c, s);
     if (overrun || (!noise.damage && !noise.strays)) return;

@@ -172,7 +172,7 @@ std::string timeout_advice(const LineFacts& facts, Duration timeout, Duration la
 /// One late reply, or another master's reply that looks like it, says nothing about the timeout.
 void find_short_timeout(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::timeout_too_short, named(station)};
-    const std::uint64_t late = beyond(s.late, s.old_replies);
+    const std::uint64_t late = s.late;
     const std::uint64_t owed = s.attempts() - s.answered;
     if (late < bar.enough(3) || late > 2 * owed) return;  // no more replies than were owed are late
     const std::uint64_t one_in = s.worst_lateness <= kClustered ? 10 : 2;
@@ -294,7 +294,7 @@ void find_broadcast_replies(Case& c, std::uint8_t station, const Symptoms& s) {
 void find_wrong_reply(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::wrong_reply, named(station)};
     // What comes by itself now and then comes in place of a reply, too.
-    const bool by_itself = beyond(s.unasked + s.old_replies, s.wrong) >= s.wrong;
+    const bool by_itself = beyond(s.unasked, s.wrong) >= s.wrong;
     const std::uint64_t wrong = (by_itself ? 0 : s.wrong) + s.misaddressed;
     const bool masters = c.has(Cause::other_master) && wrong <= c.all.requests;
     if (wrong < bar.enough(3) || wrong * 20 < s.answered || masters) return;
@@ -320,7 +320,7 @@ void find_unasked_frames(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::unasked_frames, station};
     std::uint64_t others = s.wrong + misaddressed_elsewhere(c, station);
     if (c.has(Cause::answers_broadcasts, station)) others += c.window.broadcasts;
-    const std::uint64_t frames = beyond(s.unasked, others) + s.old_replies;
+    const std::uint64_t frames = beyond(s.unasked, others);
     if (frames < bar.enough(5) || frames * (bar.low ? 40 : 20) < s.attempts()) return;
     std::string advice = "Look in its settings for what it sends by itself.";
     if (c.window.broadcasts > 0)
@@ -329,10 +329,6 @@ void find_unasked_frames(Case& c, std::uint8_t station, const Symptoms& s) {
             "send by itself: look for that in its settings.";
     if (s.attempts() == 0)
         advice += " Or another master asks it whose requests are not heard here.";
-    if (s.old_replies * 2 >= frames)
-        advice =
-            "They are earlier replies once more: look at what is between it and the gateway "
-            "(a repeater, a radio, a device server), then at its firmware.";
     c.add(Cause::unasked_frames, station,
           station_text(c, station, true) + " sends unsolicited frames.", advice,
           std::to_string(frames) + " good frames that belong to no request, " +

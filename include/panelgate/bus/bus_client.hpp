@@ -60,9 +60,6 @@ struct Request {
     bool poll = false;  ///< lowest priority, after clients' requests
     /// The client's own deadline, from arrival; the line's queue deadline applies if it is sooner.
     Duration within = Duration::max();
-    /// Minimum wait for the reply, at most the response timeout. Without it an unlisted station is
-    /// waited for only as long as the line's other stations need.
-    Duration patience{};
     /// A station search with a limited share of the line: may ask silent unlisted stations again.
     bool search = false;
     bool raw = false;  ///< a PDU that its client has made itself, as REST's `raw`

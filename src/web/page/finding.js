@@ -15,19 +15,16 @@ function who({cause, name}) {
 const isStrays = ({cause, figures}) => cause === 'noise' && 'strays' in figures && !('damaged' in figures);
 
 function textKeys(finding) {
-    if ('echoed_again' in finding.figures) return ['echo.again'];
     return isStrays(finding) ? ['noise.strays'] : [finding.cause];
 }
 
 /** The keys of its sentences, the best first: the same cause may ask for another advice. */
 function adviceKeys({cause, figures}) {
-    if ('echoed_again' in figures) return ['echo.again'];
     if (cause !== 'timeout-too-short' || !('deadline_ms' in figures)) return [cause];
     return [`${cause}.${'advised_ms' in figures ? 'deadline' : 'slow'}`];
 }
 
 function evidenceKeys({cause, figures}) {
-    if ('echoed_again' in figures) return ['echo.again'];
     if (isStrays({cause, figures})) return ['noise.strays'];
     return [cause === 'echo' && 'collided' in figures ? 'echo.none' : cause, 'damaged' in figures ? 'damage' : cause];
 }

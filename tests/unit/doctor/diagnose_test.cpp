@@ -206,8 +206,6 @@ TEST_F(Diagnose, FramesOfStationsThatAreNotOursAreAnotherMasterToo) {
 TEST_F(Diagnose, AnEchoThatTheConfigurationDeniesOrInvents) {
     const auto echoed = [](unsigned n) { return Mix().answered(50).with(&Symptoms::echoes, n); };
     EXPECT_EQ(alone(echoed(3)), "");
-    EXPECT_EQ(alone(echoed(3).with(&Symptoms::echoed_again, 3)), "echo");
-    EXPECT_EQ(alone(echoed(3).with(&Symptoms::echoed_again, 2)), "");
     facts.echo = EchoMode::off;
     EXPECT_EQ(alone(echoed(3)), "echo");
     EXPECT_EQ(alone(echoed(2)), "");

@@ -77,8 +77,6 @@ TEST_F(Innocent, APanelThatAnswersUnderItsNeighboursAddressIsNeitherOffNorIsTheN
 }
 
 TEST_F(Innocent, GoodFramesAreNoNoise) {
-    const Symptoms cut = Mix().answered(600).with(&Symptoms::strays, 60).with(&Symptoms::torn, 60);
-    EXPECT_EQ(causes({{5, cut}, {6, cut}}), "") << "our requests have cut them";
     const Symptoms babble =
         Mix().answered(70).with(&Symptoms::unasked, 120).with(&Symptoms::strays, 10);
     const Symptoms met = Mix().answered(250).with(&Symptoms::strays, 50);
@@ -119,12 +117,6 @@ TEST_F(Innocent, TwoAnswersThatDifferAndOthersRunIntoEachOtherAreTwoPanels) {
                              .with(&Symptoms::unasked, 40);
     EXPECT_EQ(beside_6(two), "duplicate-address 5");
     EXPECT_THAT(finding_of_5(two).evidence, HasSubstr("40 frames came beside the replies"));
-}
-
-TEST_F(Innocent, EarlierRepliesOnceMoreAreNoSecondPanel) {
-    const Symptoms lag = Mix().answered(300).with(&Symptoms::old_replies, 250);
-    EXPECT_EQ(beside_6(lag), "unasked-frames 5");
-    EXPECT_THAT(finding_of_5(lag).advice, HasSubstr("a device server"));
 }
 
 TEST_F(Innocent, RequestsThatComeBackAtOneOfSeveralStationsAreThatPanels) {
