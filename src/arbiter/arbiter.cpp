@@ -195,11 +195,10 @@ void Arbiter::on_line_up(TimePoint now) {
     resetting_ = false;
     mute_.attempts = 0;
     mute_.ever_heard = false;
-    stations_.outstanding().on_opened();
+    stations_.on_opened(now);
     if (ascii_) ascii_->cut();
     quiet_.on_open(now);
     quiet_.rest_until(std::max(rest_, now + settings_.connect_pause));
-    stations_.on_recovery();
     echo_memory_.forget();
     step(now);
 }

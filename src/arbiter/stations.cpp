@@ -143,7 +143,7 @@ void Stations::on_line_down() {
 
 /// While no station is online, and that has only just begun, nobody is hurt by more probes.
 const ProbeBudget& Stations::probes(TimePoint now) const {
-    return now < heard_ + timing::kYoungOutage && !any_online() ? alone_ : offline_;
+    return now < lively_ + timing::kYoungOutage && !any_online() ? alone_ : offline_;
 }
 
 bool Stations::any_online() const {

@@ -51,10 +51,15 @@ class Stations {
     /// An attempt that occupied the line for `cost` failed.
     void on_failed(TimePoint now, std::uint8_t id, Duration cost);
     /// A station answered.
-    void on_reply(TimePoint now) { heard_ = now; }
-    /// A station is back, or the line was opened: others may be back for the same reason, and are
-    /// asked at once.
+    void on_reply(TimePoint now) { lively_ = now; }
+    /// A station is back: others may be back for the same reason, and are asked at once.
     void on_recovery() { offline_.clear(); }
+    /// The line was opened: all stations may be there.
+    void on_opened(TimePoint now) {
+        outstanding_.on_opened();
+        on_recovery();
+        lively_ = now;
+    }
     /// A broadcast has left: stations need their time behind it as behind any write (T14).
     void on_broadcast(const Asked& broadcast);
     void on_line_down();
@@ -95,7 +100,7 @@ class Stations {
     ProbeBudget suspects_{ProbeBudget::kSuspect};
     ProbeBudget offline_{ProbeBudget::kOffline};
     ProbeBudget alone_{ProbeBudget::kAlone};
-    TimePoint heard_{};  ///< any of them
+    TimePoint lively_{};  ///< the last reply of any station, or when the line was opened
 };
 
 }  // namespace panelgate::arbiter
