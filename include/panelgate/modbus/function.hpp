@@ -62,6 +62,10 @@ inline constexpr bool is_bit_table(Table table) {
 }
 Function read_function(Table table);
 
+/// True for 01 to 04, the reads of the four tables.
+inline constexpr bool reads_table(std::uint8_t function) {
+    return function >= kReadCoils && function <= kReadInputRegisters;
+}
 /// True for pure reads, which may be repeated without harm (RTY-02: 01..04, 07, 0B, 0C, 11, 14,
 /// 18). 2B is one only with MEI type 0E; see is_pure_read(pdu) in request.hpp.
 bool is_read(std::uint8_t function);
