@@ -50,6 +50,9 @@ inline constexpr std::size_t kMaxLongRtuAdu = 260;
 /// Longest write to it (ARCT1F501E gives no limit, the byte count does): 0F with 255 data bytes.
 inline constexpr std::size_t kMaxLongRequestPdu = 261;
 inline constexpr std::uint8_t kMaxStation = 247;  ///< serial line V1.02, 2.2
+/// The standard reserves 248 to 255. Devices use these addresses all the same (modbus-tk#6,
+/// minimalmodbus#101, mbpoll#75): a station there is asked if the configuration lists it.
+inline constexpr std::uint8_t kMaxListedStation = 255;
 
 /// The four tables of the data model (AP 4.3).
 enum class Table : std::uint8_t { coils, discrete_inputs, input_registers, holding_registers };
