@@ -134,6 +134,16 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
     }
 }
 
+/// `connect_pause` needs a connection.
+void check_connect_pause(MapReader& in, const Line& line) {
+    if (line.kind == Line::Kind::tcp || line.device.device.empty()) return;
+    if (line.arbiter.connect_pause > Duration::zero())
+        in.problem("connect_pause",
+                   "connect_pause belongs to a tcp:// line, whose device server may ignore what "
+                   "comes right behind a connection; " +
+                       yaml::quote(line.device.device) + " has no connection: leave it out");
+}
+
 /// Reads which master is on this line: the gateway or another one.
 void load_mode(MapReader& in, Line& line) {
     const Node* given = in.child("mode");
@@ -171,6 +181,7 @@ std::vector<yaml::Elsewhere> keys_elsewhere() {
         {"points", {}, "a station"},
         {"poll", {}, "a station"},
         {"crc_order", {}, "a station"},
+        {"any_length", {}, "a station"},
         {"profile", {}, "a station"},
         {"listen", {}, "modbus_tcp or http"},
         {"access", {}, "a station or of modbus_tcp; rules are in 'access' at the top level"},
@@ -192,7 +203,7 @@ std::vector<yaml::Elsewhere> keys_elsewhere() {
 void warn_of_unused_keys(Loading& loading, MapReader& in, const Line& line) {
     if (line.device.rs485.mode != line::Rs485::Mode::off) warn_of_unused_key(loading, in, "rs485");
     for (const std::string_view key :
-         {"echo", "retries", "queue", "quarantine", "unlisted_stations"}) {
+         {"connect_pause", "echo", "retries", "queue", "quarantine", "unlisted_stations"}) {
         if (in.has(key)) warn_of_unused_key(loading, in, key);
     }
 }
@@ -215,6 +226,7 @@ Line load_line(Loading& loading, const Node& node) {
              [&](MapReader& rs485) { load_rs485(rs485, line, line.device.rs485); });
     line.arbiter.echo = EchoMode::automatic;  // an arbiter of its own expects none
     line_keys().read(in, line);
+    check_connect_pause(in, line);
     load_map(in, "queue", "{limit: 256}",
              [&](MapReader& queue) { load_queue(queue, line.arbiter.queue); });
     load_map(in, "offline", "{after: 3}",

@@ -153,6 +153,10 @@ void warn_of_unused_keys(Loading& loading, MapReader& in, const StationSettings&
     warn("max_age", settings.max_age > Duration::zero());
     warn("guard", station.guard);
     warn("translate", !station.translate);
+    if (settings.any_length)
+        loading.warn(in.mark("any_length"),
+                     "any_length does nothing on a line that is only listened to (mode: listen): "
+                     "no client reads through the gateway there; leave it out");
 }
 
 /// Reads what a template may have: all but id, name and profile, which `station` has.
@@ -189,10 +193,13 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineContext& wo
 }
 
 /// Keys that users write beside `id`.
-constexpr std::array<yaml::Elsewhere, 10> kStationKeysElsewhere{
+constexpr std::array<yaml::Elsewhere, 13> kStationKeysElsewhere{
     {{"response_timeout", "timing", {}},
      {"frame_gap", "timing", {}},
      {"late_window", "timing", {}},
+     {"station_gap", "timing", {}},
+     {"after_write", "timing", {}},
+     {"connect_pause", {}, "a line: all stations share its connection"},
      {"think_time", "timing", {}},
      {"serial", {}, "a line: all stations of a line share it"},
      {"baud", {}, "a line's serial"},

@@ -293,7 +293,7 @@ Handling post_raw(HttpRequest request, const Api* api) {
     const bool broadcast = made.station == 0;
     const Patience patience(request, (*line)->deadline, api->providers.now);
     made.within = patience.left();
-    made.raw = true;
+    made.raw = made.verbatim = true;
     bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));
     co_return broadcast ? broadcast_answer(answer) : raw_answer(answer);
 }
