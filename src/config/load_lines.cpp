@@ -103,6 +103,18 @@ bool check_comment(MapReader& in, const std::string& device) {
     return true;
 }
 
+void check_tcp_device(Loading& loading, MapReader& in, const std::string& device) {
+    const auto endpoint = line::parse_tcp_device(device);
+    if (!endpoint)
+        return in.problem("device",
+                          "device must be tcp://HOST:PORT with a port from 1 to 65535, not " +
+                              yaml::quote(device) + device_hint(device));
+    if (endpoint->port == "502")  // node-modbus-serial#171, tf03mqtt#4
+        loading.warn(in.mark("device"),
+                     "port 502 is the one of Modbus/TCP, and a tcp:// line sends RTU frames: set "
+                     "the device server to raw (transparent) mode, on any port");
+}
+
 void load_device(Loading& loading, MapReader& in, Line& line) {
     line.device.device = in.required_text("device").value_or("");
     in.looks_like("device", "^(/|tcp://.+:[0-9]+$|sim$)");
@@ -111,6 +123,8 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
         loading.firsts.again("device " + line.device.device, in.mark("device"));
     for (const Line& other : loading.config.lines) {
         if (line.device.device == "sim" || line.device.device.empty()) break;
+        warn_of_same_adapter(loading, in, line.device.device, "line '" + other.name + '\'',
+                             other.device.device);
         if (other.device.device != line.device.device) continue;
         in.problem("device", "line '" + other.name + "' has this device already" + first);
         break;
@@ -120,10 +134,7 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
     } else if (line.device.device.starts_with("tcp://")) {
         line.kind = Line::Kind::tcp;
         line.arbiter.may_stall = true;
-        if (!line::parse_tcp_device(line.device.device))
-            in.problem("device",
-                       "device must be tcp://HOST:PORT with a port from 1 to 65535, not " +
-                           yaml::quote(line.device.device) + device_hint(line.device.device));
+        check_tcp_device(loading, in, line.device.device);
     } else if (!line.device.device.empty() && line.device.device[0] != '/') {
         in.problem(
             "device",
@@ -241,6 +252,16 @@ Line load_line(Loading& loading, const Node& node) {
 }
 
 }  // namespace
+
+void warn_of_same_adapter(Loading& loading, MapReader& in, const std::string& device,
+                          const std::string& owner, const std::string& other) {
+    if (device == other || !device.starts_with('/') || !other.starts_with('/')) return;
+    const std::string real = loading.files.real_path(device);
+    if (real != loading.files.real_path(other)) return;
+    loading.warn(in.mark("device"), device + " and " + other + " of " + owner +
+                                        " are one adapter, " + real +
+                                        ": only one of the two can open it; name another device");
+}
 
 bool load_port(Loading& loading, MapReader& in, line::Settings& port, SerialMode mode) {
     Line line;  // for load_rs485(): a port has some of a line's keys

@@ -98,6 +98,13 @@ TEST_F(RealFilesTest, KnowsWhichFilesAllUsersMayRead) {
     EXPECT_FALSE(RealFiles().is_readable_by_all(at("absent")));
 }
 
+TEST_F(RealFilesTest, FollowsLinksAsFarAsTheyLead) {
+    const std::string path = put("tty", "");
+    fs::create_symlink("tty", at("by-id"));
+    EXPECT_EQ(RealFiles().real_path(at("by-id")), RealFiles().real_path(path));
+    EXPECT_EQ(RealFiles().real_path(at("absent")), at("absent"));
+}
+
 TEST_F(RealFilesTest, ListsTheYamlFilesOfADirectorySorted) {
     for (const char* name : {"b.yaml", "a.yaml", "c.yml", "README"}) put(name, "");
     EXPECT_THAT(RealFiles().list_yaml(dir_.string()).value(),
