@@ -268,6 +268,7 @@ bus::Settings RunningLine::settings_of(const config::Line& line) {
 /// Opens the line, and its simulated panels if it has any.
 std::unique_ptr<line::Line> RunningLine::make_wire(const config::Line& line) {
     line::Settings device = line.device;
+    device.owner = "line '" + line.name + '\'';
     if (wires_.size() >= kWires)
         wires_.clear();  // no reply is outstanding on the earlier ones any more
     if (!is_simulated(line, simulate_)) wires_.insert(wire_of(line));
