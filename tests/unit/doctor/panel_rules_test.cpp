@@ -210,6 +210,22 @@ TEST_F(DiagnoseOverTcp, DamageIsAMatterOfTheServer) {
     }
 }
 
+TEST_F(DiagnoseOverTcp, TelnetIsNamedAtOnceAndDamageBesideItIsItsOwn) {
+    telnet = true;
+    EXPECT_THAT(only("telnet", {}).advice, HasSubstr("raw TCP"));
+    const Symptoms beheaded =
+        Mix().answered(20).garbage(30).with(&Symptoms::beheaded, 30).with(&Symptoms::strays, 30);
+    EXPECT_EQ(causes({{1, beheaded}, {2, beheaded}}), "telnet");
+    EXPECT_EQ(causes({{1, Mix().garbage(30)}, {2, fine}}), "telnet");
+    EXPECT_EQ(causes({{1, Mix().silent(9)}}), "telnet, no-answer-at-all")
+        << "the baud may be wrong, too";
+}
+
+TEST_F(DiagnoseOverTcp, ASilentLineMayBeAServerThatSpeaksModbusTcp) {
+    EXPECT_THAT(only("no-answer-at-all", {{1, Mix().silent(9)}}).advice,
+                HasSubstr("raw or transparent, not Modbus/TCP"));
+}
+
 TEST_F(DiagnoseOverTcp, RightLengthsAreNotWhatFramingChanges) {
     const Symptoms hit = Mix().answered(297).damaged(3);
     EXPECT_THAT(only("noise", {{1, hit}, {2, hit}}).advice, HasSubstr("behind the server"));
