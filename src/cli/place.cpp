@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::array<std::string_view, 4> kTables{"coils", "discrete-inputs", "input-registers",
                                                   "holding-registers"};
-constexpr unsigned kMostId = 255;  // above 247 only where it is listed: the gateway says so
+constexpr unsigned kMostId = 255;  // the gateway refuses an id above 247 that is not listed
 constexpr std::size_t kFew = 8;    // names that are all listed
 
 bool is_table(std::string_view word) { return std::ranges::find(kTables, word) != kTables.end(); }

@@ -193,7 +193,7 @@ Wait longest_wait(const Node& node, const Line& line) {
     return longest;
 }
 
-/// A rest of a station behind its reply, and where the key of it stands.
+/// A rest of a station behind its reply, and the key that sets the rest.
 struct Rest {
     std::string_view key;
     Duration time{};

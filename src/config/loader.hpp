@@ -86,8 +86,8 @@ void load_section(Loading& loading, yaml::MapReader& root, std::string_view key,
     });
 }
 
-/// Warns at `device` if it and the device of `owner` are names of one adapter, which only one of
-/// them can open (solax-modbus#1171).
+/// Warns at `device` if `device` and `other`, the device of `owner`, are two names of one adapter:
+/// only one owner can open an adapter (solax-modbus#1171).
 void warn_of_same_adapter(Loading& loading, yaml::MapReader& in, const std::string& device,
                           const std::string& owner, const std::string& other);
 

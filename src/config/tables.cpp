@@ -218,7 +218,9 @@ const Keys<Timing>& timing_keys() {
                 "stations are asked meanwhile.")
             .duration(
                 "after_write", [](auto& of) -> auto& { return of.settings.after_write; }, 0ms, 1min,
-                "The same behind a write to it, where that is longer.")
+                "Least time between a station's answer to a write and the next request to it, "
+                "where "
+                "longer than station_gap.")
             .duration("think_time", &Timing::think_time, 0ms, 10s,
                       "Think time of a panel that the plan of `check` assumes.");
     return kKeys;

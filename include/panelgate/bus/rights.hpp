@@ -60,8 +60,8 @@ struct StationSettings {
     Access access = Access::read_write;
     Guard guard{};          ///< empty: nothing is refused
     Translate translate{};  ///< empty: requests are sent unchanged
-    /// Replies to reads of its tables may have any length (modbus::ByteCount::any), for clients
-    /// that take them as they are.
+    /// Replies to reads of the station's tables may have any length (modbus::ByteCount::any), for
+    /// clients that take a reply's bytes as they are.
     bool any_length = false;
     /// Functions that the panel is likely to be asked: their counters start at 0.
     std::vector<std::uint8_t> functions{};
