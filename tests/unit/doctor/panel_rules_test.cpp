@@ -142,6 +142,7 @@ TEST_F(Diagnose, APanelThatAnswersBroadcastsIsNamed) {
 TEST_F(Diagnose, GoodFramesThatDoNotAnswerAreAWrongReply) {
     const Symptoms not_silent = wrong(9).with(&Symptoms::mute_in_a_row, 9);
     const Finding found = only("wrong-reply 2", {{1, fine}, {2, wrong(9)}});
+    EXPECT_THAT(found.advice, HasSubstr("any_length: true"));
     EXPECT_EQ(found.text, "Station 2 answers with frames that do not fit the request.");
     EXPECT_EQ(found.evidence, "9 of 9 requests (100 %) were answered so, 0 rightly");
     EXPECT_EQ(beside(not_silent), "wrong-reply 2");
