@@ -50,6 +50,8 @@ MEANINGS = {
     "dashboard": "where the dashboard is",
     "datagram refused": "a datagram of a client was not served",
     "decision": "why the gateway did what it did next",
+    "device server hangs up on requests": "three connections in a row of a `tcp://` line ended behind a request, without an answer",
+    "device server speaks telnet": "a connection of a `tcp://` line began with telnet's negotiation: other bytes are mixed in",
     "device settings differ": "the serial port did not take a setting",
     "discovery begins": "the search for unlisted panels begins",
     "discovery ends": "the search for unlisted panels is over, with what it found",

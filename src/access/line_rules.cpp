@@ -13,7 +13,7 @@ namespace {
 using modbus::Span;
 
 constexpr std::size_t kMeetings = 2048;  ///< remembered; then all are forgotten
-constexpr std::size_t kAddresses = modbus::kMaxStation + std::size_t{1};
+constexpr std::size_t kAddresses = modbus::kMaxListedStation + std::size_t{1};
 
 template <class List, class Value>
 bool holds(const List& list, const Value& value) {

@@ -26,6 +26,8 @@ plan::Station station_of(const config::Line& line, const config::Station& statio
     made.profile = station.profile;
     made.response_timeout = settings.response_timeout;
     made.think_time = station.think_time;
+    made.station_gap = settings.station_gap;
+    made.after_write = settings.after_write;
     made.repeats = settings.retries > 0;
     if (line.arbiter.quarantine == arbiter::Quarantine::line)
         made.line_rest =

@@ -68,12 +68,14 @@ std::vector<std::uint8_t> functions_of(const profile::PanelProfile& profile) {
     return functions;
 }
 
+const arbiter::StationSettings& station_settings(const config::Line& line, std::uint8_t station) {
+    const auto& listed = line.arbiter.stations;
+    const auto own = std::ranges::find(listed, station, &arbiter::StationSettings::id);
+    return own == listed.end() ? line.arbiter.unlisted : *own;
+}
+
 Duration frame_gap(const config::Line& line, std::uint8_t station) {
-    std::optional<Duration> gap = line.arbiter.unlisted.frame_gap;
-    for (const arbiter::StationSettings& settings : line.arbiter.stations) {
-        if (settings.id == station) gap = settings.frame_gap;
-    }
-    return gap.value_or(silent_interval(line.device.serial));
+    return station_settings(line, station).frame_gap.value_or(silent_interval(line.device.serial));
 }
 
 }  // namespace
@@ -91,6 +93,7 @@ bus::Settings bus_settings(const config::Line& line) {
         made.functions = functions_of(*station.profile);
         if (station.guard) made.guard = guard_of(station.profile);
         if (station.translate && !station.guard) add_translation(made, station.profile);
+        made.any_length = station_settings(line, station.id).any_length;
     }
     return settings;
 }
@@ -265,6 +268,7 @@ bus::Settings RunningLine::settings_of(const config::Line& line) {
 /// Opens the line, and its simulated panels if it has any.
 std::unique_ptr<line::Line> RunningLine::make_wire(const config::Line& line) {
     line::Settings device = line.device;
+    device.owner = "line '" + line.name + '\'';
     if (wires_.size() >= kWires)
         wires_.clear();  // no reply is outstanding on the earlier ones any more
     if (!is_simulated(line, simulate_)) wires_.insert(wire_of(line));

@@ -291,9 +291,11 @@ void Servers::apply_masters(const config::Config& config, const Plant& plant) {
     before.clear();  // a removed master's device may be a new one's
     for (Master& one : masters_) {
         if (one.master) continue;
+        line::Settings device = one.settings.device;
+        device.owner = "serial master '" + one.settings.name + '\'';
         one.master = std::make_unique<serial_server::SerialMaster>(
             clock_, one.settings, tcp_server::UnitMap(one.settings.access, lines),
-            line::make_tty_line(executor_, clock_, one.settings.device));
+            line::make_tty_line(executor_, clock_, std::move(device)));
         one.master->start();
     }
 }

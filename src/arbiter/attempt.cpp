@@ -41,7 +41,8 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo,
       echo_(std::move(echo)),
       framer_(group_.station, group_.request.pdu(), orders_,
               has_delimiters() ? modbus::ReplyFramer::Ends::told
-                               : modbus::ReplyFramer::Ends::by_length),
+                               : modbus::ReplyFramer::Ends::by_length,
+              group_.request.byte_count()),
       pace_(byte_time(timing.serial), timing.steady),
       computed_end_(timing.sent),
       first_byte_(timing.sent),
@@ -126,7 +127,8 @@ void Attempt::collect(std::optional<Bytes> reply) {
 
 void Attempt::add(Unused part, bool answers, bool in_front) {
     const bool own = part.kind == Unused::Kind::own;
-    answers = answers || (own && modbus::answers(group_.request.pdu(), modbus::pdu_of(part.bytes)));
+    answers = answers || (own && modbus::answers(group_.request.pdu(), modbus::pdu_of(part.bytes),
+                                                 group_.request.byte_count()));
     if (!answers && in_front) disturbed_ = disturbed_ || part.kind != Unused::Kind::damaged;
     if (part.kind == Unused::Kind::damaged &&
         !begins_with_request(part.bytes, echo_.frame(), orders_)) {

@@ -8,6 +8,10 @@
 
 namespace panelgate::arbiter {
 
+bool Asked::may_be_answered(ByteView reply) const {
+    return modbus::answers(pdu, reply, byte_count);
+}
+
 namespace {
 
 using By = Asked::By;
@@ -42,7 +46,7 @@ const Asked* Outstanding::answered_by(TimePoint now, std::uint8_t station, ByteV
     const Page* const all = find(station);
     if (all == nullptr) return nullptr;
     const auto found = std::ranges::find_if(all->asked, [&](const Asked& asked) {
-        return asked.by == by && is_live(asked, now) && modbus::answers(asked.pdu, reply);
+        return asked.by == by && is_live(asked, now) && asked.may_be_answered(reply);
     });
     return found == all->asked.end() ? nullptr : &*found;
 }
@@ -118,7 +122,7 @@ bool Outstanding::is_proof(TimePoint now, std::uint8_t station, const modbus::Re
     return all == nullptr || std::ranges::none_of(all->asked, [&](const Asked& asked) {
                if (!is_ours(asked, now) || asked.pdu[0] != read.function()) return false;
                if (again && is_same(asked, read.pdu())) return false;
-               const auto length = modbus::reply_length_from_request(asked.pdu);
+               const auto length = modbus::reply_length_from_request(asked.pdu, asked.byte_count);
                return !length || length == read.reply_length();
            });
 }
@@ -206,7 +210,7 @@ std::optional<Asked> Outstanding::on_late(TimePoint now, std::uint8_t station, B
     all.replied = now;
     const bool is_sure = std::ranges::none_of(all.asked, [&](const Asked& asked) {
         return is_ours(asked, now) && asked.epoch != answered.epoch &&
-               modbus::answers(asked.pdu, reply);
+               asked.may_be_answered(reply);
     });
     if (is_sure) close(all, answered.epoch, answered.sent);
     return answered;

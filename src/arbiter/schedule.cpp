@@ -23,10 +23,10 @@ void append(Jobs& jobs, Jobs more) {
     jobs.insert(jobs.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
 }
 
-/// Makes a read that no client asked for.
-Group internal_read(std::uint8_t station, modbus::Request request) {
-    const std::optional<modbus::Span> span = request.span();
-    return {.station = station, .request = std::move(request), .span = span};
+/// Makes a read that no client asked for, and whose reply shows that the station is there.
+Group internal_read(const Station& station, const modbus::Request& read) {
+    const bool any_length = station.settings().any_length;
+    return {.station = station.id(), .request = any_length ? read.with_any_length() : read};
 }
 
 }  // namespace
@@ -34,8 +34,7 @@ Group internal_read(std::uint8_t station, modbus::Request request) {
 Group Sharing::gather(TimePoint now, Job leader, const Station& station,
                       const Outstanding& outstanding, JobQueue& queue) const {
     Group group{.station = leader.station, .request = leader.request};
-    const bool shares = share_ && !leader.alone && !station.settings().any_length;
-    if (shares) group.span = leader.request.span();
+    if (share_ && !leader.alone) group.span = leader.request.span();
     group.jobs.push_back(std::move(leader));
     if (!group.span || outstanding.any(now, group.station)) return group;
     append(group.jobs, queue.take_reads(group.station, [&](const Job& other) {
@@ -248,8 +247,8 @@ std::optional<Group> Schedule::next_probe(const Line& line) const {
     if (line.now < line.quiet.quarantined_until()) return std::nullopt;
     const auto station = line.stations.next_to_probe(line.now);
     if (!station || !gap_is_over(line, *station)) return std::nullopt;
-    Group group = internal_read(
-        *station, line.stations.probe_for(line.now, *line.stations.find(*station)));
+    const Station& asked = *line.stations.find(*station);
+    Group group = internal_read(asked, line.stations.probe_for(line.now, asked));
     group.probe = true;
     return group;
 }
@@ -270,7 +269,7 @@ std::optional<Group> Schedule::read_before(const Line& line, const Job& job) {
     TimePoint clear = outstanding.clear_at(line.now, job.station, job.request);
     if (learns) clear = std::max(clear, outstanding.clear_at(line.now, job.station, probe));
     if (clear > line.now) {
-        Group proof = internal_read(job.station, line.stations.probe_for(line.now, *station));
+        Group proof = internal_read(*station, line.stations.probe_for(line.now, *station));
         proof.probe = true;
         return proof;
     }
@@ -278,7 +277,7 @@ std::optional<Group> Schedule::read_before(const Line& line, const Job& job) {
     learned_for_ = job.ticket;
     if (!teaches_echo(probe))
         probe = modbus::Request::read({modbus::Table::holding_registers, 0, 1});
-    Group group = internal_read(job.station, std::move(probe));
+    Group group = internal_read(*station, probe);
     group.learns_for = job.ticket;
     return group;
 }

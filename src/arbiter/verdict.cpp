@@ -58,7 +58,8 @@ Asked Arbiter::asked_of(const Attempt& attempt, bool in_transit) const {
             .sent = sent,
             .until = in_transit ? Outstanding::kInTransit
                                 : sent + latency_ + stations_.latest_reply(group.station),
-            .pdu = group.request.pdu()};
+            .pdu = group.request.pdu(),
+            .byte_count = group.request.byte_count()};
 }
 
 /// The reply has come: it is handed on.

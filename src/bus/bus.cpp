@@ -85,6 +85,8 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
         entry.sent_as = other->function();
         request.request = std::move(*other);
     }
+    if (request.verbatim && has_any_length(settings.stations, request.station))
+        request.request = request.request.with_any_length();
     arbiter::Job job{.station = request.station,
                      .request = std::move(request.request),
                      .client = request.client,

@@ -31,7 +31,9 @@ doctor::Sample sample_of(const LineCounts& counts) {
         sample.stations.emplace_hint(sample.stations.end(), id, counters.symptoms);
     }
     sample.broadcasts = counts.broadcasts;
-    sample.uart = counts.line.counters().uart;
+    const line::Counters& line = counts.line.counters();
+    sample.uart = line.uart;
+    sample.telnet = line.telnet;
     return sample;
 }
 

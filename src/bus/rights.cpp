@@ -34,6 +34,11 @@ std::optional<modbus::Request> translated(const Stations& stations, std::uint8_t
     return listed->second.translate(request);
 }
 
+bool has_any_length(const Stations& stations, std::uint8_t id) {
+    const auto listed = stations.find(id);
+    return listed != stations.end() && listed->second.any_length;
+}
+
 std::string name_of(const Stations& stations, std::uint8_t id) {
     const auto listed = stations.find(id);
     return listed == stations.end() ? std::to_string(id) : listed->second.name;

@@ -20,8 +20,8 @@ namespace {
 
 constexpr std::array<std::string_view, 4> kTables{"coils", "discrete-inputs", "input-registers",
                                                   "holding-registers"};
-constexpr unsigned kMostId = 247;
-constexpr std::size_t kFew = 8;  // names that are all listed
+constexpr unsigned kMostId = 255;  // the gateway refuses an id above 247 that is not listed
+constexpr std::size_t kFew = 8;    // names that are all listed
 
 bool is_table(std::string_view word) { return std::ranges::find(kTables, word) != kTables.end(); }
 
@@ -69,7 +69,7 @@ Named of_id(std::span<const Station> all, unsigned id) {
 Named of_line(std::span<const Station> all, const std::string& line, std::string_view number,
               std::span<const std::string> lines) {
     const auto id = id_in(number);
-    if (!id) return {"", "LINE/ID has an id from 1 to 247, not '" + std::string(number) + '\''};
+    if (!id) return {"", "LINE/ID has an id from 1 to 255, not '" + std::string(number) + '\''};
     for (const Station& station : all)
         if (station.line == line && station.id == *id) return {station.name, ""};
     if (std::ranges::find(lines, line) != lines.end() || lines.empty())

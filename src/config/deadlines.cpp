@@ -193,6 +193,47 @@ Wait longest_wait(const Node& node, const Line& line) {
     return longest;
 }
 
+/// A rest of a station behind its reply, and the key that sets the rest.
+struct Rest {
+    std::string_view key;
+    Duration time{};
+    Mark mark;
+};
+
+/// Replaces `longest` by a longer rest of these settings.
+void consider(const arbiter::StationSettings& settings, const Node& body, Mark otherwise,
+              Rest& longest) {
+    const auto take = [&](std::string_view key, Duration time) {
+        if (time <= longest.time) return;
+        const Node* value = find(find(&body, "timing"), key);
+        longest = {key, time, value == nullptr ? otherwise : value->mark};
+    };
+    take("station_gap", settings.station_gap);
+    take("after_write", settings.after_write);
+}
+
+/// Returns the longest rest of all stations.
+Rest longest_rest(const Node& node, const Line& line) {
+    Rest longest;
+    consider(line.arbiter.unlisted, node, node.mark, longest);
+    const Node* list = find(&node, "stations");
+    for (std::size_t i = 0; i < line.arbiter.stations.size(); ++i)
+        consider(line.arbiter.stations[i], list->items[i], node.mark, longest);
+    return longest;
+}
+
+/// A request right behind a reply waits for all of the rest.
+void warn_of_rest(Loading& loading, const Rest& rest, Duration deadline) {
+    const std::string key(rest.key);
+    const std::string time = format_milliseconds(rest.time);
+    loading.warn(rest.mark,
+                 key + ' ' + time + " is not below the queue's deadline of " +
+                     format_milliseconds(deadline) +
+                     ": a request that comes right behind the reply is answered 06; raise "
+                     "queue.deadline above " +
+                     time + ", or lower " + key);
+}
+
 bool fits(const std::optional<Read>& read, const Line& line) {
     return !read || read->on_wire(line.device.serial) < line.arbiter.queue.deadline;
 }
@@ -225,6 +266,8 @@ void warn_of_deadline(Loading& loading, const Node& node, const Line& line) {
                          "queue.deadline above " +
                          format_milliseconds(wait.timeout) + ", or lower response_timeout");
     }
+    if (const Rest rest = longest_rest(node, line); rest.time >= deadline)
+        warn_of_rest(loading, rest, deadline);
     const std::optional<Read> poll = longest_poll(line);
     const std::optional<Read> read = longest_read(line);
     if (!fits(poll, line)) {

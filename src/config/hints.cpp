@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <vector>
 
@@ -221,6 +222,22 @@ std::string tcp_hint(std::string_view typed) {
     return host_hint(host);
 }
 
+/// Hint for a device of a scheme that other programs have (Telegraf, Home Assistant, pyserial).
+std::string scheme_hint(std::string_view scheme, std::string_view rest) {
+    constexpr std::string_view kModbusTcp[] = {"modbus-tcp", "modbus+tcp", "modbus", "mbtcp"};
+    if (std::ranges::find(kModbusTcp, scheme) != std::end(kModbusTcp))
+        return "; Modbus/TCP devices as lines are not there yet: write tcp:// only where the far "
+               "end takes RTU frames over TCP (raw, transparent)";
+    if (scheme == "file") return write(rest.starts_with('/') ? rest : "/dev/" + std::string(rest));
+    const std::string device = "tcp://" + std::string(rest.substr(0, rest.find_first_of("/?")));
+    if (scheme == "rfc2217" || scheme == "telnet")
+        return "; " + std::string(scheme) +
+               " mixes bytes of its own in: set the device server's port to raw TCP (ser2net: "
+               "accepter tcp, without telnet), then write " +
+               device;
+    return write(device) + " for RTU over TCP";
+}
+
 }  // namespace
 
 std::string serial_example(const yaml::Node* typed) {
@@ -256,8 +273,7 @@ std::string device_hint(std::string_view typed) {
     if (typed.starts_with("tcp://")) return tcp_hint(typed.substr(6));
     const std::string text = to_lower(typed);
     const std::size_t scheme = text.find("://");
-    if (scheme != text.npos)
-        return "; write tcp://" + std::string(typed.substr(scheme + 3)) + " for RTU over TCP";
+    if (scheme != text.npos) return scheme_hint(text.substr(0, scheme), typed.substr(scheme + 3));
     if (text.starts_with("tcp:")) return "; write tcp://" + text.substr(4);
     if (is_com_port(text))
         return "; COM ports are those of Windows: here it is /dev/ttyUSB0 (adapters) or /dev/ttyS0";

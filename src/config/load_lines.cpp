@@ -103,6 +103,18 @@ bool check_comment(MapReader& in, const std::string& device) {
     return true;
 }
 
+void check_tcp_device(Loading& loading, MapReader& in, const std::string& device) {
+    const auto endpoint = line::parse_tcp_device(device);
+    if (!endpoint)
+        return in.problem("device",
+                          "device must be tcp://HOST:PORT with a port from 1 to 65535, not " +
+                              yaml::quote(device) + device_hint(device));
+    if (endpoint->port == "502")  // node-modbus-serial#171, tf03mqtt#4
+        loading.warn(in.mark("device"),
+                     "port 502 is the one of Modbus/TCP, and a tcp:// line sends RTU frames: set "
+                     "the device server to raw (transparent) mode, on any port");
+}
+
 void load_device(Loading& loading, MapReader& in, Line& line) {
     line.device.device = in.required_text("device").value_or("");
     in.looks_like("device", "^(/|tcp://.+:[0-9]+$|sim$)");
@@ -111,6 +123,8 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
         loading.firsts.again("device " + line.device.device, in.mark("device"));
     for (const Line& other : loading.config.lines) {
         if (line.device.device == "sim" || line.device.device.empty()) break;
+        warn_of_same_adapter(loading, in, line.device.device, "line '" + other.name + '\'',
+                             other.device.device);
         if (other.device.device != line.device.device) continue;
         in.problem("device", "line '" + other.name + "' has this device already" + first);
         break;
@@ -120,10 +134,7 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
     } else if (line.device.device.starts_with("tcp://")) {
         line.kind = Line::Kind::tcp;
         line.arbiter.may_stall = true;
-        if (!line::parse_tcp_device(line.device.device))
-            in.problem("device",
-                       "device must be tcp://HOST:PORT with a port from 1 to 65535, not " +
-                           yaml::quote(line.device.device) + device_hint(line.device.device));
+        check_tcp_device(loading, in, line.device.device);
     } else if (!line.device.device.empty() && line.device.device[0] != '/') {
         in.problem(
             "device",
@@ -132,6 +143,16 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
     } else {
         check_path(in, line.device.device);
     }
+}
+
+/// `connect_pause` needs a connection.
+void check_connect_pause(MapReader& in, const Line& line) {
+    if (line.kind == Line::Kind::tcp || line.device.device.empty()) return;
+    if (line.arbiter.connect_pause > Duration::zero())
+        in.problem("connect_pause",
+                   "connect_pause belongs to a tcp:// line, whose device server may ignore what "
+                   "comes right behind a connection; " +
+                       yaml::quote(line.device.device) + " has no connection: leave it out");
 }
 
 /// Reads which master is on this line: the gateway or another one.
@@ -171,6 +192,7 @@ std::vector<yaml::Elsewhere> keys_elsewhere() {
         {"points", {}, "a station"},
         {"poll", {}, "a station"},
         {"crc_order", {}, "a station"},
+        {"any_length", {}, "a station"},
         {"profile", {}, "a station"},
         {"listen", {}, "modbus_tcp or http"},
         {"access", {}, "a station or of modbus_tcp; rules are in 'access' at the top level"},
@@ -192,7 +214,7 @@ std::vector<yaml::Elsewhere> keys_elsewhere() {
 void warn_of_unused_keys(Loading& loading, MapReader& in, const Line& line) {
     if (line.device.rs485.mode != line::Rs485::Mode::off) warn_of_unused_key(loading, in, "rs485");
     for (const std::string_view key :
-         {"echo", "retries", "queue", "quarantine", "unlisted_stations"}) {
+         {"connect_pause", "echo", "retries", "queue", "quarantine", "unlisted_stations"}) {
         if (in.has(key)) warn_of_unused_key(loading, in, key);
     }
 }
@@ -215,6 +237,7 @@ Line load_line(Loading& loading, const Node& node) {
              [&](MapReader& rs485) { load_rs485(rs485, line, line.device.rs485); });
     line.arbiter.echo = EchoMode::automatic;  // an arbiter of its own expects none
     line_keys().read(in, line);
+    check_connect_pause(in, line);
     load_map(in, "queue", "{limit: 256}",
              [&](MapReader& queue) { load_queue(queue, line.arbiter.queue); });
     load_map(in, "offline", "{after: 3}",
@@ -229,6 +252,16 @@ Line load_line(Loading& loading, const Node& node) {
 }
 
 }  // namespace
+
+void warn_of_same_adapter(Loading& loading, MapReader& in, const std::string& device,
+                          const std::string& owner, const std::string& other) {
+    if (device == other || !device.starts_with('/') || !other.starts_with('/')) return;
+    const std::string real = loading.files.real_path(device);
+    if (real != loading.files.real_path(other)) return;
+    loading.warn(in.mark("device"), device + " and " + other + " of " + owner +
+                                        " are one adapter, " + real +
+                                        ": only one of the two can open it; name another device");
+}
 
 bool load_port(Loading& loading, MapReader& in, line::Settings& port, SerialMode mode) {
     Line line;  // for load_rs485(): a port has some of a line's keys

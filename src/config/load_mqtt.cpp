@@ -54,6 +54,10 @@ bool parse_broker(std::string_view text, mqtt::Settings& settings) {
 /// Suggests mqtt://localhost:1883 for localhost:1883 and http://localhost:1883/.
 std::string broker_hint(std::string_view typed) {
     const std::size_t scheme = typed.find("://");
+    const std::string_view kind = typed.substr(0, scheme);
+    if (scheme != typed.npos && (kind == "ws" || kind == "wss"))
+        return "; MQTT over WebSocket is not there: write the broker's port for plain MQTT, such "
+               "as mqtt://HOST:1883, or mqtts://HOST:8883";
     constexpr std::array<std::string_view, 4> kSafe{"mqtts", "https", "ssl", "tls"};
     const bool safe =
         scheme != typed.npos && std::ranges::find(kSafe, typed.substr(0, scheme)) != kSafe.end();

@@ -129,11 +129,12 @@ std::vector<std::string> listener_names(const Config& config) {
 std::optional<access::Place> place_of(const Config& config, const std::string& text) {
     const std::size_t slash = text.find('/');
     for (const Line& line : config.lines) {
+        const bool of_line = slash != text.npos && text.substr(0, slash) == line.name;
+        const auto id = of_line ? yaml::parse_integer(text.substr(slash + 1)) : std::nullopt;
         for (const Station& station : line.stations) {
-            if (station.name == text) return access::Place{line.name, station.id};
+            if (station.name == text || id == station.id)
+                return access::Place{line.name, station.id};
         }
-        if (slash == text.npos || text.substr(0, slash) != line.name) continue;
-        const auto id = yaml::parse_integer(text.substr(slash + 1));
         if (id && *id >= 1 && *id <= modbus::kMaxStation)
             return access::Place{line.name, static_cast<std::uint8_t>(*id)};
     }

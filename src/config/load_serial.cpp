@@ -92,6 +92,8 @@ void check_device(Loading& loading, MapReader& in, const line::Settings& port) {
     if (!port.device.starts_with('/')) return;
     const std::string first = loading.firsts.again("device " + port.device, in.mark("device"));
     for (const Line& line : loading.config.lines) {
+        warn_of_same_adapter(loading, in, port.device, "line '" + line.name + '\'',
+                             line.device.device);
         if (line.device.device != port.device) continue;
         in.problem("device", "line '" + line.name +
                                  "' has this device already; a master needs a port of its own" +
@@ -99,6 +101,8 @@ void check_device(Loading& loading, MapReader& in, const line::Settings& port) {
         return;
     }
     for (const Settings& other : loading.config.serial_masters) {
+        warn_of_same_adapter(loading, in, port.device, "serial master '" + other.name + '\'',
+                             other.device.device);
         if (other.device.device != port.device) continue;
         in.problem("device", "serial master '" + other.name + "' has this device already" + first);
         return;

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -248,11 +250,24 @@ void check_overlap(Loading& loading, MapReader& in, const tcp_server::Settings& 
     }
 }
 
-/// The gateway's own unit must not hide a station; the default one gives way to an alias.
+/// Returns the station of the listener's lines with this id; nullptr if there is none.
+const Station* station_with_id(const Config& config, const tcp_server::Settings& settings,
+                               std::int64_t id) {
+    for (const std::string& name : settings.lines) {
+        const std::vector<Station>& stations = find_line(config, name)->stations;
+        const auto found = std::ranges::find(stations, id, &Station::id);
+        if (found != stations.end()) return &*found;
+    }
+    return nullptr;
+}
+
+/// The gateway's own unit must not hide a station; the default one gives way to an alias and to a
+/// station.
 void load_diagnostics(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
     in.schema("diagnostics_unit").may_be_null = true;
-    const bool given_way =
-        settings.diagnostics_unit && settings.units.contains(*settings.diagnostics_unit);
+    const std::optional<std::uint8_t> usual = settings.diagnostics_unit;
+    const bool given_way = usual && (settings.units.contains(*usual) ||
+                                     station_with_id(loading.config, settings, *usual) != nullptr);
     const bool is_set = in.has("diagnostics_unit");
     if (is_set || given_way) settings.diagnostics_unit.reset();
     if (!is_set) return;
@@ -270,14 +285,9 @@ void load_diagnostics(Loading& loading, MapReader& in, tcp_server::Settings& set
     settings.diagnostics_unit = static_cast<std::uint8_t>(*unit);
     if (settings.units.contains(*settings.diagnostics_unit))
         in.problem("diagnostics_unit", "unit " + std::to_string(*unit) + " is in 'units' already");
-    for (const std::string& name : settings.lines) {
-        const Line* line = find_line(loading.config, name);
-        for (const Station& station : line->stations) {
-            if (station.id != *unit) continue;
-            in.problem("diagnostics_unit", "diagnostics_unit " + std::to_string(*unit) +
-                                               " hides station '" + station.name + '\'');
-        }
-    }
+    if (const Station* hidden = station_with_id(loading.config, settings, *unit))
+        in.problem("diagnostics_unit", "diagnostics_unit " + std::to_string(*unit) +
+                                           " hides station '" + hidden->name + '\'');
 }
 
 /// Keys that users write as for the serial lines of other programs.

@@ -75,15 +75,20 @@ std::uint8_t load_id(Loading& loading, MapReader& in) {
     const Node* node = in.child("id");
     const bool plain = node != nullptr && node->kind == Node::Kind::scalar && !node->is_text();
     const auto number = plain ? yaml::parse_integer(node->scalar) : std::nullopt;
-    if (number && (*number == 0 || (*number > modbus::kMaxStation && *number < 256))) {
-        const bool broadcast = *number == 0;  // serial line V1.02, 2.2
-        in.problem("id", "id must be from 1 to 247, not " + node->scalar +
-                             (broadcast ? ": that is the broadcast" : ": 248 to 255 are reserved"));
+    if (number && *number == 0) {  // serial line V1.02, 2.2
+        in.problem("id", "id must be from 1 to 247, not 0: that is the broadcast");
         return 0;
     }
-    const auto id =
-        static_cast<std::uint8_t>(in.required_integer("id", 1, modbus::kMaxStation).value_or(0));
+    const auto id = static_cast<std::uint8_t>(
+        in.required_integer("id", 1, modbus::kMaxListedStation).value_or(0));
     if (id == 0) return id;
+    if (id > modbus::kMaxStation)
+        loading.warn(
+            in.mark("id"),
+            "id " + node->scalar +
+                " is outside the standard's 1 to 247: some devices have it (Temco, SIN-8), "
+                "others answer it whatever their own is (PZEM 248, soil sensors 255); "
+                "give the device one from 1 to 247 if it can have that");
     const std::string on = std::to_string(loading.config.lines.size());  // this line's index
     loading.firsts.once(in, "id", "id " + on + '/' + node->scalar,
                         "there are two stations " + node->scalar + " on this line");
@@ -131,6 +136,7 @@ std::uint16_t read_limit(const PanelProfile& profile, std::initializer_list<std:
 
 void check_range(MapReader& in, const PanelProfile& profile, std::uint8_t id) {
     if (id == 0 || (id >= profile.first_station && id <= profile.last_station)) return;
+    if (id > modbus::kMaxStation && profile.name == "generic") return;  // load_id() has warned
     in.problem("id", "id must be from " + std::to_string(profile.first_station) + " to " +
                          std::to_string(profile.last_station) + " for " + profile.name + ", not " +
                          std::to_string(id) + " (" + profile.manual + ')');
@@ -147,6 +153,10 @@ void warn_of_unused_keys(Loading& loading, MapReader& in, const StationSettings&
     warn("max_age", settings.max_age > Duration::zero());
     warn("guard", station.guard);
     warn("translate", !station.translate);
+    if (settings.any_length)
+        loading.warn(in.mark("any_length"),
+                     "any_length does nothing on a line that is only listened to (mode: listen): "
+                     "no client reads through the gateway there; leave it out");
 }
 
 /// Reads what a template may have: all but id, name and profile, which `station` has.
@@ -183,10 +193,13 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineContext& wo
 }
 
 /// Keys that users write beside `id`.
-constexpr std::array<yaml::Elsewhere, 10> kStationKeysElsewhere{
+constexpr std::array<yaml::Elsewhere, 13> kStationKeysElsewhere{
     {{"response_timeout", "timing", {}},
      {"frame_gap", "timing", {}},
      {"late_window", "timing", {}},
+     {"station_gap", "timing", {}},
+     {"after_write", "timing", {}},
+     {"connect_pause", {}, "a line: all stations share its connection"},
      {"think_time", "timing", {}},
      {"serial", {}, "a line: all stations of a line share it"},
      {"baud", {}, "a line's serial"},

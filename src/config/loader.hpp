@@ -86,6 +86,11 @@ void load_section(Loading& loading, yaml::MapReader& root, std::string_view key,
     });
 }
 
+/// Warns at `device` if `device` and `other`, the device of `owner`, are two names of one adapter:
+/// only one owner can open an adapter (solax-modbus#1171).
+void warn_of_same_adapter(Loading& loading, yaml::MapReader& in, const std::string& device,
+                          const std::string& owner, const std::string& other);
+
 /// Returns nullptr if there is none.
 const Line* find_line(const Config& config, std::string_view name);
 

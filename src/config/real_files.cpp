@@ -64,6 +64,12 @@ std::optional<std::string> read_all(int file) {
 
 }  // namespace
 
+std::string RealFiles::real_path(const std::string& path) const {
+    std::error_code unknown;
+    const fs::path real = fs::canonical(path, unknown);
+    return unknown ? path : real.string();
+}
+
 bool RealFiles::is_special(const std::string& path) const {
     std::error_code error;
     const fs::file_status status = fs::status(path, error);

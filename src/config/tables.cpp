@@ -80,6 +80,12 @@ const Keys<Line>& line_keys() {
             .other("device",
                    "Serial device, tcp://HOST:PORT (RTU over TCP), or sim (simulated panels).")
             .change_needs(kOpensPort)
+            .duration(
+                "connect_pause", [](auto& line) -> auto& { return line.arbiter.connect_pause; },
+                0ms, 1min,
+                "Of a tcp:// line: pause behind each connecting, for a device server that ignores "
+                "what comes at once.")
+            .shown_if([](const Line& line) { return line.kind == Line::Kind::tcp; })
             .other("mode",
                    "listen: another master asks on this line, nothing is ever sent, and "
                    "points show what passes by.",
@@ -206,6 +212,15 @@ const Keys<Timing>& timing_keys() {
                 10min,
                 "How long after a timeout a late reply may still come; auto: as has been seen of "
                 "the station.")
+            .duration(
+                "station_gap", [](auto& of) -> auto& { return of.settings.station_gap; }, 0ms, 10s,
+                "Least time between a reply of a station and the next request to it; other "
+                "stations are asked meanwhile.")
+            .duration(
+                "after_write", [](auto& of) -> auto& { return of.settings.after_write; }, 0ms, 1min,
+                "Least time between a station's answer to a write and the next request to it, "
+                "where "
+                "longer than station_gap.")
             .duration("think_time", &Timing::think_time, 0ms, 10s,
                       "Think time of a panel that the plan of `check` assumes.");
     return kKeys;
@@ -300,6 +315,11 @@ const Keys<StationBody, StationView>& station_keys() {
                 "15 and 16, and 02 and 04 as 01 and 03 where the profile says that the "
                 "memory is the same. Not with a guard.")
             .initially("auto")
+            .boolean(
+                "any_length", [](auto& of) -> auto& { return of.settings.any_length; },
+                "Passes replies to reads (01 to 04) of any length on to Modbus clients, for "
+                "registers of 4 or 12 bytes; points and polls still need two bytes a register.")
+            .initially("false")
             .other("poll", "Blocks that are polled, to answer clients (max_age).")
             .other("simulate", "Of a simulated panel: what it does wrong.")
             .change_needs(kOpensPort)

@@ -90,6 +90,7 @@ Sample difference(const Sample& later, const Sample& earlier) {
             before == earlier.stations.end() ? symptoms : minus(symptoms, before->second);
     }
     window.broadcasts = later.broadcasts - earlier.broadcasts;
+    window.telnet = later.telnet;
     if (later.uart) window.uart = minus(*later.uart, earlier.uart.value_or(line::UartErrors{}));
     return window;
 }

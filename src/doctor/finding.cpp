@@ -12,8 +12,9 @@ namespace panelgate::doctor {
 namespace {
 
 /// In the order of Cause.
-constexpr std::array<std::string_view, 23> kCodes{
+constexpr std::array<std::string_view, 24> kCodes{
     "echo",
+    "telnet",
     "no-answer-at-all",
     "wrong-baud",
     "wrong-parity",

@@ -29,13 +29,23 @@ void find_echo(Case& c) {
     }
 }
 
+/// Negotiation at the start of a connection is telnet (RFC 854) and nothing else: no counts are
+/// waited for.
+void find_telnet(Case& c) {
+    if (!c.window.telnet) return;
+    c.add(Cause::telnet, {}, "The device server speaks telnet, which mixes bytes of its own in.",
+          "Set its port to raw TCP, without telnet and RFC 2217 (ser2net: accepter `tcp`, not "
+          "`telnet(rfc2217)`).",
+          "the connection began with telnet's negotiation (FF FB to FF FE)", {});
+}
+
 namespace {
 
 std::string silence_advice(const LineFacts& facts) {
     if (facts.over_tcp)
-        return "The TCP connection is up. Check whether the server can open its serial port and no "
-               "other program uses it, its baud and parity, the power of the panels and the "
-               "stations' addresses.";
+        return "The TCP connection is up. Check the server's mode (raw or transparent, not "
+               "Modbus/TCP), whether it can open its serial port and no other program uses it, its "
+               "baud and parity, the power of the panels and the stations' addresses.";
     return "Check the power of the panels, the wires A and B (swapped?) and their bias, `serial` "
            "(now " +
            to_string(facts.serial) + ") and the stations' addresses.";

@@ -90,6 +90,7 @@ Cause cause_of_damage(const Case& c, const arbiter::Symptoms& symptoms);
 // Each adds at most one finding per line or station. When it is asked, and beside what it is not
 // named, is the table in diagnose.cpp.
 void find_echo(Case& c);
+void find_telnet(Case& c);
 void find_no_answer(Case& c);
 void find_other_master(Case& c);
 void find_collision(Case& c);

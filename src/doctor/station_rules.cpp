@@ -308,7 +308,7 @@ void find_wrong_reply(Case& c, std::uint8_t station, const Symptoms& s) {
                 "panel its own."
               : "Compare the line's trace with the panel's manual: another function, length or "
                 "address than was asked comes back. Another function or a shorter read may be what "
-                "it can do.",
+                "it can do; registers of 4 or 12 bytes need `any_length: true`.",
           share_text(wrong, s.attempts(), "requests") + " were answered so, " +
               std::to_string(s.answered) + " rightly",
           {{"wrong", wrong}, {"requests", s.attempts()}, {"right", s.answered}});

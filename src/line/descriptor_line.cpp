@@ -156,6 +156,7 @@ void DescriptorLine::opened() {
 }
 
 void DescriptorLine::lost(const std::string& why) {
+    if (is_open()) was_lost(has_sent_ && !has_received_);
     close();
     go_down(settings_.device + " is gone: " + why, has_received_ || may_have_returned());
 }

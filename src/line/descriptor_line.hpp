@@ -119,6 +119,10 @@ class DescriptorLine : public Line {
     virtual bool may_have_returned() const { return false; }
     /// Returns the driver's counters, also while the device is closed.
     virtual std::optional<UartErrors> uart_errors() { return {}; }
+    /// The open device is lost; `unanswered`: bytes were sent, and none came back.
+    virtual void was_lost(bool unanswered) { static_cast<void>(unanswered); }
+    /// Whether this connection began with telnet's negotiation (Counters::telnet).
+    void set_telnet(bool telnet) { counters_.telnet = telnet; }
     /// Tries to open the device soon, unless it is open.
     void open_soon();
 

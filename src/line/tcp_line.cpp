@@ -22,6 +22,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <system_error>
 #include <thread>
@@ -30,6 +31,7 @@
 #include "descriptor_line.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/rt/acceptor.hpp"
+#include "panelgate/rt/log.hpp"
 
 namespace panelgate::line {
 
@@ -214,9 +216,11 @@ class TcpLine final : public DescriptorLine {
     std::string blocked_reason() const override { return "the connection takes nothing"; }
     std::optional<TimePoint> unacknowledged_since();
     void resolve();
+    ssize_t get(std::span<std::uint8_t> room) override;
     ssize_t put(ByteView bytes) override {
         return ::send(fd(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
     }
+    void was_lost(bool unanswered) override;
     void cancel_open() override;
     void give_up();
     void connect(const NameLookup::Addresses& addresses);
@@ -238,7 +242,11 @@ class TcpLine final : public DescriptorLine {
     std::uint64_t attempt_ = 0;
     TimePoint last_write_{};
     std::size_t last_size_ = 0;
-    TimePoint older_{};  ///< of the bytes unacknowledged at the last write
+    TimePoint older_{};       ///< of the bytes unacknowledged at the last write
+    bool has_begun_ = false;  ///< the first bytes of this connection were looked at
+    int hang_ups_ = 0;        ///< connections in a row that ended without an answer
+    bool told_telnet_ = false;
+    bool told_hang_ups_ = false;
 };
 
 void TcpLine::begin_open() {
@@ -280,6 +288,8 @@ void TcpLine::connected() {
     if (error) return failed(error.message());
     const std::string refused = adopt(released);
     if (!refused.empty()) return failed(refused);
+    has_begun_ = false;
+    set_telnet(false);
     opened();
 }
 
@@ -298,6 +308,45 @@ Duration TcpLine::latency() {
     socklen_t size = sizeof info;
     if (!is_open() || ::getsockopt(fd(), IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return {};
     return std::chrono::microseconds(info.tcpi_rtt + 4 * info.tcpi_rttvar);
+}
+
+namespace {
+
+/// True for telnet's IAC with WILL, WONT, DO or DONT (RFC 854). A server negotiates before
+/// anything else (ser2net#30, teraterm#916).
+bool begins_like_telnet(ByteView bytes) {
+    constexpr std::uint8_t kIac = 0xFF;
+    constexpr std::uint8_t kWill = 0xFB;
+    return bytes.size() >= 2 && bytes[0] == kIac && bytes[1] >= kWill && bytes[1] != kIac;
+}
+
+}  // namespace
+
+ssize_t TcpLine::get(std::span<std::uint8_t> room) {
+    const ssize_t size = DescriptorLine::get(room);
+    if (size <= 0 || std::exchange(has_begun_, true)) return size;
+    const bool telnet = begins_like_telnet(room.first(static_cast<std::size_t>(size)));
+    set_telnet(telnet);
+    if (telnet && !std::exchange(told_telnet_, true))
+        rt::log(rt::LogLevel::warn, "device server speaks telnet",
+                {{"device", settings().device},
+                 {"advice",
+                  "set its port to raw TCP, without telnet and RFC 2217 (ser2net: "
+                  "accepter tcp)"}});
+    return size;
+}
+
+/// A box in Modbus/TCP mode takes RTU frames for broken headers and hangs up
+/// (node-modbus-serial#171, tf03mqtt#4).
+void TcpLine::was_lost(bool unanswered) {
+    constexpr int kMany = 3;
+    hang_ups_ = unanswered ? hang_ups_ + 1 : 0;
+    if (hang_ups_ < kMany || std::exchange(told_hang_ups_, true)) return;
+    rt::log(rt::LogLevel::warn, "device server hangs up on requests",
+            {{"device", settings().device},
+             {"advice",
+              "set its mode to raw (transparent): one that speaks Modbus/TCP refuses "
+              "RTU frames; or another client has its port"}});
 }
 
 void TcpLine::write(ByteView bytes) {

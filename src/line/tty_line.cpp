@@ -4,6 +4,7 @@
 #include <sys/file.h>
 #include <sys/inotify.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <algorithm>
 #include <array>
@@ -11,7 +12,9 @@
 #include <cerrno>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -139,6 +142,40 @@ constexpr Duration kTransferTime = 50ms;
 /// Limit for closing a device that keeps bytes it was to drop.
 constexpr Duration kCloseWait = 10ms;
 
+/// Enters an open serial device in the list of this process, for as long as the object lives: two
+/// links may lead to one adapter (solax-modbus#1171). One thread drives all lines.
+class OpenDevice {
+  public:
+    OpenDevice(int fd, const Settings& settings) {
+        struct stat status{};
+        if (::fstat(fd, &status) != 0 || !S_ISCHR(status.st_mode)) return;
+        number_ = status.st_rdev;
+        all()[*number_] = (settings.owner.empty() ? "another line" : settings.owner) +
+                          " of this gateway holds it, as " + settings.device;
+    }
+    ~OpenDevice() {
+        if (number_) all().erase(*number_);
+    }
+    OpenDevice(const OpenDevice&) = delete;
+    OpenDevice& operator=(const OpenDevice&) = delete;
+
+    /// Returns who of this process holds the device at this path, a clause; "" nobody.
+    static std::string holder_of(const std::string& path) {
+        struct stat status{};
+        if (::stat(path.c_str(), &status) != 0 || !S_ISCHR(status.st_mode)) return {};
+        const auto found = all().find(status.st_rdev);
+        return found == all().end() ? "" : found->second;
+    }
+
+  private:
+    static std::map<dev_t, std::string>& all() {
+        static std::map<dev_t, std::string> devices;
+        return devices;
+    }
+
+    std::optional<dev_t> number_;
+};
+
 class TtyLine final : public DescriptorLine {
   public:
     TtyLine(const boost::asio::any_io_executor& executor, rt::Clock& clock,
@@ -185,7 +222,8 @@ class TtyLine final : public DescriptorLine {
     std::string last_rs485_warning_;
     std::string last_latency_warning_;
     TimePoint drain_deadline_{};  ///< a driver with unsent bytes after this is stuck
-    bool exclusive_ = false;      ///< set by us: another program's lock must stay
+    std::optional<OpenDevice> entry_;
+    bool exclusive_ = false;  ///< set by us: another program's lock must stay
 };
 
 void TtyLine::begin_open() {
@@ -198,11 +236,13 @@ void TtyLine::begin_open() {
 /// Returns an empty text if the device is ready.
 std::string TtyLine::try_open() {
     const std::string& device = settings().device;
+    if (std::string holder = OpenDevice::holder_of(device); !holder.empty()) return holder;
     const int access = settings().listen_only ? O_RDONLY : O_RDWR;
     const int opened = ::open(device.c_str(), access | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (opened < 0) return explain_open_error(device, errno);
     if (std::string error = adopt(opened); !error.empty()) return error;
     if (flock(fd(), LOCK_EX | LOCK_NB) != 0) return holder_of_lock(fd()) + " holds it";
+    entry_.emplace(fd(), settings());
     exclusive_ = ops_.control(fd(), TIOCEXCL, nullptr) >= 0;  // against programs without flock()
     return set_up();
 }
@@ -244,6 +284,7 @@ void TtyLine::warn_once(std::string& last, const std::string& what, const std::s
 
 void TtyLine::close_device(bool discard) {
     rts_.closing();
+    entry_.reset();
     if (std::exchange(exclusive_, false)) ops_.control(fd(), TIOCNXCL, nullptr);
     std::optional<CallInterrupter> interrupter;
     if (discard) {

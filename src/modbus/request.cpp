@@ -175,8 +175,7 @@ Access access_of(ByteView pdu) {
 
 std::optional<Span> read_span(ByteView pdu) {
     constexpr std::size_t kSize = kReadRequestAdu - kAduOverhead;
-    if (pdu.size() != kSize || pdu[0] < kReadCoils || pdu[0] > kReadInputRegisters)
-        return std::nullopt;
+    if (pdu.size() != kSize || !reads_table(pdu[0])) return std::nullopt;
     const std::optional<Span> span = access_of(pdu).read;
     if (span->count == 0 || span->end() > kTableItems) return std::nullopt;
     return span;
@@ -202,6 +201,15 @@ Request::Request(Bytes pdu)
       span_(modbus::read_span(pdu_)),
       reply_length_(reply_length_from_request(pdu_)) {}
 
+Request Request::with_any_length() const {
+    Request same = *this;
+    if (!reads_table(function())) return same;
+    same.byte_count_ = ByteCount::any;
+    same.span_.reset();
+    same.reply_length_.reset();
+    return same;
+}
+
 Result<Request> Request::make(Bytes pdu, QuantityCheck check) {
     if (const auto legal = check_request(pdu, check); !legal) return legal.error();
     return Request(std::move(pdu));
@@ -222,8 +230,9 @@ std::size_t request_adu_length(ByteView heard) {
     return one || many ? request_length(heard).length : 0;
 }
 
-std::optional<std::size_t> reply_length_from_request(ByteView pdu) {
+std::optional<std::size_t> reply_length_from_request(ByteView pdu, ByteCount byte_count) {
     if (pdu.empty()) return std::nullopt;
+    if (byte_count == ByteCount::any && reads_table(pdu[0])) return std::nullopt;
     switch (pdu[0]) {
         case kReadCoils:
         case kReadDiscreteInputs:

@@ -77,10 +77,12 @@ bool answers_encapsulated(ByteView request, ByteView reply) {
 
 }  // namespace
 
-bool answers(ByteView request, ByteView reply) {
+bool answers(ByteView request, ByteView reply, ByteCount byte_count) {
     if (request.empty() || reply.empty()) return false;
     if (reply[0] == (request[0] | kExceptionBit)) return exception_of(reply).has_value();
     if (reply[0] != request[0]) return false;
+    if (byte_count == ByteCount::any && reads_table(request[0]))
+        return has_true_byte_count(reply) && reply[1] > 0 && reply.size() <= kMaxPdu;
     switch (request[0]) {
         case kReadCoils:
         case kReadDiscreteInputs:

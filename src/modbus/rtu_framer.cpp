@@ -84,12 +84,13 @@ ReplyLength reply_length(ByteView b) {
 }
 
 ReplyFramer::ReplyFramer(std::uint8_t station, Bytes request_pdu, const CrcOrders& orders,
-                         Ends ends)
+                         Ends ends, ByteCount byte_count)
     : station_(station),
       request_(std::move(request_pdu)),
       orders_(orders),
       ends_(ends),
-      expected_(reply_length_from_request(request_)) {}
+      byte_count_(byte_count),
+      expected_(reply_length_from_request(request_, byte_count)) {}
 
 std::optional<Bytes> ReplyFramer::feed(ByteView bytes) {
     heard_.insert(heard_.end(), bytes.begin(), bytes.end());
@@ -268,7 +269,7 @@ std::optional<Bytes> ReplyFramer::judge(std::size_t start, bool silence, bool& o
 std::optional<Bytes> ReplyFramer::answering(ByteView frame) const {
     if (frame.size() > kMaxLongRtuAdu || !crc_ok(frame, orders_)) return std::nullopt;
     const ByteView pdu = pdu_of(frame);
-    if (!answers(request_, pdu)) return std::nullopt;
+    if (!answers(request_, pdu, byte_count_)) return std::nullopt;
     return Bytes(pdu.begin(), pdu.end());
 }
 
@@ -340,16 +341,21 @@ std::size_t ReplyFramer::size_from_start(ByteView bytes) const {
     return 0;
 }
 
+/// Returns distinct_byte_count() of the request; nothing where the reply may have any byte count.
+std::optional<std::uint8_t> ReplyFramer::distinct_count() const {
+    return expected_ ? distinct_byte_count(request_) : std::nullopt;
+}
+
 /// True for our damaged reply, and not for our own frame, which may begin like it.
 bool ReplyFramer::is_own_reply(ByteView damaged) const {
-    const auto count = distinct_byte_count(request_);
+    const auto count = distinct_count();
     return count && damaged.size() >= std::min(*expected_, kReadRequestAdu + 1) &&
            damaged[0] == station_ && damaged[1] == request_[0] && damaged[2] == *count;
 }
 
 /// Bytes of the beginning of our own frame, which no reply to the read has.
 std::size_t ReplyFramer::own_beginning(ByteView damaged) const {
-    if (!distinct_byte_count(request_)) return 0;
+    if (!distinct_count()) return 0;
     const Bytes own = encode_adu(station_, request_, orders_.of(station_));
     const auto same = std::ranges::mismatch(damaged, own).in1 - damaged.begin();
     return std::cmp_less(same, kHeader) ? 0 : static_cast<std::size_t>(same);

@@ -343,6 +343,35 @@ void warn_of_timeouts(const Line& line, const LinePlan& plan, std::vector<std::s
     }
 }
 
+/// Returns which part of each second the station is asked or rests; more than 1 cannot be.
+double share_with_rests(const LinePlan& plan, const Station& station) {
+    const Duration after_write = std::max(station.station_gap, station.after_write);
+    double share = 0;
+    for (const Poll& poll : plan.polls)
+        if (poll.station == station.name)
+            share += to_seconds(poll.wire + station.station_gap) / to_seconds(poll.every);
+    for (const RelayLoad& relay : plan.relays) {
+        if (relay.station != station.name || relay.request == RelayLoad::Request::reread) continue;
+        const bool writes = relay.request == RelayLoad::Request::write;
+        const Duration rest = writes ? after_write : station.station_gap;
+        share += to_seconds(relay.wire + rest) / to_seconds(relay.every);
+    }
+    return share;
+}
+
+void warn_of_rests(const Line& line, const LinePlan& plan, std::vector<std::string>& messages) {
+    for (const Station& station : line.stations) {
+        if (station.station_gap + station.after_write == Duration::zero()) continue;
+        const double share = share_with_rests(plan, station);
+        if (share <= 1) continue;
+        const double times = std::ceil(share * 10) / 10;
+        messages.push_back("line " + line.name + ": with its station_gap and after_write '" +
+                           station.name + "' is busy for longer than its polls and relays allow; " +
+                           "ask it " + number_text(times) +
+                           " times as seldom, or for more items at once");
+    }
+}
+
 /// A periodic request whose items could be fewer.
 struct Transaction {
     std::string what;
@@ -405,6 +434,7 @@ void warn_of_deadline(const Line& line, const LinePlan& plan, std::vector<std::s
 std::vector<std::string> warnings(const Line& line, const LinePlan& plan) {
     std::vector<std::string> messages;
     warn_of_timeouts(line, plan, messages);
+    warn_of_rests(line, plan, messages);
     if (messages.empty())
         warn_of_deadline(line, plan, messages);  // otherwise the think times are at fault
     return messages;

@@ -189,10 +189,11 @@ std::optional<AddressRange> range(MapReader& in, std::string_view key) {
 void load_stations(const Node& node, PanelProfile& profile, Problems& problems) {
     MapReader in(node, problems, "stations");
     profile.first_station =
-        static_cast<std::uint8_t>(in.integer("first", 1, modbus::kMaxStation).value_or(1));
-    profile.last_station =
-        static_cast<std::uint8_t>(in.integer("last", profile.first_station, modbus::kMaxStation)
-                                      .value_or(modbus::kMaxStation));
+        static_cast<std::uint8_t>(in.integer("first", 1, modbus::kMaxListedStation).value_or(1));
+    constexpr std::uint8_t kMost = modbus::kMaxListedStation;
+    profile.last_station = static_cast<std::uint8_t>(
+        in.integer("last", profile.first_station, kMost)
+            .value_or(std::max(profile.first_station, modbus::kMaxStation)));
     in.text("source");
     in.finish();
 }

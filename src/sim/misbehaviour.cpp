@@ -10,6 +10,7 @@
 
 #include "panelgate/base/text.hpp"
 #include "panelgate/modbus/ascii.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::sim {
@@ -161,7 +162,8 @@ Spoken misbehave(const Misbehaviour& faults, Bytes adu, std::mt19937& chance,
     Spoken spoken{std::move(adu), faults.slow, {}};
     if (happens(faults.late)) spoken.delay += faults.late_by;
     if (happens(faults.foreign_id)) {
-        const auto other = static_cast<std::uint8_t>(spoken.adu[0] == 247 ? 1 : spoken.adu[0] + 1);
+        const auto other =
+            static_cast<std::uint8_t>(spoken.adu[0] >= modbus::kMaxStation ? 1 : spoken.adu[0] + 1);
         spoken.adu = modbus::encode_adu(other, modbus::pdu_of(spoken.adu));
     }
     const bool ascii = format.mode == SerialMode::ascii;

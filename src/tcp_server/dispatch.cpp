@@ -27,9 +27,12 @@ void Caller::certify(std::string subject, std::optional<std::string> role,
 void Caller::transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,
                       bus::AnswerHandler handler) {
     use(bus);
-    bus->transact(
-        {.station = station, .request = std::move(request), .client = client_, .who = who_},
-        std::move(handler));
+    bus->transact({.station = station,
+                   .request = std::move(request),
+                   .client = client_,
+                   .who = who_,
+                   .verbatim = true},
+                  std::move(handler));
 }
 
 void Caller::count_refused(bus::RequestPort* bus, std::uint8_t station, ByteView pdu) {

@@ -32,7 +32,7 @@ std::size_t UnitMap::index_of(const std::string& line) const {
 
 void UnitMap::add_stations(std::size_t line, const std::vector<std::uint8_t>& stations) {
     for (const std::uint8_t station : stations) {
-        if (station == 0 || station > modbus::kMaxStation) continue;
+        if (station == 0) continue;
         std::optional<Place>& place = direct_[station];
         // Listed on two lines: ambiguous, and guessing could return a wrong value.
         const bool ambiguous = listed_[station] && (!place || place->line != line);

@@ -87,7 +87,7 @@ class CommandLine(unittest.TestCase):
         self.assertIn("lines.queue.limit: 1 to 4096 (default 256)\n    Most requests that wait, of all clients together.\n",
                       keys("lines.queue"))
         self.assertIn("lines.timing.frame_gap: 0ms to 10s, or auto (default auto)\n", keys("lines.timing"))
-        self.assertIn("lines.stations.id: 1 to 247 (required)\n", keys())
+        self.assertIn("lines.stations.id: 1 to 255 (required)\n", keys())
         self.assertIn("there is no key", self.expect(USAGE, "config", "keys", "nothing").stderr)
         self.assertIn("did you mean 'lines'?", self.expect(USAGE, "config", "keys", "linse").stderr)
 

@@ -230,7 +230,7 @@ class Itself(unittest.TestCase):
                      "<!-- test: output -->\n```text\npanelgate ...\nand more\n```\n",
                      "<!-- test: program -->\n```sh\ntrue\n```\n",
                      "<!-- test: config -->\n```yaml\nlines: 7\n```\n",
-                     "<!-- test: station -->\n```yaml\n- {id: 248}\n```\n",
+                     "<!-- test: station -->\n```yaml\n- {id: 256}\n```\n",
                      "<!-- test: config-part mqtt -->\n```yaml\nlog: {level: info}\n```\n",
                      "<!-- test: script -->\n```sh\ndeploy/nothing.sh\n```\n"):
             with self.subTest(text=text), tempfile.TemporaryDirectory() as folder:

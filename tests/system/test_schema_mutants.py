@@ -54,7 +54,7 @@ realtime: {{priority: 0}}
 ONLY_CHECK = {
     "what a profile has": {
         "lines/stations/points/at", "lines/stations/poll/read", "lines/stations/poll/count",
-        "lines/stations/profile", "relays/count", "relays/from", "relays/to",
+        "lines/stations/id", "lines/stations/profile", "relays/count", "relays/from", "relays/to",
         "access/rules/range"},
     "names that stand elsewhere, and those that would stand twice": {
         "lines/name", "lines/stations", "lines/stations/name", "lines/stations/template",

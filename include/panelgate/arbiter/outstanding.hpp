@@ -25,6 +25,10 @@ struct Asked {
     TimePoint until{};   ///< no reply comes later than this, as far as the late window tells
     unsigned epoch = 0;  ///< number of the connection that carried the request (T8); set by add()
     Bytes pdu{};
+    modbus::ByteCount byte_count = modbus::ByteCount::as_asked;  ///< of its reply (T14)
+
+    /// True if this reply PDU may be the reply.
+    bool may_be_answered(ByteView reply) const;
 };
 
 /// The memory of one line's past, by station: requests whose reply may still come, and the last

@@ -53,7 +53,7 @@ ClientId next_client_id();
 
 /// One request to one station; station 0 is a broadcast.
 struct Request {
-    std::uint8_t station = 0;  ///< 0..247
+    std::uint8_t station = 0;  ///< 0..255; above 247 only a listed one
     modbus::Request request;
     ClientId client = 0;
     WhoRef who{};       ///< null: nobody has said; then neither rights nor records know it
@@ -63,6 +63,9 @@ struct Request {
     /// A station search with a limited share of the line: may ask silent unlisted stations again.
     bool search = false;
     bool raw = false;  ///< a PDU that its client has made itself, as REST's `raw`
+    /// The client takes the reply's bytes as they are: `any_length` of the station counts. Other
+    /// clients cut values out of the reply, which must then be as long as was asked.
+    bool verbatim = false;
 };
 
 enum class Source : std::uint8_t { bus, cache };

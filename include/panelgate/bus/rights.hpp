@@ -60,6 +60,9 @@ struct StationSettings {
     Access access = Access::read_write;
     Guard guard{};          ///< empty: nothing is refused
     Translate translate{};  ///< empty: requests are sent unchanged
+    /// Replies to reads of the station's tables may have any length (modbus::ByteCount::any), for
+    /// clients that take a reply's bytes as they are.
+    bool any_length = false;
     /// Functions that the panel is likely to be asked: their counters start at 0.
     std::vector<std::uint8_t> functions{};
     /// The same for `translate`: function requested and function sent.
@@ -73,6 +76,9 @@ using Stations = std::map<std::uint8_t, StationSettings>;
 /// translated: they go to many stations.
 std::optional<modbus::Request> translated(const Stations& stations, std::uint8_t id,
                                           const modbus::Request& request);
+
+/// True if the station is listed with `any_length`.
+bool has_any_length(const Stations& stations, std::uint8_t id);
 
 /// Returns the station's name, or its id if it is not listed.
 std::string name_of(const Stations& stations, std::uint8_t id);

@@ -112,6 +112,9 @@ struct Files {
     virtual bool is_readable_by_all(const std::string&) const { return false; }
     /// True if the path is a pipe, a socket or a device, whose reading might never end.
     virtual bool is_special(const std::string&) const { return false; }
+    /// The path without symbolic links, such as /dev/ttyUSB0 for /dev/serial/by-id/...; the path
+    /// itself where no such file exists.
+    virtual std::string real_path(const std::string& path) const { return path; }
 };
 
 /// Parses and checks a configuration. Returns nothing if it adds anything to `problems`.

@@ -15,6 +15,7 @@ class RealFiles final : public Files {
     std::optional<std::vector<std::string>> list_yaml(const std::string& dir) const override;
     bool is_readable_by_all(const std::string& path) const override;
     bool is_special(const std::string& path) const override;
+    std::string real_path(const std::string& path) const override;
 
     /// Like read(), but also reads a pipe or a device, without a time limit: for paths of the
     /// command line. A named pipe without a writer within a second is not read (EPIPE).

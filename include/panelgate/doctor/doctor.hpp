@@ -36,6 +36,7 @@ struct Sample {
     std::map<std::uint8_t, arbiter::Symptoms> stations;
     std::optional<line::UartErrors> uart;
     std::uint64_t broadcasts = 0;  ///< sent; no panel should answer them
+    bool telnet = false;           ///< the connection began with telnet's negotiation
 
     /// Sum of all stations; mute_in_a_row and worst_lateness are the maximum.
     arbiter::Symptoms total() const;
@@ -43,8 +44,8 @@ struct Sample {
 };
 
 /// Returns what was counted between two times on one line. Values that are no counters
-/// (mute_in_a_row, worst_lateness) are those of `later`. Counters that have begun anew, so that one
-/// is smaller than before, count from zero.
+/// (mute_in_a_row, worst_lateness, telnet) are those of `later`. Counters that have begun anew, so
+/// that one is smaller than before, count from zero.
 Sample difference(const Sample& later, const Sample& earlier);
 
 /// Returns the findings of a window, the likeliest cause first: in the order of Cause, and by

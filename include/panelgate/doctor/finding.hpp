@@ -24,6 +24,7 @@ struct Settings {
 /// The probable fault; causes of the whole line come first.
 enum class Cause : std::uint8_t {
     echo,                ///< the adapter's echo differs from the configuration
+    telnet,              ///< a device server mixes telnet's bytes in
     no_answer_at_all,    ///< wiring, power, baud, parity or addresses
     wrong_baud,          ///< bytes come at another rate
     wrong_parity,        ///< bytes come at the right rate but with parity errors

@@ -19,6 +19,7 @@ struct Counters {
     std::uint64_t bytes_sent = 0;
     std::uint64_t bytes_received = 0;
     std::optional<UartErrors> uart;  ///< if the driver counts them
+    bool telnet = false;  ///< no count: the last connection began with telnet's negotiation
 };
 
 }  // namespace panelgate::line

@@ -40,6 +40,7 @@ struct Settings {
     /// rate, if that is more. A device that never stops must not block the other lines.
     std::size_t input_rate = 2 * 1024 * 1024;
     bool simulated = false;  ///< our own pty, which has no parity: no warning about that
+    std::string owner{};     ///< "line 'floor1'": whose device it is, for messages
     friend bool operator==(const Settings&, const Settings&) = default;
 };
 

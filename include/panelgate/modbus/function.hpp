@@ -50,6 +50,9 @@ inline constexpr std::size_t kMaxLongRtuAdu = 260;
 /// Longest write to it (ARCT1F501E gives no limit, the byte count does): 0F with 255 data bytes.
 inline constexpr std::size_t kMaxLongRequestPdu = 261;
 inline constexpr std::uint8_t kMaxStation = 247;  ///< serial line V1.02, 2.2
+/// The standard reserves 248 to 255. Devices use these addresses all the same (modbus-tk#6,
+/// minimalmodbus#101, mbpoll#75): a station there is asked if the configuration lists it.
+inline constexpr std::uint8_t kMaxListedStation = 255;
 
 /// The four tables of the data model (AP 4.3).
 enum class Table : std::uint8_t { coils, discrete_inputs, input_registers, holding_registers };
@@ -62,6 +65,10 @@ inline constexpr bool is_bit_table(Table table) {
 }
 Function read_function(Table table);
 
+/// True for 01 to 04, the reads of the four tables.
+inline constexpr bool reads_table(std::uint8_t function) {
+    return function >= kReadCoils && function <= kReadInputRegisters;
+}
 /// True for pure reads, which may be repeated without harm (RTY-02: 01..04, 07, 0B, 0C, 11, 14,
 /// 18). 2B is one only with MEI type 0E; see is_pure_read(pdu) in request.hpp.
 bool is_read(std::uint8_t function);

@@ -23,6 +23,14 @@ enum class QuantityCheck {
     wide,  ///< REST and polls: up to 255 data bytes, the GT's larger frames
 };
 
+/// How the byte count of a normal reply to a read of a table (01 to 04) is judged.
+enum class ByteCount : std::uint8_t {
+    as_asked,  ///< the quantity asked decides
+    /// The reply's own byte count decides. Devices with registers of 4 or 12 bytes (pymodbus#669,
+    /// libmodbus#466, NModbus4#80).
+    any,
+};
+
 /// Checks whether this PDU may be transmitted. Function 0 or 128..255: Fault::denied. A length that
 /// contradicts the function (PDU-07) or a reply that cannot fit: Fault::malformed. Unknown
 /// functions have no length rule and pass. An empty PDU is malformed.
@@ -49,6 +57,10 @@ class Request {
     /// Makes a read of at least one item, none beyond the end of the table, no more than a wide
     /// reply holds.
     static Request read(const Span& span);
+    /// Returns this request with ByteCount::any if it reads a table, otherwise unchanged. With
+    /// ByteCount::any nobody knows which items a reply holds: such a request has no span(), so that
+    /// its reply is not shared, cut or remembered, and no reply_length().
+    Request with_any_length() const;
 
     const Bytes& pdu() const { return pdu_; }
     std::uint8_t function() const { return pdu_[0]; }
@@ -57,19 +69,25 @@ class Request {
     bool is_broadcastable() const { return modbus::is_broadcastable(function()); }
     /// True for a unicast request that gets no reply (DIA-01).
     bool is_never_answered() const { return modbus::is_never_answered(pdu_); }
-    /// Returns read_span() of the PDU: std::nullopt unless it is a read of one table.
+    /// Returns how the byte count of a reply is judged.
+    ByteCount byte_count() const { return byte_count_; }
+    /// Returns read_span() of the PDU: std::nullopt unless it is a read of one table with
+    /// ByteCount::as_asked.
     const std::optional<Span>& span() const { return span_; }
     /// Returns the items that it reads and writes.
     Access access() const { return access_of(pdu_); }
     /// Lq: returns reply_length_from_request() of the PDU.
     std::optional<std::size_t> reply_length() const { return reply_length_; }
-    friend bool operator==(const Request& a, const Request& b) { return a.pdu_ == b.pdu_; }
+    friend bool operator==(const Request& a, const Request& b) {
+        return a.pdu_ == b.pdu_ && a.byte_count_ == b.byte_count_;
+    }
 
   private:
     explicit Request(Bytes pdu);
 
     Bytes pdu_;
     bool read_;
+    ByteCount byte_count_ = ByteCount::as_asked;
     std::optional<Span> span_;
     std::optional<std::size_t> reply_length_;
 };
@@ -79,8 +97,9 @@ class Request {
 std::size_t request_adu_length(ByteView heard);
 
 /// Length of the normal RTU reply (address to CRC) if the request determines it; 0 for 08/0004;
-/// std::nullopt if only the reply determines it.
-std::optional<std::size_t> reply_length_from_request(ByteView pdu);
+/// std::nullopt if only the reply determines it, as with ByteCount::any for 01 to 04.
+std::optional<std::size_t> reply_length_from_request(ByteView pdu,
+                                                     ByteCount byte_count = ByteCount::as_asked);
 
 /// The byte count of the normal reply to this read, where the request has another byte in that
 /// place: by it one frame's beginning is told from the other's. Empty: it tells nothing.

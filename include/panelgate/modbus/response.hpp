@@ -11,8 +11,10 @@ namespace panelgate::modbus {
 
 /// True if this reply PDU answers this request: same function (or its exception, two bytes), byte
 /// count equal to the quantity requested, echoed address, value and quantity equal for writes
-/// (FRM-04, P1). Functions that this file does not know match by function code alone.
-bool answers(ByteView request, ByteView reply);
+/// (FRM-04, P1). Functions that this file does not know match by function code alone. With
+/// ByteCount::any a reply to 01 to 04 may hold 1 to 251 bytes, as many as Modbus/TCP carries (AP
+/// 4.1), if its byte count is that number.
+bool answers(ByteView request, ByteView reply, ByteCount byte_count = ByteCount::as_asked);
 
 /// Returns a device's normal reply to a broadcastable write (TBC-03): 05 and 06 echo, 0F and 10
 /// return address and quantity. `request` must be one of these.

@@ -8,6 +8,7 @@
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/pool.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::modbus {
@@ -54,8 +55,9 @@ class ReplyFramer {
         told        ///< on_end() follows every frame, valid or not
     };
     /// `orders`: of all stations. A frame is valid only in the order of its own address.
+    /// `byte_count`: how that of a reply to 01 to 04 is judged, Request::byte_count().
     ReplyFramer(std::uint8_t station, Bytes request_pdu, const CrcOrders& orders = {},
-                Ends ends = Ends::by_length);
+                Ends ends = Ends::by_length, ByteCount byte_count = ByteCount::as_asked);
 
     /// Feeds bytes; returns the reply PDU as soon as its last byte is there. What has begun behind
     /// it like another reply stays pending.
@@ -123,6 +125,7 @@ class ReplyFramer {
     std::size_t size_from_start(ByteView bytes) const;
     bool is_own_reply(ByteView damaged) const;
     std::size_t own_beginning(ByteView damaged) const;
+    std::optional<std::uint8_t> distinct_count() const;
     void collect_starts();
     void find_start_at_head();
     std::optional<Bytes> accept(std::size_t start, Bytes pdu);
@@ -136,6 +139,7 @@ class ReplyFramer {
     Bytes request_;
     CrcOrders orders_;
     Ends ends_;
+    ByteCount byte_count_;
     std::optional<std::size_t> expected_;  ///< from the request (FRM-04)
     Bytes heard_;
     std::size_t looked_ = 0;          ///< offsets below were tried as a start

@@ -20,7 +20,8 @@ struct Advice {
 std::vector<Advice> advise(const Line& line, const LinePlan& plan);
 
 /// Returns warnings of what fails even on an idle line, with the remedy: panels whose planned reply
-/// comes after their timeout, and a request so long that, with one other before it, it misses the
+/// comes after their timeout, panels that rest for longer than their polls and relays allow, and a
+/// request so long that, with one other before it, it misses the
 /// queue's deadline. `plan` is the line's plan.
 std::vector<std::string> warnings(const Line& line, const LinePlan& plan);
 

@@ -34,6 +34,8 @@ struct Station {
     bool repeats = true;
     /// Silence after its replies, if configured; nullopt: from the serial format and the profile.
     std::optional<Duration> frame_gap;
+    Duration station_gap{};  ///< rest of the station behind its reply, in which others are asked
+    Duration after_write{};  ///< the same behind a write
     std::vector<PolledItem> asked;
     points::SharedMemory memory{};  ///< decides what is read again after a write
 };

@@ -41,7 +41,8 @@ class UnitMap {
 
     /// Returns the target of an alias, or of a station listed by exactly one line of the listener;
     /// on a listener with a single line that passes unlisted stations, also of the rest of 1..247.
-    /// Everything else, including unit 0 without an alias and 248..255, is Fault::not_routed.
+    /// Everything else, including unit 0 without an alias and 248..255 unless listed, is
+    /// Fault::not_routed.
     Result<Target> route(std::uint8_t unit) const;
     /// As route(), by the line's name.
     std::optional<UnitTarget> place(std::uint8_t unit) const;

@@ -10,7 +10,7 @@ namespace {
 
 std::optional<std::uint8_t> parse_id(std::string_view text) {
     const auto id = to_number(text);
-    if (!id || *id < 1 || *id > modbus::kMaxStation) return std::nullopt;
+    if (!id || *id < 1 || *id > modbus::kMaxListedStation) return std::nullopt;
     return static_cast<std::uint8_t>(*id);
 }
 
@@ -37,7 +37,8 @@ std::optional<StationEntry> Directory::find_station(std::string_view name) const
         if (station.line == name.substr(0, colon) && station.id == *id) return station;
     }
     const LineEntry* line = find_line(name.substr(0, colon));
-    if (line == nullptr || !line->pass_unlisted_stations) return std::nullopt;
+    if (*id > modbus::kMaxStation || line == nullptr || !line->pass_unlisted_stations)
+        return std::nullopt;
     StationEntry unlisted;
     unlisted.name = line->name + ":" + std::to_string(*id);
     unlisted.line = line->name;

@@ -239,7 +239,7 @@ Problem no_broadcast() {
 
 Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& line,
                                  const json::object& body) {
-    const auto station = number_member(body, "station", 0, modbus::kMaxStation);
+    const auto station = number_member(body, "station", 0, modbus::kMaxListedStation);
     if (!station) return station.error();
     const auto hex = string_member(body, "pdu");
     if (!hex) return hex.error();
@@ -260,7 +260,7 @@ Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& li
 /// Reports a request that is invalid or refused before the bus is asked: the bus counts and logs
 /// it.
 void count_refused(Caller& caller, bus::RequestPort& bus, const json::object& body) {
-    const auto station = number_member(body, "station", 0, modbus::kMaxStation);
+    const auto station = number_member(body, "station", 0, modbus::kMaxListedStation);
     const auto hex = string_member(body, "pdu");
     const auto pdu = hex ? from_hex(*hex) : std::nullopt;
     if (!station || !pdu || pdu->empty() || pdu->size() > modbus::kMaxPdu) return;
@@ -293,7 +293,7 @@ Handling post_raw(HttpRequest request, const Api* api) {
     const bool broadcast = made.station == 0;
     const Patience patience(request, (*line)->deadline, api->providers.now);
     made.within = patience.left();
-    made.raw = true;
+    made.raw = made.verbatim = true;
     bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));
     co_return broadcast ? broadcast_answer(answer) : raw_answer(answer);
 }

@@ -3,6 +3,7 @@
 export const words = {
 "finding.line": ["the line", "die Linie", "라인", "回線"],
 "finding.echo": ["{who}: the echo is not what the configuration says.", "{who}: Das Echo ist nicht so, wie es konfiguriert ist.", "{who}: 에코가 설정과 다릅니다.", "{who}:エコーが設定と異なります。"],
+"finding.telnet": ["{who}: the device server speaks telnet, which mixes bytes of its own in.", "{who}: Der Geräteserver spricht Telnet und mischt eigene Bytes hinein.", "{who}: 장치 서버가 텔넷을 써서 자기 바이트를 섞습니다.", "{who}:デバイスサーバーが telnet を使い、独自のバイトを混ぜます。"],
 "finding.no-answer-at-all": ["{who}: no station answers.", "{who}: Niemand antwortet.", "{who}: 아무도 응답하지 않습니다.", "{who}:どの局も応答しません。"],
 "finding.wrong-baud": ["{who}: the baud differs.", "{who}: Die Baudrate stimmt nicht.", "{who}: 통신 속도가 다릅니다.", "{who}:通信速度が異なります。"],
 "finding.wrong-parity": ["{who}: parity or data bits differ.", "{who}: Parität oder Datenbits stimmen nicht.", "{who}: 패리티 또는 데이터 비트가 다릅니다.", "{who}:パリティまたはデータビットが異なります。"],
@@ -28,6 +29,7 @@ export const words = {
 "finding.misses-requests": ["{who} answers only some of the requests.", "{who} beantwortet nur einen Teil der Anfragen.", "{who}: 요청 일부에만 응답합니다.", "{who}:要求の一部にしか応答しません。"],
 "finding.unlisted": ["an unlisted station", "eine nicht gelistete Station", "미등록 국", "未登録局"],
 "advice.echo": ["Set `echo: auto`.", "`echo: auto` einstellen.", "`echo: auto`로 설정하십시오.", "`echo: auto` に設定してください。"],
+"advice.telnet": ["Set the server's port to raw TCP, without telnet and RFC 2217.", "Den Port des Servers auf rohes TCP einstellen, ohne Telnet und RFC 2217.", "서버 포트를 텔넷과 RFC 2217 없는 raw TCP로 설정하십시오.", "サーバーのポートを telnet と RFC 2217 なしの raw TCP に設定してください。"],
 "advice.no-answer-at-all": ["Check the power of the panels, the wires A and B and their bias, `serial` and the stations' addresses.", "Stromversorgung der Panels, Adern A und B und ihren Ruhepegel (Bias), `serial` und die Adressen prüfen.", "패널 전원, A·B 배선과 바이어스, `serial`, 국번을 확인하십시오.", "パネルの電源、A・B の配線とバイアス、`serial`、局番を確認してください。"],
 "advice.wrong-baud": ["Set the baud of the line (`serial.baud`) and of the panel to the same.", "Baudrate der Linie (`serial.baud`) und des Panels gleich einstellen.", "라인(`serial.baud`)과 패널의 통신 속도를 같게 하십시오.", "回線 (`serial.baud`) とパネルの通信速度を合わせてください。"],
 "advice.wrong-parity": ["Set parity, data and stop bits of the line (`serial`) and of the panel to the same.", "Parität, Daten- und Stoppbits der Linie (`serial`) und des Panels gleich einstellen.", "라인(`serial`)과 패널의 패리티, 데이터·정지 비트를 같게 하십시오.", "回線 (`serial`) とパネルのパリティ、データビット、ストップビットを合わせてください。"],
@@ -55,6 +57,7 @@ export const words = {
 "evidence.damage": ["{damaged} of {replies} replies damaged: {exact} of the right length, {short} shorter, {long} longer", "{damaged} von {replies} Antworten beschädigt: {exact} in richtiger Länge, {short} kürzer, {long} länger", "응답 {replies}개 중 {damaged}개 손상: 길이 일치 {exact}, 짧음 {short}, 김 {long}", "応答 {replies} 件中 {damaged} 件が破損: 長さ一致 {exact}、短い {short}、長い {long}"],
 "evidence.echo": ["{echoes} requests came back as they were sent", "{echoes} Anfragen kamen zurück, wie sie gesendet wurden", "요청 {echoes}개가 보낸 그대로 돌아옴", "要求 {echoes} 件が送信したまま戻った"],
 "evidence.echo.none": ["instead of its echo something else followed {collided} of {requests} requests", "statt des Echos folgte auf {collided} von {requests} Anfragen etwas anderes", "요청 {requests}개 중 {collided}개에서 에코 대신 다른 것이 옴", "要求 {requests} 件中 {collided} 件でエコーの代わりに別のものが来た"],
+"evidence.telnet": ["the connection began with telnet's negotiation", "die Verbindung begann mit einer Telnet-Aushandlung", "연결이 텔넷 협상으로 시작됨", "接続が telnet のネゴシエーションで始まった"],
 "evidence.no-answer-at-all": ["{stations} station(s) asked, the last {requests} requests without a reply", "{stations} Station(en) gefragt, die letzten {requests} Anfragen ohne Antwort", "{stations}개 국에 요청, 마지막 {requests}개 요청 무응답", "{stations} 局に照会、直近 {requests} 件が無応答"],
 "evidence.other-master": ["{foreign_requests} requests of another master, {foreign_frames} frames of stations that were not asked; {requests} requests of this gateway", "{foreign_requests} fremde Anfragen, {foreign_frames} Telegramme nicht gefragter Stationen; {requests} Anfragen dieses Gateways", "외부 요청 {foreign_requests}, 요청하지 않은 국의 프레임 {foreign_frames}; 이 게이트웨이의 요청 {requests}", "他からの要求 {foreign_requests}、照会していない局のフレーム {foreign_frames}、このゲートウェイの要求 {requests}"],
 "evidence.collision": ["{collided} of {requests} requests came back changed", "{collided} von {requests} Anfragen kamen verändert zurück", "요청 {requests}개 중 {collided}개가 바뀌어 돌아옴", "要求 {requests} 件中 {collided} 件が変わって戻った"],

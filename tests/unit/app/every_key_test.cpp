@@ -101,15 +101,17 @@ constexpr const char* kFurther = R"(lines:
     stations:
       - id: 1
         timing: {response_timeout: adaptive, adaptive_floor: 30ms, adaptive_ceiling: 700ms,
-                 frame_gap: auto, late_window: auto, think_time: 2ms}
+                 frame_gap: auto, late_window: auto, think_time: 2ms, station_gap: 20ms,
+                 after_write: 1s}
         simulate: {dead: false, slow: 1ms, late_by: 1ms, late: 0.1, drop: 0.1, damage: 0.1,
                    truncate: 0.1, foreign_id: 0.1, duplicate: 0.1}
-      - {id: 2, access: read_write, profile: generic}
+      - {id: 2, access: read_write, profile: generic, any_length: true}
   - name: b
     device: /dev/ttyS7
     mode: listen
     serial: {baud: 9600, data_bits: 8, parity: none, stop_bits: 1}
   - {name: c, device: /dev/ttyS8, serial: {mode: rtu}}
+  - {name: d, device: "tcp://10.0.0.1:4001", connect_pause: 1s}
 modbus_tcp:
   - {listen: "127.0.0.1:502", lines: [a], framing: ascii, ascii_lower_case: take, broadcast: silent}
   - {listen: "127.0.0.1:503", retransmissions: join, units: {101: a/1, 102: a/1}}

@@ -105,9 +105,35 @@ class BusTest : public BusCase {
         start_bus();
     }
 
+    /// Reads a register of press four times at once, the last two as one who takes values out.
+    void read_four_times(bool verbatim) {
+        answers.clear();
+        line->written.clear();
+        for (int i = 0; i < 4; ++i)
+            bus->transact({.station = 17,
+                           .request = test::request_of(kRead),
+                           .client = 1,
+                           .verbatim = verbatim && i < 2},
+                          [this](Answer answer) { answers.push_back(std::move(answer)); });
+        EXPECT_TRUE(run_until([&] { return answers.size() == 4; }));
+    }
+
     std::string seen;  ///< causes and findings of line events
     std::vector<Answer> answers;
 };
+
+TEST_F(BusTest, P6AReplyOfAnyLengthIsSharedWithNobody) {
+    read_four_times(true);
+    EXPECT_LT(line->written.size(), 3U) << "one goes out, and the rest share another";
+    settings.stations[17].any_length = true;
+    start_bus();
+    read_four_times(false);
+    EXPECT_LT(line->written.size(), 3U) << "whoever takes values out is answered as asked";
+    read_four_times(true);
+    EXPECT_EQ(line->written.size(), 3U);
+    EXPECT_FALSE(answers[0].shared);
+    EXPECT_FALSE(answers[1].shared);
+}
 
 TEST_F(BusTest, P2WhatWaitsIsNotWrittenOnceTheStationMayOnlyBeRead) {
     for (const std::uint8_t station : Bytes{17, 17, 99, 17}) send(station, kWrite, answers);

@@ -24,7 +24,7 @@ const KeyShape& shape(const std::string& path) {
 TEST(Describe, KnowsWhatTheLoaderAsksFor) {
     EXPECT_EQ(shape("lines/stations/id").kind, KeyShape::Kind::integer);
     EXPECT_TRUE(shape("lines/stations/id").required);
-    EXPECT_EQ(shape("lines/stations/id").max, 247);
+    EXPECT_EQ(shape("lines/stations/id").max, 255);
     EXPECT_EQ(shape("lines/timing/response_timeout").kind, KeyShape::Kind::duration);
     EXPECT_THAT(shape("lines/timing/response_timeout").words, ElementsAre("adaptive"));
     EXPECT_EQ(shape("lines/timing/response_timeout").shortest, Duration(1ms));

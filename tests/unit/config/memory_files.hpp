@@ -36,6 +36,12 @@ class MemoryFiles final : public Files {
         return path.starts_with("/public/") || path == "/run/secrets/mounted";
     }
     bool is_special(const std::string& path) const override { return path == "/run/pipe"; }
+    std::string real_path(const std::string& path) const override {
+        const auto link = links.find(path);
+        return link == links.end() ? path : link->second;
+    }
+
+    std::map<std::string, std::string> links;
 
   private:
     std::map<std::string, std::string> texts_;

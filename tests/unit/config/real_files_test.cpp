@@ -12,6 +12,8 @@
 #include <optional>
 #include <string>
 
+#include "memory_files.hpp"
+#include "panelgate/config/config.hpp"
 #include "support/temp_dir.hpp"
 
 namespace panelgate::config::real_files_test {
@@ -19,6 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 class RealFilesTest : public ::testing::Test {
   protected:
@@ -98,11 +101,37 @@ TEST_F(RealFilesTest, KnowsWhichFilesAllUsersMayRead) {
     EXPECT_FALSE(RealFiles().is_readable_by_all(at("absent")));
 }
 
+TEST_F(RealFilesTest, FollowsLinksAsFarAsTheyLead) {
+    const std::string path = put("tty", "");
+    fs::create_symlink("tty", at("by-id"));
+    EXPECT_EQ(RealFiles().real_path(at("by-id")), RealFiles().real_path(path));
+    EXPECT_EQ(RealFiles().real_path(at("absent")), at("absent"));
+}
+
 TEST_F(RealFilesTest, ListsTheYamlFilesOfADirectorySorted) {
     for (const char* name : {"b.yaml", "a.yaml", "c.yml", "README"}) put(name, "");
     EXPECT_THAT(RealFiles().list_yaml(dir_.string()).value(),
                 ElementsAre(at("a.yaml"), at("b.yaml")));
     EXPECT_EQ(RealFiles().list_yaml(at("absent")), std::nullopt);
+}
+
+TEST(ConfigLoad, WarnsOfTwoNamesOfOneAdapter) {
+    MemoryFiles files({});
+    files.links = {{"/dev/serial/by-id/usb-a", "/dev/ttyUSB0"},
+                   {"/dev/serial/by-path/1", "/dev/ttyUSB0"}};
+    const Config config = load_valid(
+        "lines:\n  - {name: a, device: /dev/serial/by-id/usb-a}\n"
+        "  - {name: b, device: /dev/ttyUSB0}\n  - {name: c, device: /dev/ttyUSB1}\n"
+        "serial_masters: [{name: plc, device: /dev/serial/by-path/1, lines: [a],\n"
+        "                  units: {1: a/1}}]\n"
+        "modbus_tcp: [{listen: \"127.0.0.1:502\", lines: [a]}]\n",
+        files);
+    EXPECT_THAT(config.warnings,
+                ElementsAre("f.yaml:3:23: warning: /dev/ttyUSB0 and /dev/serial/by-id/usb-a of "
+                            "line 'a' are one adapter, /dev/ttyUSB0: only one of the two can open "
+                            "it; name another device",
+                            HasSubstr("of line 'a' are one adapter"),
+                            HasSubstr("of line 'b' are one adapter")));
 }
 
 }  // namespace

@@ -102,6 +102,24 @@ TEST(ConfigTiming, AStationOverridesTheTimingOfItsLine) {
     EXPECT_TRUE(line.stations[1].read_only);
 }
 
+TEST(ConfigTiming, RestsOfAStationAreThoseOfItsLineUnlessItHasItsOwn) {
+    const Line line = line_of(
+        kSim + kFast +
+        "    timing: {station_gap: 100ms, after_write: 1s}\n    stations:\n"
+        "      - {id: 1}\n"
+        "      - {id: 2, any_length: true, timing: {station_gap: 850ms, after_write: 0ms}}\n");
+    EXPECT_EQ(line.arbiter.unlisted.station_gap, 100ms);
+    EXPECT_EQ(line.arbiter.unlisted.after_write, 1s);
+    EXPECT_EQ(line.arbiter.stations[0].station_gap, 100ms);
+    EXPECT_EQ(line.arbiter.stations[0].after_write, 1s);
+    EXPECT_FALSE(line.arbiter.stations[0].any_length);
+    EXPECT_EQ(line.arbiter.stations[1].station_gap, 850ms);
+    EXPECT_EQ(line.arbiter.stations[1].after_write, Duration::zero());
+    EXPECT_TRUE(line.arbiter.stations[1].any_length);
+    EXPECT_EQ(line_of(kTcp + "    connect_pause: 1500ms\n").arbiter.connect_pause, 1500ms);
+    EXPECT_EQ(line_of(kTcp).arbiter.connect_pause, Duration::zero());
+}
+
 TEST(ConfigTiming, TheAutomaticFrameGapIsWhatThePanelAsksOrTheStandardWhicheverIsLonger) {
     // The GT requires 4 characters (ARCT1F501E, 1.1.2): longer than t3.5 only up to 19200 bit/s.
     const std::string gt = "    stations: [{id: 20, profile: panasonic-gt}, {id: 1}]\n";

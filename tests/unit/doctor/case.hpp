@@ -97,6 +97,7 @@ class Diagnose : public testing::Test {
         window.stations = std::move(stations);
         window.uart = uart;
         window.broadcasts = broadcasts;
+        window.telnet = telnet;
         return diagnose(facts, window, standing);
     }
     /// "wrong-baud", or with its station "gap-too-short 2"; "noise, gap-too-short 2".
@@ -130,6 +131,7 @@ class Diagnose : public testing::Test {
     LineFacts facts;
     std::optional<line::UartErrors> uart;
     std::uint64_t broadcasts = 0;
+    bool telnet = false;
 };
 
 }  // namespace panelgate::doctor

@@ -142,6 +142,7 @@ TEST_F(Diagnose, APanelThatAnswersBroadcastsIsNamed) {
 TEST_F(Diagnose, GoodFramesThatDoNotAnswerAreAWrongReply) {
     const Symptoms not_silent = wrong(9).with(&Symptoms::mute_in_a_row, 9);
     const Finding found = only("wrong-reply 2", {{1, fine}, {2, wrong(9)}});
+    EXPECT_THAT(found.advice, HasSubstr("any_length: true"));
     EXPECT_EQ(found.text, "Station 2 answers with frames that do not fit the request.");
     EXPECT_EQ(found.evidence, "9 of 9 requests (100 %) were answered so, 0 rightly");
     EXPECT_EQ(beside(not_silent), "wrong-reply 2");
@@ -208,6 +209,22 @@ TEST_F(DiagnoseOverTcp, DamageIsAMatterOfTheServer) {
         EXPECT_THAT(found.advice, HasSubstr("telnet"));
         EXPECT_THAT(found.advice, Not(AnyOf(HasSubstr("termination"), HasSubstr("parity"))));
     }
+}
+
+TEST_F(DiagnoseOverTcp, TelnetIsNamedAtOnceAndDamageBesideItIsItsOwn) {
+    telnet = true;
+    EXPECT_THAT(only("telnet", {}).advice, HasSubstr("raw TCP"));
+    const Symptoms beheaded =
+        Mix().answered(20).garbage(30).with(&Symptoms::beheaded, 30).with(&Symptoms::strays, 30);
+    EXPECT_EQ(causes({{1, beheaded}, {2, beheaded}}), "telnet");
+    EXPECT_EQ(causes({{1, Mix().garbage(30)}, {2, fine}}), "telnet");
+    EXPECT_EQ(causes({{1, Mix().silent(9)}}), "telnet, no-answer-at-all")
+        << "the baud may be wrong, too";
+}
+
+TEST_F(DiagnoseOverTcp, ASilentLineMayBeAServerThatSpeaksModbusTcp) {
+    EXPECT_THAT(only("no-answer-at-all", {{1, Mix().silent(9)}}).advice,
+                HasSubstr("raw or transparent, not Modbus/TCP"));
 }
 
 TEST_F(DiagnoseOverTcp, RightLengthsAreNotWhatFramingChanges) {

@@ -26,6 +26,7 @@
 #include "line_events.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/rt/asio_clock.hpp"
+#include "panelgate/rt/log.hpp"
 #include "support/hex.hpp"
 #include "support/manual_clock.hpp"
 
@@ -186,6 +187,49 @@ TEST_F(TcpLineTest, AConnectionThatIsListenedToIsOnlyRead) {
     EXPECT_EQ(peer->available(), 0u);
     EXPECT_EQ(line->counters().bytes_sent, 0u);
     expect_heard("1F 03 00 64"_hex);
+}
+
+TEST_F(TcpLineTest, TellsOnceOfTelnetAtTheStartOfAConnectionOnly) {
+    const rt::LogTap log;
+    start();
+    expect_heard("FF FD 03"_hex);  // IAC DO suppress go ahead
+    EXPECT_TRUE(line->counters().telnet);
+    EXPECT_EQ(log.count("device server speaks telnet"), 1u);
+    connect([this] { peer->close(); });
+    EXPECT_FALSE(line->counters().telnet) << "not of this connection";
+    heard.bytes.clear();
+    expect_heard("FF 03 02 00 01"_hex);  // station 255
+    heard.bytes.clear();
+    expect_heard("FF FB 01"_hex);
+    EXPECT_FALSE(line->counters().telnet) << "inside a connection anything may be data";
+    connect([this] { peer->close(); });
+    heard.bytes.clear();
+    expect_heard("FF FB 01"_hex);
+    EXPECT_TRUE(line->counters().telnet);
+    EXPECT_EQ(log.count("device server speaks telnet"), 1u);
+}
+
+TEST_F(TcpLineTest, TellsOnceOfAServerThatHangsUpOnRequests) {
+    const rt::LogTap log;
+    start();
+    for (int i = 1; i <= 5; ++i) {
+        line->write("1F 03 00 64 00 01 C6 6B"_hex);
+        connect([this] { peer->close(); });
+        EXPECT_EQ(log.count("device server hangs up on requests"), i < 3 ? 0u : 1u) << i;
+    }
+}
+
+TEST_F(TcpLineTest, AServerThatHangsUpWhileItIsIdleOrBehindAnAnswerIsLeftInPeace) {
+    const rt::LogTap log;
+    start();
+    for (int i = 0; i < 4; ++i) connect([this] { peer->close(); });
+    for (int i = 0; i < 4; ++i) {
+        line->write("1F 03 00 64 00 01 C6 6B"_hex);
+        heard.bytes.clear();
+        expect_heard("1F 83 02 01 32"_hex);
+        connect([this] { peer->close(); });
+    }
+    EXPECT_EQ(log.count("device server hangs up"), 0u);
 }
 
 // P7: a silent name server delays only the lines that need it.

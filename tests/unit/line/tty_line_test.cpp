@@ -194,12 +194,13 @@ TEST_F(TtyLineTest, RefusesAFileThatIsNoSerialDevice) {
 TEST_F(TtyLineTest, ASecondUserIsTurnedAway) {
     const Pty pty;
     plug(pty);
+    settings.owner = "line 'press'";
     auto first = start(heard);
     Heard other;
     const auto second = start(other);
-    const std::string process = "process " + std::to_string(getpid());
     EXPECT_THAT(other.downs,
-                ElementsAre("cannot open " + settings.device + ": " + process + " holds it"));
+                ElementsAre("cannot open " + settings.device +
+                            ": line 'press' of this gateway holds it, as " + settings.device));
     first.reset();
     run_until([&] { return other.ups == 1; });
 }

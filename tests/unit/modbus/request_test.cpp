@@ -158,6 +158,25 @@ TEST(Request, KnowsWhatItIs) {
     EXPECT_EQ(Request::read(span).span(), span);
 }
 
+TEST(Request, WithAnyLengthHasNeitherASpanNorALengthOfItsReply) {
+    const Request asked = Request::read({Table::input_registers, 1, 1});
+    const Request any = asked.with_any_length();
+    EXPECT_EQ(any.byte_count(), ByteCount::any);
+    EXPECT_EQ(any.pdu(), asked.pdu());
+    EXPECT_TRUE(any.is_read());
+    EXPECT_EQ(any.span(), std::nullopt);
+    EXPECT_EQ(any.reply_length(), std::nullopt);
+    EXPECT_EQ(reply_length_from_request(any.pdu(), ByteCount::any), std::nullopt);
+    EXPECT_EQ(any.access().read, asked.access().read) << "what is asked for stays known";
+    EXPECT_NE(any, asked) << "one reply may not answer both";
+    EXPECT_EQ(any, asked.with_any_length());
+    for (const Bytes& pdu : {"06 00 01 00 03"_hex, read_write(2, 1), "07"_hex, "11"_hex}) {
+        const Request other = Request::make(pdu, QuantityCheck::fit).value();
+        EXPECT_EQ(other.with_any_length(), other) << to_hex(pdu);
+        EXPECT_EQ(other.with_any_length().reply_length(), other.reply_length()) << to_hex(pdu);
+    }
+}
+
 TEST(AccessOf, SaysWhatIsReadAndWritten) {
     const auto holding = [](std::uint16_t at, std::uint16_t n) {
         return Span{Table::holding_registers, at, n};

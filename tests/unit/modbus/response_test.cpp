@@ -4,6 +4,7 @@
 
 #include <random>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "support/hex.hpp"
@@ -14,6 +15,11 @@ namespace {
 
 using Random = std::mt19937;
 using Texts = std::vector<const char*>;
+
+Bytes joined(Bytes front, const Bytes& back) {
+    front.insert(front.end(), back.begin(), back.end());
+    return front;
+}
 
 Bytes bytes_of(const char* hex) { return from_hex(hex).value(); }
 
@@ -80,6 +86,24 @@ TEST(Answers, WhatRepeatsTheRequestAndHasTheSizeOfTheReply) {
             EXPECT_FALSE(answers(bytes_of(row.request), bytes_of(reply)))
                 << row.request << " / " << reply;
     }
+}
+
+TEST(Answers, WithAnyByteCountAReadIsAnsweredByAnyNumberOfBytesThatIsTrue) {
+    const Bytes clock = "04 00 01 00 01"_hex;  // one register of 12 bytes
+    const Bytes longest = joined("03 FB"_hex, Bytes(251, 7));
+    EXPECT_FALSE(answers(clock, "04 0C 07 E5 0A 1F 00 0F 1E 00 00 80 00 00"_hex));
+    for (const Bytes& reply : {"04 0C 07 E5 0A 1F 00 0F 1E 00 00 80 00 00"_hex,
+                               "04 04 00 00 12 34"_hex, "04 02 12 34"_hex, "84 02"_hex})
+        EXPECT_TRUE(answers(clock, reply, ByteCount::any)) << to_hex(reply);
+    for (const Bytes& reply : {"04 0C 07 E5"_hex, "04 00"_hex, "04"_hex, "03 04 00 00 12 34"_hex})
+        EXPECT_FALSE(answers(clock, reply, ByteCount::any)) << to_hex(reply);
+    EXPECT_TRUE(answers("03 00 00 00 01"_hex, longest, ByteCount::any));
+    EXPECT_FALSE(answers("03 00 00 00 01"_hex, joined("03 FC"_hex, Bytes(252, 7)), ByteCount::any))
+        << "more than Modbus/TCP carries";
+    for (const auto& [request, reply] :
+         {std::pair("06 00 01 00 03"_hex, "06 00 02 00 03"_hex),
+          std::pair("17 00 00 00 01 00 00 00 01 02 00 00"_hex, "17 04 00 00 00 00"_hex)})
+        EXPECT_FALSE(answers(request, reply, ByteCount::any)) << to_hex(request);
 }
 
 TEST(Response, GivesTheNormalReplyOfABroadcast) {

@@ -338,6 +338,52 @@ TEST_F(RtuFramer, SoIsWhatBeginsLikeTheSameConfirmationOfAWrite) {
 
 /// P4: a reply that has begun is not damaged by who speaks in its pause, and a request heard there
 /// keeps its reply.
+class AnyLengthFramer : public ::testing::Test {
+  protected:
+    const Bytes clock = "04 00 01 00 01"_hex;
+    const Bytes told = "04 0C 07 E5 0A 1F 00 0F 1E 00 00 80 00 00"_hex;
+    ReplyFramer framer{1, clock, {}, ReplyFramer::Ends::by_length, ByteCount::any};
+};
+
+TEST_F(AnyLengthFramer, TheByteCountOfTheReplyDecides) {
+    const Bytes reply = encode_adu(1, told);
+    EXPECT_FALSE(ReplyFramer(1, clock).feed(reply));
+    for (std::size_t at = 0; at + 1 < reply.size(); ++at) {
+        EXPECT_FALSE(framer.feed(ByteView(reply).subspan(at, 1)));
+        EXPECT_EQ(framer.missing_as_asked(), framer.missing());
+    }
+    EXPECT_EQ(framer.missing(), 1u);
+    EXPECT_TRUE(framer.knows_length());
+    EXPECT_EQ(framer.feed(ByteView(reply).last(1)), told);
+    EXPECT_EQ(framer.feed(encode_adu(1, "84 02"_hex)), "84 02"_hex);
+}
+
+TEST_F(AnyLengthFramer, OurOwnFrameAndOtherStationsAreNoReply) {
+    EXPECT_FALSE(framer.feed(encode_adu(1, clock)));
+    EXPECT_FALSE(framer.feed(encode_adu(2, told)));
+    EXPECT_FALSE(framer.feed(encode_adu(1, "03 02 00 01"_hex)));
+    EXPECT_EQ(framer.feed(encode_adu(1, told)), told);
+}
+
+TEST_F(AnyLengthFramer, OfADamagedReplyNothingMoreIsKnownThanThatItWasThere) {
+    Bytes reply = encode_adu(1, told);
+    reply.back() ^= 1;
+    EXPECT_FALSE(framer.feed(reply));
+    EXPECT_FALSE(framer.on_silence());
+    EXPECT_TRUE(framer.was_damaged());
+    EXPECT_TRUE(framer.was_damaged_whole());
+    EXPECT_FALSE(framer.had_own_header());
+    EXPECT_FALSE(framer.ends_beheaded(ByteView(reply).subspan(1)));
+}
+
+TEST_F(AnyLengthFramer, TheEndOfALineOfAsciiDecidesTheSame) {
+    ReplyFramer line(1, clock, {}, ReplyFramer::Ends::told, ByteCount::any);
+    EXPECT_FALSE(line.feed(encode_adu(1, told)));
+    EXPECT_EQ(line.on_end(true), told);
+    EXPECT_FALSE(line.feed(encode_adu(1, "04 04 00 00"_hex)));
+    EXPECT_FALSE(line.on_end(true)) << "fewer bytes than it says";
+}
+
 TEST(Framer, AFrameBehindTheBeginningOfAnotherIsFound) {
     Bytes heard{5, 3};
     const Bytes other = encode_adu(9, kReplyPdu);

@@ -215,6 +215,23 @@ TEST_F(WarningsTest, APanelThatThinksForLongerThanItIsWaitedForTimesOut) {
     EXPECT_THAT(warned(), IsEmpty());
 }
 
+TEST_F(WarningsTest, AStationThatRestsForLongerThanItIsAskedIsTold) {
+    Station& inverter = add("inverter");
+    ask(inverter, 0, 2, 1s);
+    ask(inverter, 500, 2, 1s);
+    inverter.station_gap = 400ms;
+    EXPECT_THAT(warned(), IsEmpty());
+    inverter.station_gap = 850ms;
+    EXPECT_THAT(warned(), ElementsAre(AllOf(HasSubstr("'inverter' is busy for longer"),
+                                            HasSubstr("ask it 1.8 times as seldom"))));
+    inverter.station_gap = {};
+    inverter.after_write = 2s;
+    EXPECT_THAT(warned(), IsEmpty()) << "nobody writes";
+    add("oven").after_write = 2s;
+    copy(0, 1, 2s);
+    EXPECT_THAT(warned(), ElementsAre(HasSubstr("'oven' is busy for longer")));
+}
+
 TEST_F(WarningsTest, PanelsThatAreAlikeAreToldTogetherAndARelayIsARequestToo) {
     add("from");
     for (const char* name : {"a", "b", "c", "d", "e"}) {

@@ -221,8 +221,8 @@ TEST(LoadProfile, HoldsSerialStationsAndTimingInTheirRanges) {
          "6:40: parity must list none even odd\n"
          "6:56: stop_bits must list whole numbers from 1 to 2"},
         {"stations: {first: 9, last: 8}\n",
-         "6:28: last must be a whole number from 9 to 247, not '8'"},
-        {"stations: {first: 0}\n", "6:19: first must be a whole number from 1 to 247, not '0'"},
+         "6:28: last must be a whole number from 9 to 255, not '8'"},
+        {"stations: {first: 0}\n", "6:19: first must be a whole number from 1 to 255, not '0'"},
         {"timing: {frame_gap_characters: 1.5}\n",
          "6:32: frame_gap_characters must be from 3.5 to 1000"}};
     for (const auto& [more, problems] : rows) EXPECT_EQ(problems_of(whole(more)), problems);

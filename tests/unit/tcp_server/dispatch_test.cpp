@@ -69,10 +69,12 @@ TEST_F(UnitMapTest, PassesUnlistedUnitsOnlyOnAListenerWithOneLine) {
     EXPECT_EQ(route(1), "a/1");
 }
 
-TEST_F(UnitMapTest, RoutesNothingAbove247UnlessItIsAnAlias) {
+TEST_F(UnitMapTest, RoutesNothingAbove247UnlessItIsListedOrAnAlias) {
     settings.lines = {"a"};
     settings.units[250] = {"b", 11};
+    lines[0].stations.push_back(254);
     for (const std::uint8_t unit : Bytes{248, 249, 251, 255}) EXPECT_EQ(route(unit), "");
+    EXPECT_EQ(route(254), "a/254");
     EXPECT_EQ(route(250), "b/11") << "an alias may leave the listener's lines";
     EXPECT_TRUE(UnitMap(settings, lines).is_alias(250));
 }

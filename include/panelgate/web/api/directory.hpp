@@ -63,7 +63,7 @@ struct Directory {
     const LineEntry* find_line(std::string_view name) const;
     /// The line of a station; the station must have a bus.
     const LineEntry& line_of(const StationEntry& station) const;
-    /// Finds a station by name or as LINE:ID. An unlisted id (1..247) is found if its line passes
+    /// Finds a station by name or as LINE:ID. An unlisted id (1 to 247) is found if its line passes
     /// unlisted stations.
     std::optional<StationEntry> find_station(std::string_view name) const;
 };

@@ -248,13 +248,15 @@ TEST_F(ApiLines, RefusesRawRequestsThatCannotBe) {
     const std::string endless = R"({"station":5,"pdu":")" + std::string(508, '0') + "\"}";
     expect_bodies(
         "POST", kRaw, 400,
-        {R"({"station":248,"pdu":"0b"})", R"({"station":5,"pdu":"0"})", R"({"station":5,"pdu":""})",
+        {R"({"station":256,"pdu":"0b"})", R"({"station":5,"pdu":"0"})", R"({"station":5,"pdu":""})",
          R"({"station":5,"pdu":7})", endless.c_str(), R"({"station":5,"pdu":"030001"})",
          R"({"station":5,"pdu":"0300010080"})"});  // more than a reply holds
     expect_bodies("POST", kRaw, 403, {R"({"station":5,"pdu":"0600010002"})"});
     expect_bodies("POST", "/api/v1/lines/floor2/raw", 404, {R"({"station":9,"pdu":"0300010001"})"});
+    expect_bodies("POST", kRaw, 404, {R"({"station":248,"pdu":"0b"})"});  // not listed
     EXPECT_TRUE(bus.requests.empty());
     EXPECT_EQ(raw(R"({"station":5,"pdu":"0300010001"})").status(), 200u);
+    EXPECT_TRUE(bus.requests.back().verbatim);
     EXPECT_EQ(raw(R"({"station":5,"pdu":"030001007f"})").status(), 200u) << "a GT's larger frames";
 }
 

@@ -188,6 +188,15 @@ TEST_F(ApiRead, HasNoNotationForAPanelItDoesNotKnow) {
                   "station 'floor1:9' has no profile that explains notations; read its tables"}});
 }
 
+TEST_F(ApiRead, FindsAnAddressThatTheStandardReservesOnlyWhereItIsListed) {
+    const std::string path = "/api/v1/stations/floor1:250/coils/0";
+    EXPECT_EQ(get(path).status(), 404u);
+    directory.stations[0].id = 250;
+    EXPECT_EQ(get(path).status(), 200u);
+    EXPECT_EQ(bus.requests.back().station, 250);
+    EXPECT_FALSE(bus.requests.back().verbatim) << "values are taken out of the reply";
+}
+
 TEST_F(ApiRead, RefusesWhatIsMalformed) {
     const char* coils = "/api/v1/stations/press/coils/";
     for (const char* text : {"65536", "0x10000", "-1", "1x", "1f", "0x", "0x0x1"}) {
