@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "arbiter_fixture.hpp"
-#include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::arbiter::arbiter_health_test {
@@ -67,18 +66,6 @@ TEST_F(ArbiterTest, P4ProbesOfASilentStationStayBelowTheirShareAndOneReplyBrings
     EXPECT_TRUE(bus.answer(ticket).pdu.has_value());
 }
 
-TEST_F(ArbiterTest, P4AProbeOfAStationWhosePaceIsKnownIsShort) {
-    bus.submit(17, kRead);
-    answer(bus, 17, kReply, 4ms);
-    silence(bus);
-    ASSERT_TRUE(bus.next_sent(60s));
-    const Ticket other = bus.submit(18, kRead);
-    const TimePoint asked = bus.now();
-    EXPECT_EQ(bus.next_sent().value().adu[0], 18);
-    EXPECT_LT(bus.now() - asked, 50ms);
-    EXPECT_FALSE(bus.answered(other));
-}
-
 TEST_F(ArbiterTest, P4AWriteMayBeTheProbeOnceAnInterval) {
     bus.submit(17, kRead);
     answer(bus, 17, kReply, 3ms);
@@ -91,35 +78,6 @@ TEST_F(ArbiterTest, P4AWriteMayBeTheProbeOnceAnInterval) {
     answer(bus, 17, kWrite, 3ms);
     EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
     EXPECT_EQ(bus.arbiter().health(17).state(), Health::online);
-}
-
-/// A panel stops inside a reply for 400 ms, beside a healthy one. Its budget is used up, so the
-/// other one is served meanwhile; the rest of its reply is still awaited.
-TEST_F(ArbiterTest, P4AReplyThatBrokeOffIsWaitedForOnceMoreForTheRestOfATimeout) {
-    const Bytes reply = modbus::encode_adu(17, kReply);
-    const auto ask = [&](std::uint8_t station) {
-        const Ticket ticket = bus.submit(station, kRead, station);
-        EXPECT_TRUE(bus.next_sent(1s));
-        bus.run_to_end_of_request();
-        bus.run_for(2ms);
-        return ticket;
-    };
-    for (unsigned i = 0; i < 40; ++i) {
-        const auto station = static_cast<std::uint8_t>(17 + i % 2);
-        ask(station);
-        bus.hear_paced(modbus::encode_adu(station, kReply));
-    }
-    const Ticket held_up = ask(17);
-    bus.hear_paced(ByteView(reply).first(4));
-    const TimePoint goes_on = bus.now() + 400ms;
-    const Ticket other = ask(18);
-    bus.hear_paced(modbus::encode_adu(18, kReply));
-    EXPECT_TRUE(bus.answer(other).pdu.has_value());
-    bus.run_until(goes_on);
-    EXPECT_EQ(bus.sent.back().adu[0], 17);
-    bus.hear_paced(ByteView(reply).subspan(4));
-    bus.hear_paced(reply);
-    EXPECT_TRUE(bus.answer(held_up).pdu.has_value());
 }
 
 TEST_F(ArbiterTest, P4ADamagedReplyIsNotSilence) {
@@ -290,28 +248,6 @@ TEST_F(ArbiterTest, P4APanelThatPausesInsideItsRepliesIsWaitedForFromTheThirdOn)
             if (i != 2) EXPECT_EQ(line.answer(asked).pdu.has_value(), i > 2) << i << is_known;
         }
     }
-}
-
-TEST(ReplyHole, IsLearnedFromTwoInARowAndForgottenWhenItDoesNotPauseAnyMore) {
-    ReplyHole hole;
-    TimePoint now{1h};
-    hole.on_broken(now, 80ms, 500ms);
-    EXPECT_EQ(hole.learned(), 0ms) << "one may be noise";
-    hole.on_reply(now, 1ms);
-    hole.on_broken(now, 80ms, 500ms);
-    EXPECT_EQ(hole.learned(), 0ms) << "not in a row";
-    hole.on_broken(now, 60ms, 500ms);
-    EXPECT_EQ(hole.learned(), 110ms);
-    now += timing::kForgetHabit - 1s;
-    hole.on_reply(now, 80ms);
-    now += timing::kForgetHabit - 1s;
-    hole.on_reply(now, 1ms);
-    EXPECT_EQ(hole.learned(), 110ms);
-    now += 1s;
-    hole.on_reply(now, 1ms);
-    EXPECT_EQ(hole.learned(), 0ms);
-    for (int i = 0; i < 9; ++i) hole.on_broken(now, 400ms, 500ms);
-    EXPECT_EQ(hole.learned(), 500ms) << "no longer than its timeout";
 }
 
 /// At 1200 baud a reply cannot be seen before 4.5 characters have passed: 41 ms.

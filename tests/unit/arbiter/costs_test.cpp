@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "panelgate/arbiter/arbiter.hpp"
-#include "panelgate/arbiter/station.hpp"
 #include "support/bus_script.hpp"
 #include "support/hex.hpp"
 #include "support/request.hpp"
@@ -205,43 +204,6 @@ TEST(Costs, P4APanelThatLosesOneFrameInTwentyHardlyNotices) {
     EXPECT_LT(plant.faults[kFlaky] * 200, plant.answers[kFlaky]);
 }
 
-/// Each of its answers is held, because a second one that differs may follow. Where none does it is
-/// believed, also behind another request that was left open when that was asked again.
-TEST(Costs, P4APanelThatGetsARequestInTenTwiceIsAskedAgainForTheseAlone) {
-    Plant plant([](int) { return kQuick; });
-    plant.reads = 10;
-    std::uint32_t random = 1;
-    plant.again = [&](int) -> std::optional<Duration> {
-        random = random * 1664525 + 1013904223;
-        if ((random >> 16) % 10 != 0) return std::nullopt;
-        return 10ms + (random >> 20) % 70 * 1ms;
-    };
-    plant.add_client({kFlaky});
-    plant.add_client({1});
-    plant.run_for(60s);
-    EXPECT_EQ(plant.faults[1], 0);
-    EXPECT_GT(plant.said_again, 20);
-    EXPECT_LE(plant.asked[kFlaky], plant.answers[kFlaky] + plant.said_again + 1);
-}
-
-/// Each reply breaks off, and is waited for on a line that may pause for longer than a timeout.
-TEST(Costs, P4FailuresThatCostMoreThanATimeoutHaveAFifthAllTheSame) {
-    const StationSettings settings;
-    Station station(settings, OfflineSettings{}, true);
-    const modbus::Request write = test::request_of("06 00 01 00 03"_hex);
-    const Duration cost = 2 * settings.response_timeout;
-    const TimePoint began{1h};
-    TimePoint now = began;
-    Duration spent{};
-    for (int i = 0; i < 30; ++i) {
-        now = std::max(now, station.affordable_at()) + cost;
-        spent += cost;
-        station.on_failed(now, Verdict::damaged, cost, i % 2 == 0 ? &write : nullptr);
-    }
-    EXPECT_LE(spent, (now - began) / 4);
-    EXPECT_GE(spent, (now - began) / 6);
-}
-
 TEST(Costs, P4APanelThatNeedsAlmostItsTimeoutIsNeverCutShort) {
     Plant plant([](int n) { return when(n % 20 != 7, 480ms); });
     add_one_client_each(plant);
@@ -309,35 +271,6 @@ TEST(Costs, P4UnheardIdsTakeAFifthAtFirstAndALittleInTheLongRun) {
     EXPECT_LE(plant.share_in_vain(6, 247), 0.025);
     EXPECT_LE(plant.share_in_vain(kFlaky, 247), 0.05);
     EXPECT_GT(plant.asked[kFlaky] - before, 10) << "the configured one is probed all the same";
-}
-
-TEST(Costs, P4BeforeADearRetryEachStationThatSomethingWaitsForHasATurn) {
-    BusScript bus{stations_up_to(5)};
-    const auto answer = [&](std::uint8_t station, Duration after, std::uint16_t value) {
-        ASSERT_EQ(bus.sent.back().adu[0], station);
-        bus.run_to_end_of_request();
-        bus.run_for(after);
-        bus.hear_reply(station, Writer().u8(3).u8(2).u16(value).take());
-    };
-    for (const Duration needs : {kQuick, Duration(300ms)}) {
-        bus.submit(kFlaky, kRead, 7);
-        answer(kFlaky, needs, static_cast<std::uint16_t>(needs / 1ms));
-        bus.run_for(60s);
-        bus.submit(kFlaky, kRead, 7);
-        for (const std::uint8_t id : kHealthy) bus.submit(id, kRead, id);
-        const std::size_t first = bus.sent.size();
-        std::vector<std::uint8_t> order;
-        while (bus.sent.back().kind != FrameKind::retry) {
-            ASSERT_TRUE(bus.next_sent(2s));
-            order.push_back(bus.sent.back().adu[0]);
-            if (order.back() != kFlaky)
-                answer(order.back(), kQuick, static_cast<std::uint16_t>(bus.sent.size()));
-        }
-        const std::size_t others = bus.sent.size() - first - 1;
-        EXPECT_EQ(others, needs == kQuick ? 1u : 4u);
-        answer(kFlaky, kQuick, 9);
-        bus.run_for(60s);
-    }
 }
 
 }  // namespace

@@ -53,8 +53,8 @@ TEST_F(OutboxTest, AnAnswerSaysWhetherItsRequestWasEverSent) {
 }
 
 TEST_F(OutboxTest, UnlistedStationsShareOneAccount) {
-    outbox.on_unsolicited(now, frame_of(98), Done::late, 17, 5ms);
-    outbox.on_unsolicited(now, frame_of(99), Done::late, 17, 5ms);
+    outbox.on_unsolicited(now, frame_of(98), Done::late, 17, false, 5ms);
+    outbox.on_unsolicited(now, frame_of(99), Done::late, 17, false, 5ms);
     EXPECT_EQ(of(0).late_frames, 2u);
     EXPECT_EQ(of(17).late_frames, 0u);
     EXPECT_EQ(outbox.stations().size(), 3u) << "no stranger can add one";
@@ -63,8 +63,7 @@ TEST_F(OutboxTest, UnlistedStationsShareOneAccount) {
 TEST_F(OutboxTest, DamageInsideAnAttemptIsCountedWithTheAttempt) {
     const modbus::Unused damaged{modbus::Unused::Kind::damaged, 0, Bytes(3)};
     for (const bool inside : {true, false}) {
-        outbox.inside_attempt(inside);
-        outbox.on_unsolicited(now, damaged, Done::damaged, 17);
+        outbox.on_unsolicited(now, damaged, Done::damaged, 17, inside);
         EXPECT_EQ(of(17).symptoms.strays, inside ? 0u : 1u);
     }
     EXPECT_EQ(of(17).discarded_bytes, 6u) << "its bytes are, in both";
@@ -214,18 +213,6 @@ TEST_F(ArbiterTest, ExplainsWhyEachRequestGoesNowAndWhyOneIsRefused) {
     EXPECT_EQ(script.decisions[1].kind, Decision::Kind::line_rests);
     EXPECT_EQ(script.decisions[1].station, 17);
     EXPECT_EQ(script.decisions[1].time, Duration(500ms));
-}
-
-TEST_F(ArbiterTest, ExplainsWhyAReadThatWasAnsweredIsAskedOnceMore) {
-    settings.explain = true;
-    BusScript script(settings);
-    for (const Bytes& read : {kRead, "03 01 00 00 03"_hex}) {
-        script.submit(17, read, 1);
-        answer(script, 17, kReply, 3ms);
-    }
-    ASSERT_TRUE(script.next_sent(100ms));
-    ASSERT_EQ(script.decisions.size(), 1u);
-    EXPECT_EQ(script.decisions[0].kind, Decision::Kind::doubted);
 }
 
 }  // namespace

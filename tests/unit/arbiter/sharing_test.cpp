@@ -27,15 +27,15 @@ class SharingTest : public test::QueueFixture {
         settings.id = 1;
         settings.vouched = count > 0;
         if (count > 0) settings.max_registers = count;
-        return {settings, OfflineSettings{}, true};
+        return {settings, OfflineSettings{}, true, 40ms};
     }
     Group gather(const Bytes& leader) { return gather(leader, station_); }
     Group gather(const Bytes& leader, const Station& station) {
-        return sharing_.gather(read_of(9, leader), station, book_, queue_);
+        return sharing_.gather(TimePoint{1h}, read_of(9, leader), station, outstanding_, queue_);
     }
     void wait(const Bytes& pdu) { EXPECT_TRUE(queue_.push(read_of(++client_, pdu)).taken); }
 
-    OutstandingRequests book_;
+    Outstanding outstanding_;
     Sharing sharing_{true};
     Station station_ = station_that_takes(125);
     Client client_ = 100;
@@ -82,8 +82,8 @@ TEST_F(SharingTest, P6AReadAsLongAsOneThatTheStationHasAnsweredIsMade) {
     Station station = station_that_takes(0);
     const Bytes reply = Writer().u8(3).u8(8).raw(Bytes(8)).take();
     const TimePoint now{1h};
-    station.on_reply(
-        book_, now, test::answered(now, now, test::group_of(1, registers(50, 4)), reply), 5ms, 5ms);
+    station.on_reply(now, test::answered(now, now, test::group_of(1, registers(50, 4)), reply),
+                     false, 5ms);
     wait(registers(12, 2));
     EXPECT_EQ(gather(registers(10, 2), station).jobs.size(), 2u);
 }

@@ -61,11 +61,6 @@ TEST_F(StationHealthTest, EachReturnFromASilenceMayHaveBeenARestart) {
     EXPECT_EQ(health.returns(), 3u);
 }
 
-TEST_F(StationHealthTest, OneThatIsNotAwaitedAgainGoesAtTheFirstSilence) {
-    EXPECT_TRUE(health.on_silence(now, true));
-    EXPECT_TRUE(health.offline());
-}
-
 TEST_F(StationHealthTest, AReplyBringsItBackAndIsRemembered) {
     go_offline();
     EXPECT_TRUE(health.on_reply(now));
@@ -135,7 +130,7 @@ TEST_F(StationHealthTest, P4SilentWritesAloneTakeNoStationOfflineThatAnswersRead
 }
 
 TEST(ProbeBudget, P4SpendingWheneverAllowedStaysAtTheShare) {
-    for (const double share : {ProbeBudget::kOffline, ProbeBudget::kFailing}) {
+    for (const double share : {ProbeBudget::kOffline, ProbeBudget::kSuspect}) {
         ProbeBudget budget(share);
         TimePoint now = kStart;
         Duration spent{};

@@ -5,7 +5,6 @@
 #include <cstdint>
 
 #include "arbiter_fixture.hpp"
-#include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
@@ -207,14 +206,6 @@ TEST_F(SymptomsTest, AnAnswerToABroadcastIsNotWhatTheNextRequestIsAnswered) {
     EXPECT_EQ(of(18).wrong, 0u);
 }
 
-TEST_F(SymptomsTest, WhatComesLongAfterABroadcastDoesNotAnswerIt) {
-    ask(0, kWrite, {});
-    for (int i = 0; i < 5; ++i) ask(17, kRead, encode_adu(17, kReply));
-    bus.run_for(timing::kLatestBroadcastAnswer);
-    hear(encode_adu(18, kWrite));
-    EXPECT_EQ(of(18).broadcast_replies, 0u);
-}
-
 TEST_F(SymptomsTest, AGoodFrameThatDoesNotAnswerIsWrongInWhateverPiecesItComes) {
     const Bytes longer = encode_adu(17, "03 08 00 01 00 02 00 03 12 34"_hex);
     for (const std::size_t cut : {3u, 6u, 11u}) {
@@ -230,35 +221,12 @@ TEST_F(SymptomsTest, AGoodFrameThatDoesNotAnswerIsWrongInWhateverPiecesItComes) 
     EXPECT_EQ(of(17).damaged(), 0u);
 }
 
-TEST_F(SymptomsTest, AFrameThatOurRequestCutsInTwoIsNoNoise) {
-    ask(17, kRead, encode_adu(17, kReply));
-    const Bytes unasked = encode_adu(18, "03 02 00 07"_hex);
-    bus.hear(ByteView(unasked).first(4));
-    bus.run_for(60ms);
-    bus.submit(17, kRead);
-    bus.run_to_end_of_request();
-    bus.hear(ByteView(unasked).subspan(4));
-    bus.run_for(5ms);
-    bus.hear(encode_adu(17, kReply));
-    bus.run_for(400ms);
-    EXPECT_EQ(of(17).strays, of(17).torn);
-    EXPECT_EQ(of(17).damaged(), 0u);
-    EXPECT_EQ(of(17).answered, 2u);
-}
-
 TEST_F(SymptomsTest, TheAnswerWithAnotherAddressIsCountedForTheAskedStation) {
     ask(18, kRead, encode_adu(18, kReply));
     ask(17, kRead, encode_adu(18, reply_number(7)));
     ask(17, kRead, encode_adu(18, "03 02 00 07"_hex));  // another length answers nothing
     EXPECT_EQ(of(17).misaddressed, 1u);
     EXPECT_EQ(of(18).misaddressed, 0u);
-}
-
-TEST_F(SymptomsTest, AnEarlierReplyOnceMoreIsNoDuplicateOfTheLast) {
-    for (unsigned i = 1; i <= 3; ++i) ask(17, read_at(i), encode_adu(17, reply_number(i)));
-    hear(encode_adu(17, reply_number(1)));
-    EXPECT_EQ(of(17).old_replies, 1u);
-    EXPECT_EQ(of(17).doubled, 0u);
 }
 
 TEST_F(SymptomsTest, AReplyWithoutItsFirstByteIsKnownAsSuch) {

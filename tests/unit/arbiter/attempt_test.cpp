@@ -1,0 +1,390 @@
+// One request on the wire: what is heard meanwhile, in frames, and when it ends.
+#include "panelgate/arbiter/attempt.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "support/attempts.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::arbiter::attempt_test {
+namespace {
+
+using Expect = EchoFilter::Expect;
+using modbus::encode_adu;
+using modbus::Unused;
+using test::group_of;
+
+constexpr std::uint8_t kStation = 17;
+constexpr TimePoint kHandedOver{1h};
+constexpr Duration kPatience = 500ms;
+const Bytes kRead = "03 00 6B 00 03"_hex;
+const Bytes kFrame = encode_adu(kStation, kRead);
+const Bytes kReplyAdu = encode_adu(kStation, "03 06 02 2B 00 00 00 64"_hex);
+
+Attempt attempt_of(const Bytes& pdu, EchoFilter echo = {}, const Settings& line = {}) {
+    return {group_of(kStation, pdu),
+            test::timing_of(kHandedOver, pdu.size() + 3, line),
+            std::move(echo),
+            {}};
+}
+
+Bytes cut(const Bytes& whole, std::size_t front, std::size_t behind) {
+    return {whole.begin() + static_cast<std::ptrdiff_t>(front),
+            whole.end() - static_cast<std::ptrdiff_t>(behind)};
+}
+
+class AttemptTest : public testing::Test {
+  protected:
+    /// These bytes come so long after the request had left.
+    void hear(Duration after, const Bytes& bytes) {
+        attempt.on_rx(attempt.timing().sent + after, bytes);
+        take();
+    }
+    /// Lets time pass until the attempt has ended.
+    Verdict end() {
+        for (int i = 0; i < 100; ++i) {
+            const TimePoint due = attempt.deadline();
+            attempt.on_silence(due);
+            take();
+            ended = due - attempt.timing().sent;
+            if (const Verdict verdict = attempt.verdict(due); verdict != Verdict::open)
+                return verdict;
+        }
+        ADD_FAILURE() << "the attempt never ends";
+        return Verdict::open;
+    }
+    /// The frame that answered the request, or nothing.
+    Bytes reply() const {
+        const auto found = std::ranges::find(heard, true, &Attempt::Heard::answers);
+        return found == heard.end() ? Bytes{} : found->part.bytes;
+    }
+    void again(Attempt other) {
+        attempt = std::move(other);
+        heard.clear();
+    }
+
+    Attempt attempt = attempt_of(kRead);
+    std::vector<Attempt::Heard> heard;
+    Duration ended{};
+
+  private:
+    void take() {
+        for (Attempt::Heard& one : attempt.take_heard()) heard.push_back(std::move(one));
+    }
+};
+
+TEST_F(AttemptTest, T1IsSilentWhenItsPatienceIsOverAndNotBefore) {
+    EXPECT_EQ(attempt.verdict(attempt.give_up() - 1ns), Verdict::open);
+    EXPECT_EQ(end(), Verdict::silent);
+    EXPECT_EQ(ended, kPatience);
+    EXPECT_FALSE(attempt.heard());
+}
+
+TEST_F(AttemptTest, T3TheReplyIsFoundAtAnyOffsetInAnyPieces) {
+    for (const Bytes& noise : {"00"_hex, "FF"_hex, "11"_hex, "11 03"_hex, "A5 11 03 06"_hex}) {
+        for (const std::size_t times : {1u, 2u, 7u}) {
+            for (const std::size_t piece : {1u, 4u, 64u}) {
+                again(attempt_of(kRead));
+                Writer bytes;
+                for (std::size_t i = 0; i < times; ++i) bytes.raw(noise);
+                const Bytes all = bytes.raw(kReplyAdu).take();
+                for (std::size_t at = 0; at < all.size(); at += piece)
+                    hear(5ms, cut(all, at, all.size() - std::min(at + piece, all.size())));
+                if (reply().empty()) end();
+                EXPECT_EQ(reply(), kReplyAdu) << to_hex(noise) << ", " << times << ", " << piece;
+            }
+        }
+    }
+}
+
+TEST_F(AttemptTest, T3BytesBehindAGoodFrameAreNoPartOfIt) {
+    hear(5ms, Writer().u8(0xFF).raw(kReplyAdu).u8(0).take());
+    EXPECT_EQ(reply(), kReplyAdu);
+    ASSERT_EQ(heard.size(), 3u);
+    EXPECT_TRUE(heard.front().in_front);
+    EXPECT_EQ(heard.back().part.bytes, "00"_hex);
+    EXPECT_FALSE(heard.back().in_front);
+}
+
+TEST_F(AttemptTest, T3AReplyThatIsCutAtEitherEndIsDamaged) {
+    for (const std::size_t missing : {1u, 2u, 3u}) {
+        again(attempt_of(kRead));
+        hear(5ms, cut(kReplyAdu, missing, 0));
+        EXPECT_EQ(end(), Verdict::damaged) << missing;
+        EXPECT_TRUE(attempt.lost_beginning());
+        EXPECT_LT(ended, kPatience) << "nothing more can come";
+        again(attempt_of(kRead));
+        hear(5ms, cut(kReplyAdu, 0, missing));
+        EXPECT_EQ(end(), Verdict::damaged) << missing;
+        EXPECT_TRUE(attempt.was_cut_off());
+        EXPECT_EQ(ended, kPatience) << "the reply may begin anew";
+    }
+}
+
+TEST_F(AttemptTest, T3AFlippedBitAnywhereInTheReplyIsNoReply) {
+    for (std::size_t at = 0; at < kReplyAdu.size(); ++at) {
+        again(attempt_of(kRead));
+        Bytes bad = kReplyAdu;
+        bad[at] ^= 0x10;
+        hear(5ms, bad);
+        const Verdict verdict = end();
+        EXPECT_TRUE(reply().empty());
+        EXPECT_EQ(verdict, at < 2 ? Verdict::silent : Verdict::damaged) << at;
+        EXPECT_EQ(attempt.damaged_bytes(), bad);
+    }
+}
+
+TEST_F(AttemptTest, T3DamageDoesNotEndItWhileTheReplyMayStillCome) {
+    hear(5ms, "11 03 06 02"_hex);
+    attempt.on_silence(attempt.deadline());
+    hear(400ms, kReplyAdu);
+    EXPECT_EQ(reply(), kReplyAdu);
+}
+
+TEST_F(AttemptTest, T4APauseInsideTheReplyIsAHoleAndALongerOneBreaksTheReply) {
+    const Duration hole = attempt.timing().hole;
+    hear(10ms, cut(kReplyAdu, 0, 6));
+    EXPECT_EQ(attempt.deadline() - attempt.timing().sent, 10ms + hole);
+    hear(10ms + hole - 1ns, cut(kReplyAdu, 5, 0));
+    EXPECT_EQ(reply(), kReplyAdu);
+    EXPECT_GT(attempt.longest_pause(), hole - 10ms);
+    again(attempt_of(kRead));
+    hear(10ms, cut(kReplyAdu, 0, 6));
+    attempt.on_silence(attempt.timing().sent + 10ms + hole);
+    hear(11ms + hole, cut(kReplyAdu, 5, 0));
+    EXPECT_EQ(end(), Verdict::damaged);
+}
+
+TEST_F(AttemptTest, T4AReplyThatHasBegunInTimeIsHeardToItsEndButNotWithoutLimit) {
+    hear(kPatience - 1ms, cut(kReplyAdu, 0, 6));
+    EXPECT_GT(attempt.deadline(), attempt.give_up());
+    again(attempt_of("41 01"_hex));
+    for (Duration after = 5ms; after < 5s; after += 10ms) hear(after, "11 41"_hex);
+    EXPECT_LE(attempt.deadline(), attempt.give_up() + attempt.timing().longest_reply);
+}
+
+TEST_F(AttemptTest, FRM11AReplyOfUnknownLengthEndsWithItsCrcAndASilence) {
+    const Bytes whole = encode_adu(kStation, "41 01 02 03 04 05"_hex);
+    again(attempt_of("41 01"_hex));
+    hear(10ms, cut(whole, 0, whole.size() - 4));
+    EXPECT_EQ(attempt.deadline() - attempt.timing().sent, Duration(70ms)) << "a hole";
+    hear(40ms, cut(whole, 4, 0));
+    EXPECT_EQ(attempt.deadline() - attempt.timing().sent, Duration(60ms)) << "the frame's end";
+    attempt.on_silence(attempt.deadline());
+    hear(61ms, {});
+    EXPECT_EQ(reply(), whole);
+}
+
+TEST_F(AttemptTest, T5AFrameOfAnotherStationIsSteppedOverAndMovesNoDeadline) {
+    const Bytes other = encode_adu(18, "03 02 00 07"_hex);
+    hear(5ms, other);
+    ASSERT_EQ(heard.size(), 1u);
+    EXPECT_EQ(heard[0].part.kind, Unused::Kind::foreign);
+    EXPECT_TRUE(attempt.disturbed());
+    EXPECT_EQ(attempt.deadline(), attempt.give_up());
+    hear(9ms, Writer().raw(other).raw(kReplyAdu).take());
+    EXPECT_EQ(reply(), kReplyAdu);
+    EXPECT_FALSE(attempt.is_clean()) << "an echo may have been lost in it";
+}
+
+TEST_F(AttemptTest, T13AFrameOfTheStationThatDoesNotAnswerIsHeard) {
+    const Bytes longer = encode_adu(kStation, "03 08 00 01 00 02 00 03 00 04"_hex);
+    hear(5ms, longer);
+    ASSERT_EQ(heard.size(), 1u);
+    EXPECT_EQ(heard[0].part.bytes, longer);
+    EXPECT_FALSE(heard[0].answers);
+}
+
+TEST_F(AttemptTest, T13AnotherFunctionsReplyLeavesTheRestOfTheTimeAndAnotherLengthDoesNot) {
+    attempt.on_wrong(false, true);
+    EXPECT_EQ(attempt.verdict(attempt.timing().sent + 5ms), Verdict::open);
+    EXPECT_EQ(end(), Verdict::wrong);
+    EXPECT_EQ(ended, kPatience);
+    EXPECT_TRUE(attempt.refused_other());
+    again(attempt_of(kRead));
+    attempt.on_wrong(true, false);
+    EXPECT_EQ(attempt.verdict(attempt.timing().sent + 5ms), Verdict::wrong);
+    EXPECT_FALSE(attempt.refused_other());
+}
+
+TEST_F(AttemptTest, T9AContestedReplyCountsAsDamage) {
+    attempt.on_contested();
+    EXPECT_EQ(end(), Verdict::damaged);
+    EXPECT_EQ(ended, kPatience);
+}
+
+TEST_F(AttemptTest, T14WhereTheReplysOwnByteCountDecidesAnyIsTaken) {
+    Group group = group_of(kStation, kRead);
+    group.request = group.request.with_any_length();
+    const Attempt any(group, test::timing_of(kHandedOver, 8), {}, {});
+    for (const Bytes& pdu : {"03 0C 00 01 00 02 00 03 00 04 00 05 00 06"_hex, "03 02 00 01"_hex}) {
+        again(any);
+        hear(5ms, encode_adu(kStation, pdu));
+        EXPECT_EQ(reply(), encode_adu(kStation, pdu));
+    }
+}
+
+TEST_F(AttemptTest, T7TheThinkTimeOfAReplyThatBeganBeforeTheRequestHadLeftIs0) {
+    hear(-3ms, kReplyAdu);
+    EXPECT_EQ(reply(), kReplyAdu);
+    EXPECT_EQ(attempt.waited(kReplyAdu.size()), 0ms);
+}
+
+TEST_F(AttemptTest, P6NoReadJoinsARepeatedOneNorOneThatMayHaveLeft) {
+    Settings uart;
+    uart.paced = true;
+    const Attempt first = attempt_of(kRead, {}, uart);
+    const Attempt::Timing& timing = first.timing();
+    const Attempt retry(group_of(kStation, kRead, 2), timing, {}, {});
+    const Job job = group_of(kStation, "03 00 6C 00 01"_hex).jobs[0];
+    const Duration whole = timing.sent - timing.started;
+    const TimePoint leaving = timing.sent - whole / 40;
+    EXPECT_TRUE(first.can_join(leaving, job));
+    EXPECT_FALSE(first.can_join(timing.sent - whole / 100, job)) << "the rate may be off";
+    EXPECT_FALSE(attempt.can_join(leaving, job)) << "the far end may have the request already";
+    EXPECT_FALSE(retry.can_join(leaving, job));
+}
+
+/// An adapter that switches late lets the first bytes of the request through (T6).
+class APartOfTheEcho : public AttemptTest, public testing::WithParamInterface<Expect> {
+  protected:
+    APartOfTheEcho() { again(attempt_of(kRead, {kFrame, GetParam()})); }
+};
+
+TEST_P(APartOfTheEcho, T6TakesNoByteOfTheReplyWithIt) {
+    for (std::size_t size = 1; size < kFrame.size(); ++size) {
+        again(attempt_of(kRead, {kFrame, GetParam()}));
+        hear(-3ms, cut(kFrame, 0, kFrame.size() - size));
+        hear(5ms, cut(kReplyAdu, 0, 9));
+        hear(9ms, cut(kReplyAdu, 2, 0));
+        EXPECT_EQ(reply(), kReplyAdu) << size;
+        EXPECT_EQ(attempt.is_clean(), size == 1) << size;
+    }
+}
+
+TEST_P(APartOfTheEcho, T6AloneIsSilenceAndNoReplyThatCameDamaged) {
+    for (std::size_t size = 3; size < kFrame.size(); ++size) {
+        again(attempt_of(kRead, {kFrame, GetParam()}));
+        hear(0ms, cut(kFrame, 0, kFrame.size() - size));
+        EXPECT_EQ(end(), Verdict::silent) << size;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Every, APartOfTheEcho, testing::Values(Expect::nothing, Expect::perhaps));
+
+TEST_F(AttemptTest, T6AnEchoWithoutItsFirstByteIsNoReply) {
+    for (const Expect expect : {Expect::nothing, Expect::perhaps}) {
+        again(attempt_of(kRead, {kFrame, expect}));
+        hear(0ms, cut(kFrame, 1, 0));
+        hear(5ms, kReplyAdu);
+        EXPECT_EQ(reply(), kReplyAdu);
+        EXPECT_FALSE(attempt.is_clean());
+    }
+}
+
+TEST_F(AttemptTest, T6TheReplyThatEqualsTheRequestIsTheEchoUntilThatHasCome) {
+    const Bytes write = "06 00 01 00 03"_hex;
+    const Bytes frame = encode_adu(kStation, write);
+    EXPECT_FALSE(attempt_of(write, {frame, Expect::nothing}).is_own_echo(write));
+    again(attempt_of(write, {frame, Expect::perhaps}));
+    EXPECT_TRUE(attempt.is_own_echo(write));
+    EXPECT_FALSE(attempt.is_own_echo("06 00 01 00 04"_hex));
+    hear(5ms, Writer().raw(frame).raw(frame).take());
+    EXPECT_FALSE(attempt.is_own_echo(write));
+    EXPECT_EQ(reply(), frame);
+}
+
+// When bytes are worth a look (P5).
+
+const Duration kByte = byte_time(SerialFormat{});
+
+class InputPaceTest : public AttemptTest {
+  protected:
+    /// Bytes `from` to `to` of the frame, whose byte n is there n + 1 byte times behind `start`.
+    void come(const Bytes& frame, std::size_t from, std::size_t to, Duration late = {}) {
+        now = start + to * kByte + late;
+        attempt.on_rx(now, ByteView(frame).subspan(from, to - from));
+    }
+    /// Bytes decide nothing until so long behind `start`; empty: each byte may decide.
+    std::optional<Duration> busy() const {
+        const auto until = attempt.busy_until();
+        return until && *until > now ? std::optional(*until - start) : std::nullopt;
+    }
+
+    TimePoint start = attempt.timing().sent + 5ms;
+    TimePoint now{};
+};
+
+TEST_F(InputPaceTest, P5TheReplyIsLookedAtWhenItsHeaderAndWhenAllOfItIsThere) {
+    EXPECT_FALSE(busy());
+    come(kReplyAdu, 0, 1);
+    EXPECT_EQ(busy(), 3 * kByte);
+    come(kReplyAdu, 1, 3);
+    EXPECT_EQ(busy(), 11 * kByte);
+    come(kReplyAdu, 3, 10);
+    EXPECT_EQ(busy(), 11 * kByte);
+}
+
+TEST_F(InputPaceTest, P5AnExceptionIsNotWaitedForLongerThanItIs) {
+    come("11 83 02 C1 34"_hex, 0, 3);
+    EXPECT_EQ(busy(), 5 * kByte);
+}
+
+TEST_F(InputPaceTest, P5WhereBytesDoNotComeOneByOneEachMayDecide) {
+    come(kReplyAdu, 0, 3, 0ms);
+    now = start + 3 * kByte;
+    attempt.on_rx(now, ByteView(kReplyAdu).subspan(3, 7));  // a USB latency timer
+    EXPECT_FALSE(busy());
+    Settings tcp;
+    tcp.may_stall = true;
+    attempt = attempt_of(kRead, {}, tcp);
+    come(kReplyAdu, 0, 1);
+    EXPECT_FALSE(attempt.busy_until());
+}
+
+TEST_F(InputPaceTest, P5BehindAPauseTheRestOfTheReplyIsExpectedFromThere) {
+    come(kReplyAdu, 0, 3);
+    start += 5ms;
+    come(kReplyAdu, 3, 4);
+    EXPECT_EQ(busy(), 11 * kByte);
+}
+
+TEST_F(InputPaceTest, P5ALongReplyIsLookedAtBeforeItsEndBecauseItMayHaveBeenCut) {
+    attempt = attempt_of("03 00 6B 00 64"_hex);
+    const Bytes whole = Writer().raw("11 03 C8"_hex).raw(Bytes(202, 7)).take();
+    come(whole, 0, 3);
+    EXPECT_EQ(busy(), 3 * kByte + timing::kLongestLook);
+    come(whole, 3, 80);
+    EXPECT_EQ(busy(), 160 * kByte) << "as long again";
+}
+
+TEST_F(InputPaceTest, P5AnEchoIsLookedAtWhenAllOfItCanHaveComeBack) {
+    attempt = attempt_of(kRead, {kFrame, Expect::certainly});
+    start = attempt.timing().started;
+    come(kFrame, 0, 1);
+    EXPECT_EQ(busy(), 8 * kByte);
+    come(kFrame, 1, 8);
+    EXPECT_FALSE(busy());
+    start = attempt.timing().sent + 5ms;
+    come(kReplyAdu, 0, 3);
+    EXPECT_EQ(busy(), 11 * kByte);
+    attempt = attempt_of(kRead, {kFrame, Expect::perhaps});
+    start = attempt.timing().started;
+    come(kFrame, 0, 1);
+    EXPECT_EQ(busy(), 3 * kByte) << "a reply begins like its request";
+}
+
+TEST_F(InputPaceTest, P5NoiseIsWantedByteByByte) {
+    come("FF 00"_hex, 0, 2);
+    EXPECT_FALSE(busy());
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter::attempt_test
