@@ -32,7 +32,7 @@ TEST_F(ApplyTest, P1AShorterTimeoutEndsNoRestThatHasBegun) {
     bus.apply(settings);
     const Ticket asked = bus.submit(17, read_at(1), 1);
     bus.run_to_end_of_request();
-    bus.run_for(501ms);
+    bus.run_for(kSilence);
     ASSERT_TRUE(bus.answered(asked));
     station(0).response_timeout = 20ms;
     bus.apply(settings);

@@ -7,6 +7,7 @@
 
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "support/bus_script.hpp"
@@ -19,6 +20,8 @@ using test::BusScript;
 inline const Bytes kRead = "03 00 6B 00 03"_hex;
 inline const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
 inline const Bytes kWrite = "06 00 01 00 03"_hex;
+/// From the end of a request to the end of the wait for its reply.
+inline constexpr Duration kSilence = 500ms + timing::kListensAgain;
 
 /// A read of three registers that touches no other one with another number.
 inline Bytes read_at(unsigned number) { return Writer().u8(3).u16(100 * number).u16(3).take(); }

@@ -130,45 +130,6 @@ TEST_F(ArbiterTest, AnAdaptiveTimeoutAnswersTheClientEarlyAndStillWaitsForALateR
     EXPECT_GT(script.next_sent().value().at - start, Duration(900ms)) << "where it is not answered";
 }
 
-/// Share of the line that station 17 takes, its own time and the rests after it, if from the fifth
-/// second on each of its replies is `late` after its request; meanwhile one client keeps asking
-/// another panel: it counts as using the line also between an answer and its next request.
-double share_of_late_panel(BusScript& bus, Duration late) {
-    std::multimap<TimePoint, std::uint8_t> replies;
-    std::size_t seen = 0;
-    std::optional<Ticket> healthy;
-    const TimePoint start = bus.now();
-    TimePoint poll = start;
-    while (bus.now() < start + 120s) {
-        if (bus.now() >= poll) {
-            bus.try_submit(17, kRead, 2, PriorityClass::poll);
-            poll = bus.now() + 1s;
-        }
-        if (!healthy || bus.answered(*healthy)) healthy = bus.submit(18, kRead);
-        bus.run_for(1ms);
-        for (; seen < bus.sent.size(); ++seen) {
-            const std::uint8_t station = bus.sent[seen].adu.front();
-            const bool is_late = station == 17 && bus.now() > start + 5s;
-            replies.emplace(bus.sent[seen].at + (is_late ? late : 5ms), station);
-        }
-        for (; !replies.empty() && replies.begin()->first <= bus.now();
-             replies.erase(replies.begin()))
-            bus.hear_reply(replies.begin()->second, kReply);
-    }
-    Duration taken{};
-    for (std::size_t i = 0; i + 1 < bus.sent.size(); ++i) {
-        if (bus.sent[i].adu.front() == 17) taken += bus.sent[i + 1].at - bus.sent[i].at;
-    }
-    return to_seconds(taken) / 120;
-}
-
-TEST_F(ArbiterTest, P4APanelThatAlwaysAnswersLateTakesAtMostAFifthOfTheLine) {
-    for (const Duration late : {600ms, 900ms, 1400ms}) {
-        BusScript script{settings};
-        EXPECT_LE(share_of_late_panel(script, late), 0.2) << to_milliseconds(late) << " ms";
-    }
-}
-
 /// One client reads station 18, four others read and write station 17, which does not answer each
 /// `nth` request. Returns the answers of 18 in half a minute.
 int answers_beside_silence(BusScript& bus, int nth) {

@@ -136,7 +136,7 @@ TEST_F(AttemptTest, T3AFlippedBitAnywhereInTheReplyIsNoReply) {
         hear(5ms, bad);
         const Verdict verdict = end();
         EXPECT_TRUE(reply().empty());
-        EXPECT_EQ(verdict, at < 2 ? Verdict::silent : Verdict::damaged) << at;
+        EXPECT_EQ(verdict, Verdict::damaged) << at;
         EXPECT_EQ(attempt.damaged_bytes(), bad);
     }
 }
@@ -185,11 +185,12 @@ TEST_F(AttemptTest, FRM11AReplyOfUnknownLengthEndsWithItsCrcAndASilence) {
 TEST_F(AttemptTest, T5AFrameOfAnotherStationIsSteppedOverAndMovesNoDeadline) {
     const Bytes other = encode_adu(18, "03 02 00 07"_hex);
     hear(5ms, other);
-    ASSERT_EQ(heard.size(), 1u);
+    attempt.on_silence(attempt.deadline());
+    hear(60ms, Writer().raw(other).raw(kReplyAdu).take());
+    ASSERT_EQ(heard.size(), 3u);
     EXPECT_EQ(heard[0].part.kind, Unused::Kind::foreign);
     EXPECT_TRUE(attempt.disturbed());
-    EXPECT_EQ(attempt.deadline(), attempt.give_up());
-    hear(9ms, Writer().raw(other).raw(kReplyAdu).take());
+    EXPECT_EQ(attempt.give_up(), attempt.timing().sent + kPatience);
     EXPECT_EQ(reply(), kReplyAdu);
     EXPECT_FALSE(attempt.is_clean()) << "an echo may have been lost in it";
 }
@@ -264,6 +265,7 @@ TEST_P(APartOfTheEcho, T6TakesNoByteOfTheReplyWithIt) {
         hear(-3ms, cut(kFrame, 0, kFrame.size() - size));
         hear(5ms, cut(kReplyAdu, 0, 9));
         hear(9ms, cut(kReplyAdu, 2, 0));
+        if (reply().empty()) end();
         EXPECT_EQ(reply(), kReplyAdu) << size;
         EXPECT_EQ(attempt.is_clean(), size == 1) << size;
     }

@@ -212,7 +212,7 @@ TEST_F(ArbiterTest, ExplainsWhyEachRequestGoesNowAndWhyOneIsRefused) {
     ASSERT_GE(script.decisions.size(), 2u);
     EXPECT_EQ(script.decisions[1].kind, Decision::Kind::line_rests);
     EXPECT_EQ(script.decisions[1].station, 17);
-    EXPECT_EQ(script.decisions[1].time, Duration(500ms));
+    EXPECT_EQ(script.decisions[1].time, 2 * 500ms - kSilence);
 }
 
 }  // namespace
