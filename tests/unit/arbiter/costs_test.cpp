@@ -242,7 +242,7 @@ TEST(Costs, P4TenOfTwentyThatWereNeverHeardLeaveTheOthersTheirTurns) {
     plant.forget();
     plant.run_for(10s);
     EXPECT_EQ(of_healthy(plant.faults), 0);
-    EXPECT_GT(plant.asked[20], 2);
+    EXPECT_GE(plant.asked[20], 2);
 }
 
 /// A client that asks for ids without a panel, one behind the other.
