@@ -20,7 +20,7 @@ class SilenceTest : public ArbiterTest {
         EXPECT_TRUE(bus.next_sent());
         bus.run_to_end_of_request();
         const TimePoint sent = bus.now();
-        other = bus.submit(18, read_at(++number), 9);
+        bus.submit(18, read_at(++number), 9);
         while (bus.sent.back().adu[0] != 18) EXPECT_TRUE(bus.next_sent());
         const Duration waited = bus.sent.back().at - sent;
         answer(bus, 18, reply_number(number), 3ms);
@@ -37,7 +37,6 @@ class SilenceTest : public ArbiterTest {
         }
     }
     unsigned number = 0;
-    Ticket other = 0;
 };
 
 TEST_F(SilenceTest, P4ASilenceOfAQuickStationIsWaitedForAsLongAsItsNeighboursDo) {
