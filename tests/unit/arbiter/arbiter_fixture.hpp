@@ -64,24 +64,6 @@ inline void expect_answer_at(BusScript& bus, Ticket ticket, TimePoint at) {
     EXPECT_TRUE(bus.answered(ticket));
 }
 
-/// P1: a late reply of the same shape answers no request and ends the rest.
-inline void expect_no_answer_by_a_late_reply(Settings settings) {
-    settings.stations[0].retries = 0;
-    BusScript bus{settings};
-    const Ticket first = bus.submit(17, read_at(1), 1);
-    const Ticket second = bus.submit(17, read_at(2), 2);
-    while (!bus.answered(first)) bus.run_for(1ms);
-    bus.run_for(300ms);
-    bus.hear_reply(17, kReply);  // of the first: same station, function and length
-    bus.run_for(100ms);
-    EXPECT_FALSE(bus.answered(second));
-    ASSERT_EQ(bus.events.size(), 1u);
-    EXPECT_EQ(bus.events[0].kind, StationEvent::Kind::late);
-    ASSERT_EQ(bus.sent.size(), 2u);
-    bus.hear_reply(17, reply_number(2));
-    EXPECT_EQ(bus.answer(second).pdu.value(), reply_number(2));
-}
-
 /// The arbiter of a line with the stations 17 and 18.
 class ArbiterTest : public testing::Test {
   protected:

@@ -70,28 +70,6 @@ TEST_F(ArbiterTest, P5OnALineThatIsQuickerThanItsRateTheGapFollowsTheReply) {
     for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(bus.sent[i + 1].at, replied[i] + gap) << i;
 }
 
-TEST_F(ArbiterTest, AForeignFrameIsSteppedOver) {
-    const Ticket ticket = bus.submit(17, kRead);
-    answer(bus, 18, kReply, 5ms);
-    bus.run_for(40ms);
-    EXPECT_FALSE(bus.answered(ticket));
-    bus.hear_reply(17, kReply);
-    EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
-    EXPECT_EQ(counters().foreign_frames, 1u);
-}
-
-TEST_F(ArbiterTest, P1AReplyOfAnotherLengthIsNotTaken) {
-    const Ticket ticket = bus.submit(17, kRead);
-    answer(bus, 17, "03 0A 00 01 00 02 00 03 00 04 00 05"_hex);
-    EXPECT_FALSE(bus.answered(ticket));
-    ASSERT_TRUE(bus.next_sent(2 * gap)) << "it said something else: nobody waits any longer";
-    answer(bus, 17, kReply);
-    EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
-    EXPECT_EQ(counters().foreign_frames, 1u);
-    EXPECT_EQ(counters().late_frames, 0u);
-    EXPECT_EQ(counters().symptoms.wrong, 1u);
-}
-
 TEST_F(ArbiterTest, ADamagedReplyIsRetriedAfterSilenceAndCounted) {
     const Ticket ticket = bus.submit(17, kRead);
     bus.run_to_end_of_request();
@@ -103,26 +81,6 @@ TEST_F(ArbiterTest, ADamagedReplyIsRetriedAfterSilenceAndCounted) {
     EXPECT_EQ(counters().damaged_frames, 1u);
     answer(bus, 17, kReply);
     EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
-}
-
-TEST_F(ArbiterTest, OnlyDamagedRepliesEndAsDamaged) {
-    const Ticket ticket = bus.submit(17, kRead);
-    for (int i = 0; i < 2; ++i) {
-        bus.run_to_end_of_request();
-        bus.hear(ByteView(encode_adu(17, kReply)).first(6));
-        bus.run_for(510ms);  // how long it needs is not known yet: the rest may come
-    }
-    EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::damaged);
-    EXPECT_EQ(bus.arbiter().health(17).silent_in_a_row(), 0);
-}
-
-TEST_F(ArbiterTest, APanelsExceptionIsFinal) {
-    const Ticket ticket = bus.submit(17, kRead);
-    answer(bus, 17, "83 06"_hex);
-    EXPECT_EQ(bus.answer(ticket).pdu.value(), "83 06"_hex);
-    bus.run_for(5s);
-    EXPECT_EQ(bus.sent.size(), 1u);
-    EXPECT_EQ(counters().exceptions.at(6), 1u);
 }
 
 TEST_F(ArbiterTest, AReplyThatHasBegunInTimeIsHeardToItsEnd) {
@@ -224,33 +182,6 @@ TEST_F(BothOrders, P1TheOtherOrderIsNoReply) {
     EXPECT_EQ(line.arbiter().station_counters().at(17).symptoms.crc_swapped, 1u);
 }
 
-TEST_F(BothOrders, P1ALateReplyOfTheOtherKindIsKnownAndAnswersNoRequest) {
-    BusScript line = script();
-    const Ticket silent = line.submit(17, read_at(1), 1);
-    const Ticket other = line.submit(18, read_at(2), 2);
-    while (!line.answered(silent)) line.run_for(1ms);
-    while (line.sent.back().adu[0] != 18) line.run_for(1ms);
-    line.run_to_end_of_request();
-    line.hear(old_adu(reply_number(1)));
-    EXPECT_FALSE(line.answered(other));
-    line.hear(encode_adu(18, reply_number(2)));
-    EXPECT_EQ(line.answer(other).pdu.value(), reply_number(2));
-    ASSERT_FALSE(line.events.empty());
-    EXPECT_EQ(line.events.back().kind, StationEvent::Kind::late);
-    EXPECT_EQ(line.arbiter().station_counters().at(17).late_frames, 1u);
-}
-
-TEST_F(BothOrders, P8AnEchoIsOurOwnFrameInWhicheverOrder) {
-    settings.echo = EchoMode::on;
-    BusScript line = script();
-    const Ticket ticket = line.submit(17, kWrite, 1);
-    line.run_to_end_of_request();
-    line.hear(old_adu(kWrite));
-    EXPECT_FALSE(line.answered(ticket));
-    line.hear(old_adu(kWrite));
-    EXPECT_EQ(line.answer(ticket).pdu.value(), kWrite);
-}
-
 TEST_F(BothOrders, ABroadcastHasTheStandardsUnlessAllAreOld) {
     EXPECT_EQ(crc_orders(settings).of(0), CrcOrder::low_first);
     EXPECT_EQ(crc_orders(settings).of(17), CrcOrder::high_first);
@@ -323,19 +254,6 @@ TEST_F(WireEnd, ThinkTimeIsCountedFromThere) {
     const Histogram& turnaround = script.arbiter().station_counters().at(0).turnaround;
     const Duration reply = wire_time(settings.serial, kReply.size() + 3);
     EXPECT_NEAR(turnaround.sum, to_seconds(5ms - reply - gap), 1e-9);
-}
-
-TEST_F(WireEnd, ABroadcastsTurnaroundBeginsThereToo) {
-    settings.broadcast_turnaround = 50ms;
-    BusScript script{settings};
-    report_once(script, 30ms);
-    const TimePoint start = script.now();
-    const Ticket broadcast = script.submit(0, kWrite, 1, PriorityClass::write);
-    script.submit(17, kRead, 2);
-    script.run_for(request + 29ms);
-    EXPECT_FALSE(script.answered(broadcast));
-    EXPECT_EQ(script.next_sent().value().at - start, request + 30ms + 50ms);
-    EXPECT_TRUE(script.answered(broadcast));
 }
 
 TEST_F(WireEnd, ADriverThatNeverGetsRidOfItIsNotBelievedForLong) {

@@ -1,34 +1,15 @@
 // Writes, broadcasts and deadlines (P2, P3): nothing is sent twice, or without a client.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <variant>
-#include <vector>
-
 #include "arbiter_fixture.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
-#include "support/request.hpp"
 
 namespace panelgate::arbiter::arbiter_writes_test {
 namespace {
 
 const Bytes kToAll = "10 00 64 00 02 04 00 0A 01 02"_hex;
-const Bytes kToOne = "10 00 64 00 02 04 00 0B 00 00"_hex;
-const Bytes kElsewhere = "10 00 68 00 02 04 00 0B 00 00"_hex;
 const Bytes kConfirmed = "10 00 64 00 02"_hex;
-
-/// The answers that this arbiter gives now.
-std::vector<Finish> finished(Arbiter& arbiter) {
-    std::vector<Finish> all;
-    while (auto action = arbiter.poll_action()) {
-        if (const auto* finish = std::get_if<Finish>(&*action)) all.push_back(*finish);
-    }
-    return all;
-}
 
 TEST_F(ArbiterTest, P2NeverRepeatsAWriteUnlessTheStationAllowsIt) {
     for (const Bytes& write :
@@ -88,45 +69,6 @@ TEST_F(ArbiterTest, ABroadcastIsAnsweredWhenItHasLeftAndTheLineRestsForTheTurnar
         EXPECT_EQ(script.next_sent().value().at - end, 100ms);
         EXPECT_EQ(script.arbiter().counters().broadcasts, 1u);
     }
-}
-
-TEST_F(ArbiterTest, P3ABroadcastIsNotConfirmedBehindItsDeadlineWhenTheProcessStoodStill) {
-    Arbiter arbiter(settings);
-    const TimePoint start{1h};
-    arbiter.on_line_up(start);
-    const Job job{
-        .request = test::request_of(kWrite), .client = 1, .priority = PriorityClass::write};
-    const TimePoint free = start + 1s;
-    arbiter.on_deadline(free);
-    ASSERT_TRUE(arbiter.submit(free, job));
-    arbiter.on_deadline(free + settings.queue.deadline + 1s);
-    const auto answers = finished(arbiter);
-    ASSERT_EQ(answers.size(), 1u);
-    EXPECT_EQ(answers[0].pdu.error(), Fault::timeout);
-}
-
-TEST_F(ArbiterTest, AReplyToABroadcastIsCountedAndGivenToNoClient) {
-    const Ticket broadcast = bus.submit(0, kWrite);
-    const Ticket read = bus.submit(17, kRead, 2);
-    answer(bus, 17, kReply, 10ms);
-    EXPECT_TRUE(bus.answered(broadcast));
-    EXPECT_FALSE(bus.answered(read));
-}
-
-/// Rates may differ by 2 %, and a long request has left that much sooner than computed.
-TEST_F(ArbiterTest, P2AWriteIsConfirmedByAPanelWhoseClockIsFast) {
-    const Bytes write = Writer().u8(16).u16(100).u16(123).u8(246).raw(Bytes(246)).take();
-    const Bytes confirmation = "10 00 64 00 7B"_hex;
-    for (int i = 0; i < 3; ++i) {
-        bus.submit(17, write);
-        answer(bus, 17, confirmation, 3ms);
-        bus.run_for(10ms);
-    }
-    const Ticket ticket = bus.submit(17, write);
-    bus.run_for(wire_time(settings.serial, 255) * 99 / 100);
-    bus.hear_reply(17, confirmation);
-    bus.run_for(100ms);
-    EXPECT_EQ(bus.answer(ticket).pdu.value(), confirmation);
 }
 
 TEST_F(ArbiterTest, P3ExpiresWhatCannotFinishBeforeItsDeadlineWithoutTouchingTheWire) {

@@ -141,13 +141,6 @@ TEST_F(AttemptTest, T3AFlippedBitAnywhereInTheReplyIsNoReply) {
     }
 }
 
-TEST_F(AttemptTest, T3DamageDoesNotEndItWhileTheReplyMayStillCome) {
-    hear(5ms, "11 03 06 02"_hex);
-    attempt.on_silence(attempt.deadline());
-    hear(400ms, kReplyAdu);
-    EXPECT_EQ(reply(), kReplyAdu);
-}
-
 TEST_F(AttemptTest, T4APauseInsideTheReplyIsAHoleAndALongerOneBreaksTheReply) {
     const Duration hole = attempt.timing().hole;
     hear(10ms, cut(kReplyAdu, 0, 6));
@@ -170,18 +163,6 @@ TEST_F(AttemptTest, T4AReplyThatHasBegunInTimeIsHeardToItsEndButNotWithoutLimit)
     EXPECT_LE(attempt.deadline(), attempt.give_up() + attempt.timing().longest_reply);
 }
 
-TEST_F(AttemptTest, FRM11AReplyOfUnknownLengthEndsWithItsCrcAndASilence) {
-    const Bytes whole = encode_adu(kStation, "41 01 02 03 04 05"_hex);
-    again(attempt_of("41 01"_hex));
-    hear(10ms, cut(whole, 0, whole.size() - 4));
-    EXPECT_EQ(attempt.deadline() - attempt.timing().sent, Duration(70ms)) << "a hole";
-    hear(40ms, cut(whole, 4, 0));
-    EXPECT_EQ(attempt.deadline() - attempt.timing().sent, Duration(60ms)) << "the frame's end";
-    attempt.on_silence(attempt.deadline());
-    hear(61ms, {});
-    EXPECT_EQ(reply(), whole);
-}
-
 TEST_F(AttemptTest, T5AFrameOfAnotherStationIsSteppedOverAndMovesNoDeadline) {
     const Bytes other = encode_adu(18, "03 02 00 07"_hex);
     hear(5ms, other);
@@ -193,64 +174,6 @@ TEST_F(AttemptTest, T5AFrameOfAnotherStationIsSteppedOverAndMovesNoDeadline) {
     EXPECT_EQ(attempt.give_up(), attempt.timing().sent + kPatience);
     EXPECT_EQ(reply(), kReplyAdu);
     EXPECT_FALSE(attempt.is_clean()) << "an echo may have been lost in it";
-}
-
-TEST_F(AttemptTest, T13AFrameOfTheStationThatDoesNotAnswerIsHeard) {
-    const Bytes longer = encode_adu(kStation, "03 08 00 01 00 02 00 03 00 04"_hex);
-    hear(5ms, longer);
-    ASSERT_EQ(heard.size(), 1u);
-    EXPECT_EQ(heard[0].part.bytes, longer);
-    EXPECT_FALSE(heard[0].answers);
-}
-
-TEST_F(AttemptTest, T13AnotherFunctionsReplyLeavesTheRestOfTheTimeAndAnotherLengthDoesNot) {
-    attempt.on_wrong(false, true);
-    EXPECT_EQ(attempt.verdict(attempt.timing().sent + 5ms), Verdict::open);
-    EXPECT_EQ(end(), Verdict::wrong);
-    EXPECT_EQ(ended, kPatience);
-    EXPECT_TRUE(attempt.refused_other());
-    again(attempt_of(kRead));
-    attempt.on_wrong(true, false);
-    EXPECT_EQ(attempt.verdict(attempt.timing().sent + 5ms), Verdict::wrong);
-    EXPECT_FALSE(attempt.refused_other());
-}
-
-TEST_F(AttemptTest, T9AContestedReplyCountsAsDamage) {
-    attempt.on_contested();
-    EXPECT_EQ(end(), Verdict::damaged);
-    EXPECT_EQ(ended, kPatience);
-}
-
-TEST_F(AttemptTest, T14WhereTheReplysOwnByteCountDecidesAnyIsTaken) {
-    Group group = group_of(kStation, kRead);
-    group.request = group.request.with_any_length();
-    const Attempt any(group, test::timing_of(kHandedOver, 8), {}, {});
-    for (const Bytes& pdu : {"03 0C 00 01 00 02 00 03 00 04 00 05 00 06"_hex, "03 02 00 01"_hex}) {
-        again(any);
-        hear(5ms, encode_adu(kStation, pdu));
-        EXPECT_EQ(reply(), encode_adu(kStation, pdu));
-    }
-}
-
-TEST_F(AttemptTest, T7TheThinkTimeOfAReplyThatBeganBeforeTheRequestHadLeftIs0) {
-    hear(-3ms, kReplyAdu);
-    EXPECT_EQ(reply(), kReplyAdu);
-    EXPECT_EQ(attempt.waited(kReplyAdu.size()), 0ms);
-}
-
-TEST_F(AttemptTest, P6NoReadJoinsARepeatedOneNorOneThatMayHaveLeft) {
-    Settings uart;
-    uart.paced = true;
-    const Attempt first = attempt_of(kRead, {}, uart);
-    const Attempt::Timing& timing = first.timing();
-    const Attempt retry(group_of(kStation, kRead, 2), timing, {}, {});
-    const Job job = group_of(kStation, "03 00 6C 00 01"_hex).jobs[0];
-    const Duration whole = timing.sent - timing.started;
-    const TimePoint leaving = timing.sent - whole / 40;
-    EXPECT_TRUE(first.can_join(leaving, job));
-    EXPECT_FALSE(first.can_join(timing.sent - whole / 100, job)) << "the rate may be off";
-    EXPECT_FALSE(attempt.can_join(leaving, job)) << "the far end may have the request already";
-    EXPECT_FALSE(retry.can_join(leaving, job));
 }
 
 /// An adapter that switches late lets the first bytes of the request through (T6).
@@ -291,18 +214,6 @@ TEST_F(AttemptTest, T6AnEchoWithoutItsFirstByteIsNoReply) {
     }
 }
 
-TEST_F(AttemptTest, T6TheReplyThatEqualsTheRequestIsTheEchoUntilThatHasCome) {
-    const Bytes write = "06 00 01 00 03"_hex;
-    const Bytes frame = encode_adu(kStation, write);
-    EXPECT_FALSE(attempt_of(write, {frame, Expect::nothing}).is_own_echo(write));
-    again(attempt_of(write, {frame, Expect::perhaps}));
-    EXPECT_TRUE(attempt.is_own_echo(write));
-    EXPECT_FALSE(attempt.is_own_echo("06 00 01 00 04"_hex));
-    hear(5ms, Writer().raw(frame).raw(frame).take());
-    EXPECT_FALSE(attempt.is_own_echo(write));
-    EXPECT_EQ(reply(), frame);
-}
-
 // When bytes are worth a look (P5).
 
 const Duration kByte = byte_time(SerialFormat{});
@@ -334,11 +245,6 @@ TEST_F(InputPaceTest, P5TheReplyIsLookedAtWhenItsHeaderAndWhenAllOfItIsThere) {
     EXPECT_EQ(busy(), 11 * kByte);
 }
 
-TEST_F(InputPaceTest, P5AnExceptionIsNotWaitedForLongerThanItIs) {
-    come("11 83 02 C1 34"_hex, 0, 3);
-    EXPECT_EQ(busy(), 5 * kByte);
-}
-
 TEST_F(InputPaceTest, P5WhereBytesDoNotComeOneByOneEachMayDecide) {
     come(kReplyAdu, 0, 3, 0ms);
     now = start + 3 * kByte;
@@ -349,13 +255,6 @@ TEST_F(InputPaceTest, P5WhereBytesDoNotComeOneByOneEachMayDecide) {
     attempt = attempt_of(kRead, {}, tcp);
     come(kReplyAdu, 0, 1);
     EXPECT_FALSE(attempt.busy_until());
-}
-
-TEST_F(InputPaceTest, P5BehindAPauseTheRestOfTheReplyIsExpectedFromThere) {
-    come(kReplyAdu, 0, 3);
-    start += 5ms;
-    come(kReplyAdu, 3, 4);
-    EXPECT_EQ(busy(), 11 * kByte);
 }
 
 TEST_F(InputPaceTest, P5ALongReplyIsLookedAtBeforeItsEndBecauseItMayHaveBeenCut) {
@@ -381,11 +280,6 @@ TEST_F(InputPaceTest, P5AnEchoIsLookedAtWhenAllOfItCanHaveComeBack) {
     start = attempt.timing().started;
     come(kFrame, 0, 1);
     EXPECT_EQ(busy(), 3 * kByte) << "a reply begins like its request";
-}
-
-TEST_F(InputPaceTest, P5NoiseIsWantedByteByByte) {
-    come("FF 00"_hex, 0, 2);
-    EXPECT_FALSE(busy());
 }
 
 }  // namespace

@@ -71,20 +71,6 @@ TEST_F(BoundsTest, T14AfterWriteHoldsBehindABroadcastToo) {
     EXPECT_EQ(line.next_sent().value().at, left + 1s);
 }
 
-TEST_F(BoundsTest, T14ProbesAndRetriesKeepTheStationsPauses) {
-    panel().after_write = 1s;
-    panel().retry_writes = true;
-    panel().retries = 1;
-    BusScript line{settings};
-    line.submit(17, kWrite);
-    line.run_to_end_of_request();
-    const TimePoint sent = line.now();
-    const auto retry = line.next_sent();
-    ASSERT_TRUE(retry);
-    EXPECT_EQ(retry->kind, FrameKind::retry);
-    EXPECT_EQ(retry->at, sent + kSilence + 1s);
-}
-
 TEST_F(BoundsTest, T8ConnectPauseFollowsEachOpening) {
     settings.connect_pause = 2s;
     BusScript line{settings};
@@ -173,22 +159,6 @@ TEST_F(JoinedRead, P6T14ThatIsIgnoredIsSplitAndItsStationNotJudged) {
     }
     EXPECT_TRUE(line.answer(first).pdu);
     EXPECT_TRUE(line.answer(second).pdu);
-}
-
-TEST_F(BoundsTest, P4T14ReadsDoNotPayForWritesThatThePanelIgnores) {
-    BusScript line{settings};
-    for (unsigned i = 0; i < 12; ++i) {
-        line.submit(17, read_at(i));
-        if (line.sent.back().adu[1] != 3 || !line.arbiter().is_waiting()) line.next_sent();
-        answer(line, 17, reply_number(i), 3ms);
-        line.run_for(10ms);
-        line.try_submit(17, kWrite);
-        line.run_for(2s);
-    }
-    EXPECT_EQ(line.arbiter().health(17).state(), Health::suspect);
-    const Ticket read = line.submit(17, kRead);
-    answer(line, 17, kReply, 3ms);
-    EXPECT_TRUE(line.answer(read).pdu);
 }
 
 /// The panel's replies come in two halves with this pause between.

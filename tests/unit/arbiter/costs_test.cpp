@@ -204,14 +204,6 @@ TEST(Costs, P4APanelThatNeedsAlmostItsTimeoutIsNeverCutShort) {
     EXPECT_GT(plant.answers[kFlaky], 100);
 }
 
-TEST(Costs, P4AnIntermittentPanelThatIsAloneIsRetriedAndWaitedFor) {
-    Plant plant([](int n) { return when(n % 2 == 0); });
-    plant.add_client({kFlaky});
-    plant.run_for(30s);
-    EXPECT_EQ(plant.faults[kFlaky], 0);
-    EXPECT_GT(plant.answers[kFlaky], 20);
-}
-
 int of_healthy(const std::map<std::uint8_t, int>& counts) {
     int sum = 0;
     for (const auto& [station, count] : counts) sum += station <= 10 ? count : 0;

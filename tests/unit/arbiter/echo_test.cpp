@@ -56,27 +56,12 @@ TEST(EchoFilter, GivesBackWhatNeverBecameTheEcho) {
     EXPECT_EQ(copy(filter.feed("01 00"_hex)), "01 00"_hex);
 }
 
-TEST(EchoFilter, ExpectsNothingOnALineWithoutAnEcho) {
-    EchoFilter filter(kFrame, Expect::nothing);
-    EXPECT_EQ(copy(filter.feed(kFrame)), kFrame);
-    EXPECT_FALSE(filter.possible());
-    EXPECT_FALSE(filter.complete());
-    filter.on_whole_frame();
-    EXPECT_TRUE(filter.complete());
-}
-
 TEST(Echo, OnlyARequestWhoseReplyCannotEqualItTeaches) {
     EXPECT_TRUE(teaches_echo(request_of(kRead)));
     EXPECT_TRUE(teaches_echo(request_of("10 00 01 00 01 02 00 03"_hex)));
     EXPECT_FALSE(teaches_echo(request_of(kWriteCoil)));
     EXPECT_FALSE(teaches_echo(request_of("01 03 00 00 18"_hex)))
         << "the reply with 24 coils has 8 bytes, too";
-}
-
-TEST(Echo, FragmentsAreTwoBytesInARow) {
-    EXPECT_TRUE(holds_fragment("FF 00 01 FF"_hex, kFrame));
-    EXPECT_FALSE(holds_fragment("FF 00 FF 01"_hex, kFrame));
-    EXPECT_FALSE(holds_fragment("06"_hex, kFrame));
 }
 
 TEST(EchoMemory, P8FollowsTheModeOrLearnsWhatReadsShow) {
@@ -182,14 +167,6 @@ TEST_F(EchoLine, P8AFreshLineIsAskedByAReadBeforeItsFirstWrite) {
     EXPECT_EQ(bus.sent.back().kind, FrameKind::learn_echo) << "another device may be there";
 }
 
-TEST_F(EchoLine, P8AnExceptionTeachesAsWellAsAValue) {
-    bus.submit(17, kWriteCoil);
-    hear_echo(bus);
-    reply(bus, "83 02"_hex);
-    EXPECT_EQ(bus.arbiter().echo(), EchoState::present);
-    EXPECT_EQ(bus.next_sent().value().adu, encode_adu(17, kWriteCoil));
-}
-
 TEST_F(EchoLine, P8AReplyBehindOtherFramesShowsNothingAboutAnEcho) {
     bus.submit(17, kRead);
     bus.run_to_end_of_request();
@@ -231,30 +208,6 @@ TEST_F(EchoLine, P8AnEchoThatDiffersIsACollision) {
     EXPECT_EQ(bus.arbiter().echo(), EchoState::unknown);
     read_once(bus, true);
     EXPECT_EQ(bus.arbiter().echo(), EchoState::present);
-}
-
-TEST_F(EchoLine, P8AnAdapterThatNoLongerHearsItselfIsLearnedAnew) {
-    read_once(bus, true);
-    for (int i = 0; i <= kNoMore; ++i) {
-        const Ticket ticket = bus.submit(17, kRead);
-        answer(bus, 17, kReply, 3ms);
-        bus.run_for(1s);
-        if (i == 0) EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
-    }
-    EXPECT_EQ(bus.arbiter().echo(), EchoState::absent);
-}
-
-TEST_F(EchoLine, T6TheFirstBytesOfTheEchoAloneHideNoReply) {
-    read_once(bus, false);
-    for (std::size_t size = 1; size < 8; ++size) {
-        const Ticket ticket = bus.submit(17, kRead);
-        bus.run_to_end_of_request();
-        bus.hear(ByteView(bus.sent.back().adu).first(size));
-        reply(bus, kReply);
-        bus.run_for(100ms);
-        ASSERT_TRUE(bus.answered(ticket)) << size;
-        EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply) << size;
-    }
 }
 
 /// The CRC of the rest is good where the last byte is 0.

@@ -35,16 +35,6 @@ TEST_P(ExceptionTest, P1IsPassedOnUnchangedAndAtOnceAndItsRequestNeverSentAgain)
     }
 }
 
-TEST_P(ExceptionTest, P4IsASuccessOfItsStation) {
-    for (int i = 0; i < 5; ++i) {
-        bus.submit(17, kRead);
-        answer(bus, 17, exception(3, GetParam()), 3ms);
-        bus.run_for(2s);
-    }
-    EXPECT_TRUE(bus.arbiter().health(17).online());
-    EXPECT_EQ(counters().exceptions.at(static_cast<std::uint8_t>(GetParam())), 5u);
-}
-
 TEST_P(ExceptionTest, P1BehindAnOutstandingRequestOfAnotherFunctionItIsItsOwnRequests) {
     settings.stations[0].retries = 0;
     BusScript line{settings};
@@ -86,17 +76,6 @@ TEST_P(AnnouncedTest, P1TheReplyThatFollowsAnswersNoLaterRead) {
     ASSERT_EQ(bus.next_sent(10ms).value().adu, encode_adu(17, read_at(2)));
     answer(bus, 17, reply_number(2), 3ms);
     EXPECT_EQ(bus.answer(next).pdu.value(), reply_number(2));
-}
-
-TEST_P(AnnouncedTest, P1ItIsOutstandingNoLongerThanAnyReply) {
-    bus.run_for(2s);
-    bus.submit(17, read_at(2));
-    EXPECT_EQ(bus.sent.back().adu, encode_adu(17, read_at(2)));
-}
-
-TEST_P(AnnouncedTest, P4OtherFunctionsGoAtOnce) {
-    bus.submit(17, kWrite);
-    EXPECT_EQ(bus.next_sent(10ms).value().adu, encode_adu(17, kWrite));
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, AnnouncedTest, testing::Values(0x05u, 0x06u));

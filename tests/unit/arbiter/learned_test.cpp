@@ -46,14 +46,6 @@ void timely(LateWindow& window, int replies) {
     for (int i = 0; i < replies; ++i) window.on_timely();
 }
 
-TEST(LateWindow, StaysWhatItWasConfiguredToBeOrStartsAtTheResponseTimeout) {
-    EXPECT_EQ(LateWindow(std::nullopt, kTimeout).value(), kTimeout);
-    LateWindow window(30ms, kTimeout);
-    window.on_late(700ms);
-    timely(window, 3 * LateWindow::kForget);
-    EXPECT_EQ(window.value(), Duration(30ms));
-}
-
 TEST(LateWindow, P1GrowsBeyondTheLatenessSeenAtMostToEightTimeouts) {
     LateWindow window(std::nullopt, kTimeout);
     window.on_late(200ms);
@@ -166,24 +158,6 @@ TEST_F(TrailTest, T12OneCopyShowsThatRepliesComeTwiceUntilNoneHasComeForTwoMinut
     EXPECT_EQ(trail.rest(), 0ms);
     reply(8ms, true);
     EXPECT_EQ(trail.rest(), 10ms) << "the old delay is forgotten";
-}
-
-TEST_F(TrailTest, SeveralPiecesBehindOneReplyAreOneTrailUpToTheLast) {
-    for (int i = 0; i < 3; ++i) {
-        reply(2ms);
-        trail.on_followed(now + 8ms, false);
-        trail.on_followed(now + 4ms, false);
-    }
-    reply();
-    EXPECT_EQ(trail.rest(), Duration(10ms));
-}
-
-TEST_F(TrailTest, IsToldOnce) {
-    EXPECT_FALSE(trail.take_report());
-    reply(8ms, true);
-    EXPECT_EQ(trail.take_report(), 10ms);
-    reply(8ms, true);
-    EXPECT_FALSE(trail.take_report());
 }
 
 }  // namespace

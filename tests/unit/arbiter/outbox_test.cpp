@@ -60,15 +60,6 @@ TEST_F(OutboxTest, UnlistedStationsShareOneAccount) {
     EXPECT_EQ(outbox.stations().size(), 3u) << "no stranger can add one";
 }
 
-TEST_F(OutboxTest, DamageInsideAnAttemptIsCountedWithTheAttempt) {
-    const modbus::Unused damaged{modbus::Unused::Kind::damaged, 0, Bytes(3)};
-    for (const bool inside : {true, false}) {
-        outbox.on_unsolicited(now, damaged, Done::damaged, 17, inside);
-        EXPECT_EQ(of(17).symptoms.strays, inside ? 0u : 1u);
-    }
-    EXPECT_EQ(of(17).discarded_bytes, 6u) << "its bytes are, in both";
-}
-
 TEST_F(OutboxTest, EachCollisionIsCountedAndReportedOnceIn10Seconds) {
     outbox.on_echo_mismatch(now, 17);
     EXPECT_TRUE(outbox.poll());
@@ -152,17 +143,6 @@ TEST_F(ExchangeTest, EachAttemptIsATransactionAndTheAnswerNamesThemAll) {
     EXPECT_EQ(ends().back(), "exception");
 }
 
-TEST_F(ExchangeTest, ReadsThatShareATransactionNameTheSame) {
-    bus.submit(18, kRead, 9);
-    const Ticket one = bus.submit(17, kRead, 1);
-    const Ticket two = bus.submit(17, kRead, 2);
-    answer(bus, 18, kReply, 5ms);
-    answer_next(bus, 17, kReply, 5ms);
-    bus.run_for(20ms);
-    EXPECT_EQ(bus.answer(one).transactions, std::vector<Transaction>{2});
-    EXPECT_EQ(bus.answer(two).transactions, std::vector<Transaction>{2});
-}
-
 TEST_F(ExchangeTest, ReportsWhatWasDamagedWrongBroadcastOrLost) {
     Settings settings = explained();
     settings.stations[0].retries = settings.stations[1].retries = 0;
@@ -182,15 +162,6 @@ TEST_F(ExchangeTest, ReportsWhatWasDamagedWrongBroadcastOrLost) {
     EXPECT_EQ(ends(), (std::vector<std::string>{"damaged", "wrong", "ok", "line_down"}));
     EXPECT_EQ(bus.exchanges[2].station, 0);
     EXPECT_TRUE(bus.exchanges[0].first_byte_in);
-}
-
-TEST_F(ExchangeTest, NothingIsReportedWithoutExplain) {
-    BusScript script{explained(false)};
-    answer_one(script);
-    script.submit(17, kRead);
-    script.run_for(3s);
-    EXPECT_TRUE(script.exchanges.empty());
-    EXPECT_TRUE(script.decisions.empty());
 }
 
 TEST_F(ArbiterTest, ExplainsWhyEachRequestGoesNowAndWhyOneIsRefused) {

@@ -145,19 +145,6 @@ TEST_F(OutstandingTest, T11ABroadcastHoldsOnlyTheWriteThatItsReplyWouldConfirm) 
         << "a station that was never asked";
 }
 
-TEST_F(OutstandingTest, TheWholeLineIsClearWhenTheLastReplyCanNoLongerCome) {
-    add(1s, kThree, 3s);
-    memory.add(kId + 1, asked(2s, kTwo, 7s));
-    EXPECT_EQ(memory.all_clear_at(at(3s), 2s), at(5s)) << "no request left later than now";
-    EXPECT_EQ(memory.all_clear_at(at(3s), 1h), at(9s));
-}
-
-TEST_F(OutstandingTest, P6AValueIsAsOldAsTheFirstRequestThatItMayAnswer) {
-    add(1s, kTwo);
-    EXPECT_EQ(memory.sampled(at(5s), kId, kTwo, at(4s)), at(1s));
-    EXPECT_EQ(memory.sampled(at(5s), kId, kThree, at(4s)), at(4s));
-}
-
 // Closing
 
 TEST_F(OutstandingTest, P1TheReplyToALaterRequestClosesTheEarlierOnes) {
@@ -274,13 +261,6 @@ TEST_F(KnownReadsTest, T14AReadLongerByOneItemIsTriedUntilThePanelDoesNotAnswerO
     reads.on_unanswered(holding(200, 60));
     EXPECT_TRUE(reads.longer());
     reads.on_unanswered(holding(200, 61));
-    EXPECT_FALSE(reads.longer());
-}
-
-TEST_F(KnownReadsTest, ALongerReadEndsWithTheTableAndAtAHundredItems) {
-    reads.on_answered(holding(65535, 1));
-    EXPECT_FALSE(reads.longer());
-    reads.on_answered(holding(0, 100));
     EXPECT_FALSE(reads.longer());
 }
 

@@ -71,17 +71,5 @@ TEST_F(QuietTest, P1AQuarantineLastsUntilItsLatestInstantUnlessItsOwnStationLift
     EXPECT_LE(quiet_.quarantined_until(), kStart);
 }
 
-TEST_F(QuietTest, ReportsOnceHowMuchOfAQuarantineHasPassed) {
-    EXPECT_EQ(quiet_.take_rested(kStart + 1s), 0ms);
-    quiet_.quarantine(kStart + 1s, 17, kStart + 1500ms);
-    EXPECT_EQ(quiet_.take_rested(kStart + 1200ms), 200ms);
-    EXPECT_EQ(quiet_.take_rested(kStart + 1300ms), 100ms);
-    EXPECT_EQ(quiet_.take_rested(kStart + 3s), 200ms);
-    quiet_.quarantine(kStart + 4s, 17, kStart + 5s);
-    quiet_.lift(kStart + 4100ms, 17);
-    EXPECT_EQ(quiet_.take_rested(kStart + 9s), 100ms);
-    EXPECT_EQ(quiet_.take_rested(kStart + 9s), 0ms);
-}
-
 }  // namespace
 }  // namespace panelgate::arbiter::quiet_test

@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <utility>
 #include <vector>
 
@@ -38,26 +37,9 @@ class BacklogTest : public test::QueueFixture {
         job.deadline = deadline;
         return job;
     }
-    /// Of the retry that is taken, 0 when none may go.
-    int take(const std::function<bool(const Group&)>& may_go) {
-        const auto group = backlog_.take_retry(may_go);
-        return group ? group->station : 0;
-    }
 
     Backlog backlog_{QueueSettings{}};
 };
-
-TEST_F(BacklogTest, TheOldestRetryThatMayGoIsTaken) {
-    for (const std::uint8_t station : Bytes{17, 18, 19}) retry({read(1, station)});
-    const auto not_17 = [](const Group& group) { return group.station != 17; };
-    EXPECT_EQ(take([](const Group&) { return false; }), 0);
-    EXPECT_EQ(take(not_17), 18);
-    EXPECT_EQ(take(not_17), 19);
-    EXPECT_EQ(take(not_17), 0);
-    EXPECT_FALSE(backlog_.retries().empty());
-    EXPECT_EQ(take([](const Group&) { return true; }), 17);
-    EXPECT_TRUE(backlog_.retries().empty());
-}
 
 TEST_F(BacklogTest, P2ACancelledClientHasNothingLeftAndTheOthersOfASharedRetryHave) {
     const Job shared = read(1, 17);
@@ -94,15 +76,6 @@ TEST_F(BacklogTest, P2ARetryEndsWithTheLastClientThatWaitsForIt) {
     EXPECT_TRUE(backlog_.empty());
 }
 
-TEST_F(BacklogTest, P3WhatWasNotSentExpiresWhenItCanNoLongerBeStarted) {
-    const Ticket first = wait(until(read(1, 17), kStart + 1s, kStart + 5s));
-    wait(until(read(2, 17), kStart + 2s, kStart + 3s));
-    EXPECT_EQ(backlog_.first_expiry(), kStart + 1s);
-    EXPECT_TRUE(backlog_.expire(kStart + 1s - 1ns).empty());
-    EXPECT_EQ(tickets(backlog_.expire(kStart + 1s)), std::vector<Ticket>{first});
-    EXPECT_EQ(backlog_.first_expiry(), kStart + 2s);
-}
-
 TEST_F(BacklogTest, P3WhatWasSentExpiresOnlyAtItsDeadlineEachJobAtItsOwn) {
     const Job first = until(read(1, 17), kStart + 1s, kStart + 2s);
     const Job second = until(read(2, 17), kStart + 1s, kStart + 4s);
@@ -114,13 +87,6 @@ TEST_F(BacklogTest, P3WhatWasSentExpiresOnlyAtItsDeadlineEachJobAtItsOwn) {
     EXPECT_EQ(tickets(backlog_.expire(kStart + 4s)), std::vector<Ticket>{second.ticket});
     EXPECT_FALSE(backlog_.has_retry(17));
     EXPECT_FALSE(backlog_.first_expiry());
-}
-
-TEST_F(BacklogTest, OnlyWhatWaitsForItsFirstTurnIsRemoved) {
-    const Ticket waits = wait(read(1, 17));
-    retry({read(1, 17)});
-    EXPECT_EQ(tickets(backlog_.queue().remove_if(test::any)), std::vector<Ticket>{waits});
-    EXPECT_TRUE(backlog_.has_retry(17));
 }
 
 TEST_F(BacklogTest, P7GivesEverythingWhenItIsCleared) {

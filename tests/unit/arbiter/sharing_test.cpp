@@ -106,18 +106,6 @@ TEST_F(SharingTest, P6AJoinThatDidNotComeAboutIsRememberedAndItsPartsGoAlone) {
     EXPECT_LT(gather(registers(10, 2)).jobs.size(), 3u) << "the whole was refused";
 }
 
-TEST_F(SharingTest, AClientThatAskedForTheWholeStaysWithItWhenTheOthersAreSplitOff) {
-    wait(registers(10, 2));
-    wait(registers(12, 1));
-    Group group = gather(registers(10, 4));
-    const Jobs parts = sharing_.split(group);
-    EXPECT_EQ(parts.size(), 2u);
-    ASSERT_EQ(group.jobs.size(), 1u);
-    EXPECT_EQ(group.jobs[0].request.pdu(), registers(10, 4));
-    wait(registers(14, 2));
-    EXPECT_TRUE(gather(registers(10, 4)).joined()) << "no join was refused";
-}
-
 TEST_F(SharingTest, P2ForAClientThatHasLeftNothingIsSentWhenAJoinIsSplit) {
     wait(registers(12, 2));
     wait(registers(14, 2));
@@ -128,12 +116,6 @@ TEST_F(SharingTest, P2ForAClientThatHasLeftNothingIsSentWhenAJoinIsSplit) {
     EXPECT_EQ(sharing_.split(group).size(), 2u);
     ASSERT_EQ(group.jobs.size(), 1u);
     EXPECT_EQ(group.jobs.front().ticket, gone);
-}
-
-TEST_F(SharingTest, OnALineThatDoesNotShareEachGoesAlone) {
-    sharing_ = Sharing(false);
-    wait(registers(10, 2));
-    EXPECT_EQ(gather(registers(10, 2)).jobs.size(), 1u);
 }
 
 TEST_F(SharingTest, P6EachGetsItsPartAndAllGetTheException) {

@@ -46,21 +46,6 @@ TEST_F(StationHealthTest, P4AnythingHeardStartsTheCountAnew) {
     EXPECT_TRUE(miss());
 }
 
-TEST_F(StationHealthTest, EachReturnFromASilenceMayHaveBeenARestart) {
-    health.on_reply(now);
-    EXPECT_EQ(health.returns(), 0u);
-    miss();
-    health.on_reply(now);
-    health.on_reply(now);
-    EXPECT_EQ(health.returns(), 1u);
-    miss();
-    health.on_damaged();
-    EXPECT_EQ(health.returns(), 2u) << "damaged, but heard";
-    go_offline();
-    health.on_reply(now);
-    EXPECT_EQ(health.returns(), 3u);
-}
-
 TEST_F(StationHealthTest, AReplyBringsItBackAndIsRemembered) {
     go_offline();
     EXPECT_TRUE(health.on_reply(now));
@@ -147,15 +132,6 @@ TEST(ProbeBudget, P4SpendingWheneverAllowedStaysAtTheShare) {
         budget.clear();
         EXPECT_TRUE(budget.allows(kStart)) << "free again";
     }
-}
-
-TEST(ProbeBudget, UnusedTimeIsNotSavedUp) {
-    ProbeBudget budget(0.2);
-    budget.spend(kStart, 100ms);
-    EXPECT_FALSE(budget.allows(kStart));
-    const Duration rest = budget.next() - kStart;
-    budget.spend(kStart + 1h, 100ms);
-    EXPECT_EQ(budget.next() - (kStart + 1h), rest);
 }
 
 TEST(ProbeBudget, P4AnExcessIsPaidOffUpToALimit) {

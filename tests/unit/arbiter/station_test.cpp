@@ -15,24 +15,22 @@ using test::group_of;
 
 constexpr std::uint8_t kId = 17;
 constexpr Duration kTimeout = 500ms;
-constexpr bool kRefused = true;
 const Bytes kRead = "03 00 6B 00 01"_hex;
 const Bytes kWrite = "06 00 6B 00 01"_hex;
 const Bytes kReply = "03 02 02 2B"_hex;
 
 class StationTest : public testing::Test {
   protected:
-    static Station made(bool listed) {
+    static Station made() {
         StationSettings settings;
         settings.id = kId;
-        return {settings, OfflineSettings{}, listed, 40ms};
+        return {settings, OfflineSettings{}, true, 40ms};
     }
     /// A request left 30 ms ago and is answered now; the first sign of the reply took 25 ms.
-    Station::Replied answer(const Bytes& pdu = kRead, const Bytes& reply = kReply,
-                            bool refused = false) {
+    Station::Replied answer(const Bytes& pdu = kRead, const Bytes& reply = kReply) {
         now += 1s;
         const Group group = group_of(kId, pdu);
-        return station.on_reply(now, test::answered(now - 30ms, now, group, reply), refused, 25ms);
+        return station.on_reply(now, test::answered(now - 30ms, now, group, reply), false, 25ms);
     }
     void miss(Verdict verdict = Verdict::silent, const Bytes& pdu = kRead) {
         now += kTimeout;
@@ -52,16 +50,9 @@ class StationTest : public testing::Test {
         return group;
     }
 
-    Station station = made(true);
+    Station station = made();
     TimePoint now{1h};
 };
-
-TEST_F(StationTest, T1WithoutAnAdaptiveTimeoutEachSilenceIsWaitedForInFull) {
-    for (int i = 0; i < 20; ++i) answer();
-    EXPECT_EQ(station.response_timeout(), kTimeout);
-    for (int i = 0; i < 20; ++i) fail();
-    EXPECT_EQ(station.response_timeout(), kTimeout);
-}
 
 TEST_F(StationTest, AnAdaptiveTimeoutFollowsTheThinkTimeBetweenFloorAndWhatIsConfigured) {
     StationSettings settings = station.settings();
@@ -77,15 +68,6 @@ TEST_F(StationTest, AnAdaptiveTimeoutFollowsTheThinkTimeBetweenFloorAndWhatIsCon
     EXPECT_EQ(station.response_timeout(), kTimeout);
     answer();
     EXPECT_EQ(station.response_timeout(), wanted);
-}
-
-TEST_F(StationTest, T2AReplyMayComeForTheTimeoutAndTheLateWindowWhichFollowsTheLateness) {
-    EXPECT_EQ(station.latest_reply(), 2 * kTimeout);
-    station.on_late(now, 600ms);
-    EXPECT_EQ(station.latest_reply(), kTimeout + 900ms);
-    EXPECT_EQ(station.lateness(), 0ms) << "one late reply is no rule";
-    station.on_late(now, 100ms);
-    EXPECT_EQ(station.lateness(), 600ms);
 }
 
 TEST_F(StationTest, T1ReadsOfAStationThatIsOnlineAreRetriedAndWritesWhereTheStationSaysSo) {
@@ -107,30 +89,6 @@ TEST_F(StationTest, T1ReadsOfAStationThatIsOnlineAreRetriedAndWritesWhereTheStat
     EXPECT_FALSE(station.may_retry(other)) << "not allowed when the write began";
 }
 
-TEST_F(StationTest, P4ASilentTransactionMakesItASuspectUntilAReplyComes) {
-    answer();
-    EXPECT_TRUE(station.answers_now(true));
-    fail();
-    EXPECT_TRUE(station.is_suspect(true));
-    EXPECT_FALSE(station.answers_now(true));
-    answer();
-    EXPECT_FALSE(station.is_suspect(true));
-    EXPECT_TRUE(station.answers_now(true));
-    EXPECT_TRUE(station.is_doubtful(true)) << "one of the last eight attempts was silent";
-    for (int i = 0; i < 8; ++i) answer();
-    EXPECT_FALSE(station.is_doubtful(true));
-}
-
-TEST_F(StationTest, P4DamageIsNoSilenceAndTwoFailuresInARowAreFailing) {
-    answer();
-    for (int i = 0; i < 9; ++i) EXPECT_FALSE(fail(Verdict::damaged));
-    EXPECT_FALSE(station.health().offline());
-    EXPECT_EQ(station.condition(), Condition::failing);
-    EXPECT_TRUE(station.is_suspect(true));
-    answer();
-    EXPECT_FALSE(station.is_doubtful(true));
-}
-
 TEST_F(StationTest, P4T14ReadsDoNotPayForWritesThatAreIgnored) {
     answer();
     EXPECT_FALSE(fail(Verdict::silent, kWrite));
@@ -149,69 +107,6 @@ TEST_F(StationTest, P4WritesOfAStationThatNeverAnsweredAReadTakeItOffline) {
     fail(Verdict::silent, kWrite);
     fail(Verdict::silent, kWrite);
     EXPECT_TRUE(fail(Verdict::silent, kWrite));
-}
-
-TEST_F(StationTest, P4AnUnlistedStationThatWasNeverHeardMayNotExist) {
-    station = made(false);
-    EXPECT_TRUE(station.speculative());
-    EXPECT_TRUE(station.is_doubtful(true));
-    EXPECT_FALSE(station.answers_now(true));
-    answer();
-    EXPECT_FALSE(station.speculative());
-    EXPECT_FALSE(made(true).speculative());
-}
-
-TEST_F(StationTest, T4PausesInsideItsRepliesAreLearnedFromTwoThatBrokeOff) {
-    const auto break_off = [&] {
-        now += 1s;
-        Attempt attempt(group_of(kId, kRead), test::timing_of(now, 8), {}, {});
-        attempt.on_rx(now + 20ms, "11 03"_hex);
-        attempt.on_silence(attempt.deadline());
-        attempt.on_rx(now + 180ms, "02 02 2B 38 F8"_hex);
-        attempt.on_silence(attempt.deadline());
-        station.on_failed(now, attempt, Verdict::damaged, true);
-    };
-    break_off();
-    EXPECT_EQ(station.reply_hole(), 0ms);
-    break_off();
-    EXPECT_GT(station.reply_hole(), 160ms);
-    EXPECT_LT(station.reply_hole(), 250ms);
-}
-
-TEST_F(StationTest, T12WhatFollowsItsRepliesIsToldOnce) {
-    answer();
-    station.on_followed(now + 20ms, true);
-    EXPECT_EQ(answer().trail, Duration(25ms));
-    station.on_followed(now + 20ms, true);
-    const auto again = answer();
-    EXPECT_TRUE(again.trailed);
-    EXPECT_FALSE(again.trail);
-}
-
-TEST_F(StationTest, T14StationGapAndAfterWriteHoldItBehindItsReplies) {
-    StationSettings settings = station.settings();
-    settings.station_gap = 100ms;
-    settings.after_write = 1s;
-    set(settings);
-    answer();
-    EXPECT_EQ(station.rests_until(), now + 100ms);
-    answer(kWrite, kWrite);
-    EXPECT_EQ(station.rests_until(), now + 1s);
-    station.on_late(now + 2s, 10ms);
-    EXPECT_EQ(station.rests_until(), now + 2s + 100ms);
-    fail(Verdict::silent, kWrite);
-    EXPECT_GE(station.rests_until(), now + 1s) << "an unanswered write may have been carried out";
-    station.on_broadcast(now + 5s);
-    EXPECT_EQ(station.rests_until(), now + 6s);
-}
-
-TEST_F(StationTest, P6OnlyReadsThatWereAnsweredWithValuesAreKnown) {
-    answer(kRead, "83 02"_hex, kRefused);
-    EXPECT_FALSE(station.reads().any());
-    answer();
-    EXPECT_TRUE(station.answers_reads());
-    fail();
-    EXPECT_FALSE(station.answers_reads());
 }
 
 TEST_F(StationTest, IsInTheWorstConditionThatIsTrueOfIt) {

@@ -78,14 +78,6 @@ TEST_F(StationsTest, P4WhereAllHaveJustFallenSilentProbesGoOn) {
     EXPECT_LE(wait_for_probe(), 5s) << "the line was opened: all stations may be there";
 }
 
-TEST_F(StationsTest, P4WhenOneIsBackTheOthersAreAskedAtOnce) {
-    for (const std::uint8_t id : Bytes{1, 2, 3}) answer(id);
-    for (const std::uint8_t id : Bytes{1, 2, 3}) kill(id, 800ms);
-    answer(2);
-    now += OfflineSettings{}.probe_max;
-    EXPECT_LE(wait_for_probe(), 0s);
-}
-
 TEST_F(StationsTest, P4SuspectsAndStrangersTogetherHaveOneBudgetWhichIsNotThatOfProbes) {
     answer(1);
     kill(2, 20ms);
@@ -112,15 +104,6 @@ TEST_F(StationsTest, P4ASuspectWaitsForItsShareOnlyWhileOthersUseTheLine) {
     now += timing::kOthersActive;
     EXPECT_LE(stations.held_until(job_for(1)), now);
     EXPECT_TRUE(stations.affords_retry(now, 1));
-}
-
-TEST_F(StationsTest, P4AWriteMayBeTheProbeOnceAnIntervalAndAReadOfAListedStationNever) {
-    kill(1);
-    const Job write = job_for(1, "06 00 6B 00 01"_hex);
-    now += 1min;
-    EXPECT_TRUE(stations.refuses(now, job_for(1)));
-    EXPECT_FALSE(stations.refuses(now, write));
-    EXPECT_TRUE(stations.refuses(now, write));
 }
 
 TEST_F(StationsTest, P4AnyRequestMayWakeAStrangerAndAScanAsksEachTime) {
@@ -161,21 +144,6 @@ TEST_F(StationsTest, T2AProofIsAReadOfAnotherLengthThanWhatIsOutstanding) {
     leave_outstanding(1, "03 00 6B 00 03"_hex);
     EXPECT_FALSE(stations.proof_for(now, stations.of(1)));
     EXPECT_EQ(probe_for(1).pdu(), kRead) << "at most answered by its own earlier attempt";
-}
-
-TEST_F(StationsTest, T2AStationThatNeverAnsweredHasNoProof) {
-    stations.of(1);
-    EXPECT_FALSE(stations.proof_for(now, stations.of(1)));
-    stations.refuses(now, job_for(1, "04 00 07 00 05"_hex));
-    EXPECT_EQ(probe_for(1).pdu(), "04 00 07 00 05"_hex) << "the station may answer nothing else";
-}
-
-TEST_F(StationsTest, T9TheSlowestStationThatWasHeardIsKnown) {
-    EXPECT_FALSE(stations.slowest());
-    fail(1);
-    EXPECT_FALSE(stations.slowest());
-    answer(2);
-    EXPECT_EQ(stations.slowest(), Duration(25ms));
 }
 
 }  // namespace

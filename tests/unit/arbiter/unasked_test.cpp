@@ -96,12 +96,6 @@ TEST_F(UnaskedTest, P5T9ForNoLongerThanUntilItsReplyWasHeard) {
     EXPECT_EQ(line.sent.back().at, asked) << "its reply was heard as well";
 }
 
-TEST_F(UnaskedTest, P5T9ItsBroadcastHasNoReply) {
-    hear(encode_adu(0, kWrite));
-    bus.submit(17, kRead);
-    EXPECT_EQ(bus.sent.back().at, bus.now());
-}
-
 TEST_F(UnaskedTest, P1T9AReplyThatMayBeItsPanelsIsDamageAndNoValue) {
     const Ticket ticket = bus.submit(17, kRead);
     bus.run_to_end_of_request();
@@ -178,20 +172,6 @@ TEST_F(UnaskedTest, T11WhatComesInTheTurnaroundIsCountedAndGivenToNobody) {
     EXPECT_EQ(symptoms().wrong, 0u);
 }
 
-TEST_F(UnaskedTest, T11ABroadcastLostWithItsConnectionMayBeAnsweredInTheNext) {
-    read();
-    bus.submit(0, kToAll, 1, PriorityClass::write);
-    bus.run_for(2ms);
-    bus.line_down();
-    bus.line_up();
-    const Ticket write = bus.submit(17, kToOne, 2, PriorityClass::write);
-    bus.run_for(300ms);
-    bus.hear_reply(17, kConfirmed);
-    bus.run_for(25ms);
-    EXPECT_FALSE(bus.answered(write));
-    EXPECT_EQ(symptoms().broadcast_replies, 1u);
-}
-
 // Copies (T12)
 
 TEST_F(UnaskedTest, T12ACopyThatComesWhileNothingIsAskedMakesTheLineRestBehindTheStationsReplies) {
@@ -212,18 +192,6 @@ TEST_F(UnaskedTest, T12ACopyThatComesWhileNothingIsAskedMakesTheLineRestBehindTh
     EXPECT_LE(bus.next_sent().value().at - bus.now(), gap) << "18 sends no copies";
 }
 
-TEST_F(UnaskedTest, P5T12NoRestBehindACopyThatHasComeAlready) {
-    for (unsigned i = 1; i < 4; ++i) {
-        bus.submit(17, read_at(i));
-        answer(bus, 17, reply_number(i), 3ms);
-        bus.run_for(10ms);
-        bus.hear_reply(17, reply_number(i));
-        bus.run_for(25ms);
-    }
-    bus.submit(17, read_at(9));
-    EXPECT_EQ(bus.sent.back().at, bus.now());
-}
-
 TEST_F(UnaskedTest, P1T12NothingIsLearnedFromAFrameThatMayAnswerWhatIsAsked) {
     bus.submit(17, read_at(1));
     answer(bus, 17, reply_number(1), 3ms);
@@ -234,35 +202,6 @@ TEST_F(UnaskedTest, P1T12NothingIsLearnedFromAFrameThatMayAnswerWhatIsAsked) {
     const TimePoint replied = bus.now();
     bus.submit(17, read_at(3));
     EXPECT_EQ(bus.next_sent().value().at, replied + gap);
-}
-
-TEST_F(UnaskedTest, P1T12ALateReplyThatEqualsTheLastOneIsNoCopy) {
-    bus.submit(17, "03 00 00 00 02"_hex);
-    answer(bus, 17, "03 04 00 01 00 02"_hex, 3ms);
-    bus.run_for(20ms);
-    const Ticket missed = bus.submit(17, read_at(1));
-    while (!bus.answered(missed)) bus.run_for(1ms);
-    bus.submit(17, read_at(1));
-    bus.next_sent(10ms);  // a proof
-    bus.run_to_end_of_request();
-    bus.hear_reply(17, reply_number(1));
-    EXPECT_EQ(last_kind(), FrameKind::late);
-    EXPECT_EQ(symptoms().doubled, 0u);
-}
-
-TEST_F(UnaskedTest, T3BytesThatFollowTheRepliesOfAStationAreRestedForFromTheThirdOn) {
-    for (unsigned i = 1; i <= 4; ++i) {
-        bus.submit(17, read_at(i));
-        answer(bus, 17, reply_number(i), 3ms);
-        bus.run_for(8ms);
-        hear("00"_hex);
-    }
-    bus.submit(17, read_at(8));
-    answer(bus, 17, reply_number(8), 3ms);
-    const TimePoint replied = bus.now();
-    bus.submit(17, read_at(9));
-    const Duration rest = bus.next_sent().value().at - replied;
-    EXPECT_EQ(rest, Duration(10ms));
 }
 
 // A second panel, and other wrong frames (T13)
