@@ -74,7 +74,9 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
     const Duration needed = std::max(attempt.waited(reply.size() + modbus::kAduOverhead),
                                      std::max(attempt.first_byte() - sent, Duration{}));
     const bool refused = modbus::exception_of(reply).has_value();
-    group.started = outstanding.sampled(now, group.station, group.request.pdu(), group.started);
+    // The reply may be that to the first of several equal requests.
+    const TimePoint answered = outstanding.sampled(now, group.station, group.request.pdu(), sent);
+    group.started = std::min(group.started, answered);
     const Station::Replied replied = station.on_reply(came, attempt, refused, needed);
     // A transport that held the reply back may hold the next one; only a proof tells.
     Asked asked = asked_of(attempt, settings_.may_stall && station.reads().longer());
@@ -82,7 +84,7 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
         asked.until = std::max(asked.until, now + latency_ + station.latest_reply());
     const bool is_own = outstanding.on_reply(now, group.station, asked, reply);
     if (is_own && announces_reply(reply)) outstanding.add(group.station, asked);
-    outstanding.on_delivered(now, sent, station.latest_reply());
+    outstanding.on_delivered(now, answered, station.latest_reply());
     stations_.on_reply(now);
     if (replied.back) stations_.on_recovery();
     explain_condition(now, group.station, before);
@@ -111,10 +113,10 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     const TimePoint sent = attempt.timing().sent;
     const Duration cost = now - attempt.timing().started + stations_.gap(group.station);
     const Condition before = station.condition();
-    const bool affordable = stations_.affords_retry(now, group.station);
+    const bool affordable = stations_.affords_retry(now, station);
     stations_.outstanding().add(group.station, asked_of(attempt, settings_.may_stall));
     station.on_failed(now, attempt, verdict, settings_.learns_holes);
-    stations_.on_failed(now, group.station, cost);
+    stations_.on_failed(now, group.station, group.request.is_read(), cost);
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
         quiet_.quarantine(now, group.station, *until);
         outbox_.decide({.at = now,
