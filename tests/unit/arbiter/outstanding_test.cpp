@@ -164,10 +164,10 @@ TEST_F(OutstandingTest, P1ALateReplyClosesItsRequestAndThoseBefore) {
     add(1s, kThree);
     add(2s, kTwo);
     add(3s, kThreeElsewhere);
-    EXPECT_EQ(memory.on_late(at(5s), kId, kReplyOfTwo)->sent, at(2s));
+    EXPECT_EQ(memory.on_late(at(5s), kId, kReplyOfTwo, false)->sent, at(2s));
     EXPECT_EQ(oldest(kReplyOfThree), at(3s));
     EXPECT_TRUE(memory.is_last_reply(at(5s), kId, kReplyOfTwo, 1ms));
-    EXPECT_FALSE(memory.on_late(at(5s), kId, kReplyOfTwo));
+    EXPECT_FALSE(memory.on_late(at(5s), kId, kReplyOfTwo, false));
 }
 
 TEST_F(OutstandingTest, P1T8OverTwoConnectionsTheOrderIsUnknown) {
@@ -180,7 +180,7 @@ TEST_F(OutstandingTest, P1T8OverTwoConnectionsTheOrderIsUnknown) {
     EXPECT_EQ(memory.earlier_clear_at(at(5s), kId, request_of(kTwo)), at(11s));
     EXPECT_EQ(memory.earlier_clear_at(at(5s), kId, request_of(kWrite)), TimePoint{});
     add(4s, kThree);
-    memory.on_late(at(5s), kId, kReplyOfThree);
+    memory.on_late(at(5s), kId, kReplyOfThree, false);
     EXPECT_EQ(oldest(kReplyOfThree), at(1s)) << "a reply of either connection closes neither";
 }
 
