@@ -256,14 +256,5 @@ TEST_F(WireEnd, ThinkTimeIsCountedFromThere) {
     EXPECT_NEAR(turnaround.sum, to_seconds(5ms - reply - gap), 1e-9);
 }
 
-TEST_F(WireEnd, ADriverThatNeverGetsRidOfItIsNotBelievedForLong) {
-    BusScript script{settings};
-    script.arbiter().confirm_ends(true);
-    script.unsent = [] { return Duration(10ms); };
-    const Ticket ticket = script.submit(17, kRead);
-    script.run_for(request + timing::kLatestEnd + 100ms + timing::kListensAgain);
-    EXPECT_TRUE(script.answered(ticket));
-}
-
 }  // namespace
 }  // namespace panelgate::arbiter::arbiter_test

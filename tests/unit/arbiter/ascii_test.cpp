@@ -54,18 +54,6 @@ TEST_F(AsciiLine, HandsTheReplyOnAtItsLastCharacter) {
     EXPECT_EQ(bus.answer(ticket).at, bus.now());
 }
 
-/// P4: its first characters, bytes that nobody says, and then all of it.
-TEST_F(AsciiLine, AReplyThatBreaksOffMayBeginAnew) {
-    const Ticket ticket = ask(kWrite);
-    const Bytes confirmed = modbus::encode_ascii(17, kWrite);
-    bus.hear_paced(ByteView(confirmed).first(5));
-    bus.hear_paced("00 12 3C CD 00 45 00 00 BF"_hex);
-    bus.hear_paced(modbus::encode_ascii(40, kReply));
-    EXPECT_FALSE(bus.answered(ticket));
-    bus.hear_paced(confirmed);
-    EXPECT_EQ(told(ticket).value(), kWrite);
-}
-
 /// Of a pause the characters count, not the bytes.
 TEST_F(AsciiLine, AReplyGoesOnWithEachCharacter) {
     for (const std::size_t front : {6u, 7u, 8u}) {

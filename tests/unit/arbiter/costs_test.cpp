@@ -224,17 +224,6 @@ TEST(Costs, P4TenOfTwentyThatDieAtOnceLeaveTheLineToTheOthersAfterTheirFirstSile
     }
 }
 
-TEST(Costs, P4TenOfTwentyThatWereNeverHeardLeaveTheOthersTheirTurns) {
-    Plant plant([](int) { return kQuick; }, 20);
-    for (std::uint8_t id = 11; id <= 20; ++id) plant.dead.insert(id);
-    for (std::uint8_t id = 1; id <= 20; ++id) plant.add_client({id});
-    plant.run_for(15s);  // T1: whole silences of each
-    plant.forget();
-    plant.run_for(10s);
-    EXPECT_EQ(of_healthy(plant.faults), 0);
-    EXPECT_GE(plant.asked[20], 2);
-}
-
 /// A client that asks for ids without a panel, one behind the other.
 TEST(Costs, P4UnheardIdsTakeAFifthAndThoseOfOfflineStationsALittle) {
     Plant plant([](int) { return std::nullopt; });

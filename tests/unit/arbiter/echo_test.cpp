@@ -48,14 +48,6 @@ TEST(EchoFilter, DetectsADifferenceAndReturnsWhatItBuffered) {
     }
 }
 
-TEST(EchoFilter, GivesBackWhatNeverBecameTheEcho) {
-    EchoFilter filter(kFrame, Expect::perhaps);
-    EXPECT_TRUE(filter.feed("11 06 00"_hex).empty());
-    EXPECT_EQ(filter.release(), "11 06 00"_hex);
-    EXPECT_TRUE(filter.release().empty());
-    EXPECT_EQ(copy(filter.feed("01 00"_hex)), "01 00"_hex);
-}
-
 TEST(Echo, OnlyARequestWhoseReplyCannotEqualItTeaches) {
     EXPECT_TRUE(teaches_echo(request_of(kRead)));
     EXPECT_TRUE(teaches_echo(request_of("10 00 01 00 01 02 00 03"_hex)));

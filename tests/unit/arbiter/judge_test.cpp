@@ -71,13 +71,5 @@ TEST(Judge, T13TheFormOfTheLastReplyIsASecondPanelsAndAnyOtherFrameIsWrong) {
     expect({{last_form | known, Done::second}, {known, Done::wrong}});
 }
 
-TEST(Judge, RepliesOfTheNamedStationAreCountedForThatStation) {
-    for (const Done done : {Done::copy, Done::late, Done::second, Done::wrong})
-        EXPECT_TRUE(is_reply(done));
-    for (const Done done : {Done::accept, Done::contested, Done::echo, Done::request, Done::damaged,
-                            Done::nobodys, Done::broadcast})
-        EXPECT_FALSE(is_reply(done));
-}
-
 }  // namespace
 }  // namespace panelgate::arbiter::judge_test

@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "support/attempts.hpp"
 #include "support/hex.hpp"
 #include "support/queue_fixture.hpp"
 
@@ -76,16 +75,6 @@ TEST_F(SharingTest, P6ContainedReadsComeAlongAndTouchingOnesUpToWhatTheProfileVo
         EXPECT_EQ(group.joined(), !is_asked);
         EXPECT_EQ(queue_.waiting(), row.waiting.size() + 1 - row.jobs);
     }
-}
-
-TEST_F(SharingTest, P6AReadAsLongAsOneThatTheStationHasAnsweredIsMade) {
-    Station station = station_that_takes(0);
-    const Bytes reply = Writer().u8(3).u8(8).raw(Bytes(8)).take();
-    const TimePoint now{1h};
-    station.on_reply(now, test::answered(now, now, test::group_of(1, registers(50, 4)), reply),
-                     false, 5ms);
-    wait(registers(12, 2));
-    EXPECT_EQ(gather(registers(10, 2), station).jobs.size(), 2u);
 }
 
 TEST_F(SharingTest, P6AJoinThatDidNotComeAboutIsRememberedAndItsPartsGoAlone) {

@@ -46,18 +46,6 @@ TEST_F(StationHealthTest, P4AnythingHeardStartsTheCountAnew) {
     EXPECT_TRUE(miss());
 }
 
-TEST_F(StationHealthTest, AReplyBringsItBackAndIsRemembered) {
-    go_offline();
-    EXPECT_TRUE(health.on_reply(now));
-    EXPECT_EQ(health.state(), Health::online);
-    EXPECT_EQ(health.last_success(), now);
-    EXPECT_FALSE(health.on_reply(now + 1s)) << "back already";
-    EXPECT_EQ(health.last_success(), now + 1s);
-    miss();
-    EXPECT_EQ(health.state(), Health::suspect);
-    EXPECT_EQ(health.last_success(), now);
-}
-
 TEST_F(StationHealthTest, P4ThePauseBetweenProbesDoublesUpToItsMost) {
     go_offline();
     for (const Duration pause : {500ms, 1000ms, 2000ms, 3000ms, 3000ms}) {

@@ -103,12 +103,6 @@ TEST_F(StationTest, P4T14ReadsDoNotPayForWritesThatAreIgnored) {
     EXPECT_TRUE(fail()) << "the read was silent, too";
 }
 
-TEST_F(StationTest, P4WritesOfAStationThatNeverAnsweredAReadTakeItOffline) {
-    fail(Verdict::silent, kWrite);
-    fail(Verdict::silent, kWrite);
-    EXPECT_TRUE(fail(Verdict::silent, kWrite));
-}
-
 TEST_F(StationTest, IsInTheWorstConditionThatIsTrueOfIt) {
     EXPECT_EQ(station.condition(), Condition::unheard);
     fail();

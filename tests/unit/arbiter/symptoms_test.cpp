@@ -94,19 +94,6 @@ TEST_F(SymptomsTest, ThePauseBeforeAnAttemptIsReportedWithItsOutcome) {
     EXPECT_EQ(of(18).answered_after[Symptoms::kPauses - 1], 1u);
 }
 
-TEST_F(SymptomsTest, AReplyThatComesTwiceIsADuplicateGluedOrApartAndWithOtherValues) {
-    const Bytes reply = encode_adu(17, kReply);
-    ask(17, kRead, Writer().raw(reply).raw(reply).take());
-    EXPECT_EQ(of(17).doubled, 1u);
-    bus.submit(17, kRead);
-    answer(bus, 17, kReply, 3ms);
-    bus.run_for(20ms);
-    hear(encode_adu(17, "03 06 00 00 00 00 00 07"_hex));
-    EXPECT_EQ(of(17).doubled, 2u);
-    EXPECT_EQ(of(17).unasked, 0u);
-    EXPECT_EQ(of(17).late, 0u);
-}
-
 TEST_F(SymptomsTest, WhatMayHaveBeenTheReplyIsNoEchoForCertain) {
     Settings settings = bus.settings();
     settings.echo = EchoMode::on;  // there is none
@@ -136,13 +123,6 @@ TEST_F(SymptomsTest, TheAnswerWithAnotherAddressIsCountedForTheAskedStation) {
     ask(17, kRead, encode_adu(18, "03 02 00 07"_hex));  // another length answers nothing
     EXPECT_EQ(of(17).misaddressed, 1u);
     EXPECT_EQ(of(18).misaddressed, 0u);
-}
-
-TEST_F(SymptomsTest, AReplyWithoutItsFirstByteIsKnownAsSuch) {
-    const Bytes reply = encode_adu(17, kReply);
-    ask(17, kRead, Bytes(reply.begin() + 1, reply.end()));
-    EXPECT_EQ(of(17).damaged_short, 1u);
-    EXPECT_EQ(of(17).beheaded, 1u);
 }
 
 TEST_F(SymptomsTest, AReadThatIsAnsweredWhenAskedAgainWasMissed) {
