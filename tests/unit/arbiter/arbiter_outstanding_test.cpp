@@ -294,11 +294,28 @@ TEST_F(MuteLine, T8AConnectionThatHasBeenHeardIsOpenedAnewForTheSecondSilence) {
     miss();
     EXPECT_EQ(line->resets, 1);
     line->submit(18, kRead);
-    answer_next(*line, 18, kReply, 3ms);
+    if (line->sent.back().adu[0] != 18) line->next_sent();
+    answer(*line, 18, kReply, 3ms);
     line->run_for(10ms);
     miss();
     miss();
     EXPECT_EQ(line->resets, 2) << "a reply ends the long pauses";
+}
+
+TEST_F(MuteLine, P3WhatWaitsWhenTheArbiterAsksForANewConnectionIsSentOverThatOne) {
+    line->submit(18, kRead);
+    answer(*line, 18, kReply, 3ms);
+    line->run_for(10ms);
+    miss();
+    line->submit(17, kRead);
+    while (line->resets == 0) line->run_for(1ms);
+    const Ticket waits = line->submit(18, kRead, 2);
+    line->line_down();
+    EXPECT_FALSE(line->answered(waits));
+    line->line_up();
+    ASSERT_EQ(line->next_sent(100ms).value().adu[0], 18);
+    answer(*line, 18, kReply, 3ms);
+    EXPECT_TRUE(line->answer(waits).pdu);
 }
 
 }  // namespace

@@ -268,16 +268,5 @@ TEST_F(EchoLine, P8TheEchoOfAnUnansweredRequestIsNoSignOfLife) {
     EXPECT_TRUE(line.arbiter().health(17).offline());
 }
 
-TEST_F(EchoLine, T6AnEchoThatIsConfiguredAndDoesNotComeHidesNoReply) {
-    BusScript line(with(EchoMode::on));
-    for (const Bytes& pdu : {kRead, kWrite}) {
-        const Ticket ticket = line.submit(17, pdu);
-        answer(line, 17, pdu == kRead ? kReply : kWrite, 3ms);
-        line.run_for(2s);
-        ASSERT_TRUE(line.answered(ticket));
-        EXPECT_EQ(line.answer(ticket).pdu.has_value(), pdu == kRead) << "P8";
-    }
-}
-
 }  // namespace
 }  // namespace panelgate::arbiter::echo_test
