@@ -1,4 +1,4 @@
-// Outstanding replies (T2, T8): no reply answers a request that it was not sent for, also across
+// Outstanding replies (T2, T8): no reply answers another request than its own, also across
 // connections.
 #include <gtest/gtest.h>
 
@@ -256,7 +256,8 @@ class MuteLine : public ArbiterTest {
         settings.offline.after = 1000;
         line.emplace(settings);
     }
-    /// One read is not answered. Where the arbiter asks for that, the line is opened anew.
+    /// A read is not answered. Where the arbiter asks for a new connection, the line is opened
+    /// anew.
     void miss() {
         const Ticket ticket = line->submit(17, kRead);
         while (!line->answered(ticket)) {

@@ -129,7 +129,7 @@ TEST_F(ArbiterSharingTest, P6AClientNeverReadsOlderThanItsOwnWrite) {
     EXPECT_EQ(bus.sent.size(), 3u);
 }
 
-/// Values of station 17 may be so old, and it was polled.
+/// Values of station 17 may be so old, and station 17 was polled.
 class ArbiterMemoryTest : public ArbiterTest {
   protected:
     void poll(Duration max_age) {

@@ -1,4 +1,4 @@
-// One transaction: when it starts, what it hears, how it ends.
+// One transaction: its start, what is heard meanwhile, its end.
 #include <gtest/gtest.h>
 
 #include <cstddef>
@@ -147,7 +147,7 @@ TEST_F(ArbiterTest, EndlessNoiseEndsInATimeoutNotInAHang) {
     EXPECT_FALSE(bus.answer(ticket).pdu.has_value());
 }
 
-/// Panels of both CRC orders on one line: 17 has old firmware, 18 has not.
+/// Panels of both CRC orders on one line: 17 has old firmware, 18 new firmware.
 class BothOrders : public ArbiterTest {
   protected:
     BothOrders() {
@@ -201,7 +201,7 @@ class WireEnd : public ArbiterTest {
         settings.unlisted.retries = 0;
         settings.stations.clear();
     }
-    /// The driver is asked, and reports once that so much is left.
+    /// The driver is asked, and reports once how much of the request is left.
     void report_once(BusScript& script, Duration left) {
         script.arbiter().confirm_ends(true);
         script.unsent = [this, left] {

@@ -78,7 +78,7 @@ TEST_F(ArbiterTest, P3ExpiresWhatCannotFinishBeforeItsDeadlineWithoutTouchingThe
     const Ticket second = script.submit(18, kRead, 2);
     const TimePoint start = script.now();
     script.run_for(1s);
-    // The first is cut at its deadline, the second was never started.
+    // The first read is cut at its deadline, the second read was never started.
     EXPECT_EQ(script.answer(first).pdu.error(), Fault::timeout);
     EXPECT_EQ(script.answer(first).at - start, 400ms);
     EXPECT_EQ(script.answer(second).pdu.error(), Fault::expired);

@@ -131,7 +131,7 @@ TEST_F(AsciiLine, P1AReplyOfAnotherLengthIsNone) {
     const Ticket ticket = ask();
     bus.hear_reply(17, "03 04 02 2B 00 00"_hex);
     EXPECT_FALSE(bus.answered(ticket) && told(ticket).has_value());
-    // A byte of 00 that was lost leaves the LRC right.
+    // A lost byte of 00 leaves the LRC right.
     bus.hear_reply(17, "03 06 02 2B 00 00 64"_hex);
     EXPECT_FALSE(bus.answered(ticket) && told(ticket).has_value());
 }

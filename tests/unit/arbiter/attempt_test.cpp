@@ -1,4 +1,4 @@
-// One request on the wire: what is heard meanwhile, in frames, and when it ends.
+// One request on the wire: what is heard meanwhile, in frames, and the end of the attempt.
 #include "panelgate/arbiter/attempt.hpp"
 
 #include <gtest/gtest.h>

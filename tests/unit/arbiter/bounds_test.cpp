@@ -1,4 +1,4 @@
-// A panel's own bounds (T14), pauses inside its replies (T4), and what a line needs.
+// A panel's own bounds (T14), pauses inside a panel's replies (T4), and what a line needs.
 #include <gtest/gtest.h>
 
 #include <cstddef>

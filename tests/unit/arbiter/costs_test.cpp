@@ -39,7 +39,7 @@ Settings stations_up_to(std::uint8_t last) {
     return settings;
 }
 
-/// Panels on a line, and clients each of which asks again as soon as it is answered.
+/// Panels on a line, and clients: each client asks again as soon as its request is answered.
 class Plant {
   public:
     /// Think time of station 3 for its n-th request; empty: no answer.
@@ -208,7 +208,7 @@ int of_healthy(const std::map<std::uint8_t, int>& counts) {
     return sum;
 }
 
-/// Each of the ten is waited for once before its silence is known (T1).
+/// Each of the ten panels is waited for before its silence is known (T1).
 TEST(Costs, P4TenOfTwentyThatDieAtOnceLeaveTheLineToTheOthersAfterTheirFirstSilences) {
     for (const Duration lived : {300ms, 1000ms, 2000ms}) {
         Plant plant([](int) { return kQuick; }, 20);
@@ -224,7 +224,7 @@ TEST(Costs, P4TenOfTwentyThatDieAtOnceLeaveTheLineToTheOthersAfterTheirFirstSile
     }
 }
 
-/// A client that asks for ids without a panel, one behind the other.
+/// Clients ask for many ids without a panel.
 TEST(Costs, P4UnheardIdsTakeAFifthAndThoseOfOfflineStationsALittle) {
     Plant plant([](int) { return std::nullopt; });
     for (const std::uint8_t id : kHealthy) plant.add_client({id});

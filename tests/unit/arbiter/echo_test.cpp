@@ -1,4 +1,4 @@
-// The line hears what it sends: that is learned, taken out, and confirms no write (P8, T6).
+// A line with an echo: the echo is learned, taken out, and confirms no write (P8, T6).
 #include "panelgate/arbiter/echo.hpp"
 
 #include <gtest/gtest.h>
@@ -103,7 +103,7 @@ class EchoLine : public testing::Test {
         bus.run_for(3ms);
         bus.hear_reply(17, pdu);
     }
-    /// A line that has carried a read, behind an echo or without one.
+    /// The line carries a read, with an echo or without an echo.
     static void read_once(BusScript& bus, bool echo) {
         const Ticket ticket = bus.submit(17, kRead);
         if (echo) hear_echo(bus);

@@ -85,7 +85,7 @@ TEST_F(OutboxTest, ATransactionCostsFromItsFirstBitToTheGapBehindItButNotAClient
     EXPECT_TRUE(outbox.shares().all().empty());
 }
 
-/// With `explain`: each transaction's number, its instants, and how it ended.
+/// With `explain`: each transaction's number, its instants, and its end.
 class ExchangeTest : public testing::Test {
   protected:
     static Settings explained(bool explain = true) {
@@ -94,7 +94,7 @@ class ExchangeTest : public testing::Test {
         made.paced = true;
         return made;
     }
-    /// Asks 17; its reply comes byte by byte 8 ms after a request without a lead.
+    /// Asks 17; the reply comes byte by byte 8 ms after a request without a lead.
     static void answer_one(BusScript& script) {
         script.submit(17, kRead);
         script.run_to_end_of_request();

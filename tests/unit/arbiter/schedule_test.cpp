@@ -57,7 +57,7 @@ TEST_F(BacklogTest, P2ACancelledClientHasNothingLeftAndTheOthersOfASharedRetryHa
     EXPECT_TRUE(backlog_.cancel(1).empty());
 }
 
-/// Clients that left while it was on the wire are still among its jobs.
+/// Clients that left while the request was on the wire are still among the retry's jobs.
 TEST_F(BacklogTest, P2ARetryEndsWithTheLastClientThatWaitsForIt) {
     Job left = read(1, 17);
     left.gone = true;

@@ -51,11 +51,11 @@ TEST_F(SharingTest, P6ContainedReadsComeAlongAndTouchingOnesUpToWhatTheProfileVo
     const Bytes other_table = "04 00 0C 00 01"_hex;
     const Bytes a_write = "06 00 0A 00 01"_hex;
     const Row rows[] = {
-        // Contained ones, whatever is known of the station.
+        // Contained reads, whatever is known of the station.
         {{registers(12, 3), registers(10, 10)}, registers(10, 10), 0, 3, registers(10, 10)},
-        // A wider one, which a client asked for itself.
+        // A wider read, for which a client asked itself.
         {{registers(10, 10)}, registers(12, 2), 0, 2, registers(10, 10)},
-        // Touching ones, also by one that lies between.
+        // Touching reads, also by a read between them.
         {{registers(14, 2), registers(12, 2)}, registers(10, 2), 125, 3, registers(10, 6)},
         // Nothing is read that no client asked for.
         {{registers(13, 2), other_table, a_write}, registers(10, 2), 125, 1, registers(10, 2)},

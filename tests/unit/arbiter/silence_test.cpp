@@ -15,7 +15,7 @@ constexpr std::uint8_t kStranger = 40;
 
 class SilenceTest : public ArbiterTest {
   protected:
-    /// How long the line waited behind the frame that is sent next, until another one left.
+    /// How long the line waits behind the next frame, until the next but one leaves.
     Duration next_wait() {
         EXPECT_TRUE(bus.next_sent());
         bus.run_to_end_of_request();

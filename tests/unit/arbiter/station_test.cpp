@@ -1,4 +1,4 @@
-// One station: its states, what is learned of it, and when it may be asked.
+// One station: its states, what is learned of the station, and when the station may be asked.
 #include "panelgate/arbiter/station.hpp"
 
 #include <gtest/gtest.h>
@@ -37,7 +37,7 @@ class StationTest : public testing::Test {
         const Attempt attempt(group_of(kId, pdu), test::timing_of(now - kTimeout, 8), {}, {});
         station.on_failed(now, attempt, verdict, true);
     }
-    /// One attempt fails, without a retry. Returns true if that took the station offline.
+    /// A transaction of one attempt fails. Returns true if the failure took the station offline.
     bool fail(Verdict verdict = Verdict::silent, const Bytes& pdu = kRead) {
         miss(verdict, pdu);
         const Fault fault = verdict == Verdict::silent ? Fault::timeout : Fault::damaged;
