@@ -129,21 +129,6 @@ TEST_F(StationsTest, P4AnyRequestMayWakeAStrangerAndAScanAsksEachTime) {
     EXPECT_FALSE(stations.next_to_probe(now)) << "nobody probes an address that may not exist";
 }
 
-TEST_F(StationsTest, AnUnheardStationIsForgottenWhenNobodyWantsItForAMinute) {
-    fail(kStranger);
-    fail(1);
-    const auto is_known = [&](Duration later) {
-        stations.refuses(now + later, job_for(2));
-        return stations.find(kStranger) != nullptr;
-    };
-    stations.refuses(now, job_for(kStranger));
-    leave_outstanding(kStranger, kRead);
-    EXPECT_TRUE(is_known(timing::kForgetUnheard - 1ns));
-    EXPECT_FALSE(is_known(timing::kForgetUnheard));
-    EXPECT_NE(stations.find(1), nullptr);
-    EXPECT_EQ(stations.health(kStranger).state(), Health::unknown);
-}
-
 TEST_F(StationsTest, T2AProofIsAReadOfAnotherLengthThanWhatIsOutstanding) {
     answer(1);
     EXPECT_EQ(probe_for(1).pdu(), kRead) << "the shortest read that was answered";
