@@ -39,10 +39,10 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo,
       timing_(timing),
       orders_(orders),
       echo_(std::move(echo)),
-      framer_(group_.station, group_.request.pdu(), orders_,
-              has_delimiters() ? modbus::ReplyFramer::Ends::told
-                               : modbus::ReplyFramer::Ends::by_length,
-              group_.request.byte_count()),
+      framer_(
+          group_.station, group_.request.pdu(), orders_,
+          has_delimiters() ? modbus::ReplyFramer::Ends::told : modbus::ReplyFramer::Ends::by_length,
+          group_.request.byte_count()),
       pace_(byte_time(timing.serial), timing.steady),
       computed_end_(timing.sent),
       first_byte_(timing.sent),
@@ -107,7 +107,8 @@ void Attempt::on_silence(TimePoint now) {
     collect(framer_.on_silence());
 }
 
-/// Takes what the framer has found, in the order received.
+/// Takes what the framer has found, in the order received. Bytes behind the reply count for nothing
+/// (FRM-07).
 void Attempt::collect(std::optional<Bytes> reply) {
     const std::size_t behind = framer_.parts_behind();
     std::vector<Unused> parts = framer_.take_unused();
@@ -130,10 +131,11 @@ void Attempt::add(Unused part, bool answers, bool in_front) {
     answers = answers || (own && modbus::answers(group_.request.pdu(), modbus::pdu_of(part.bytes),
                                                  group_.request.byte_count()));
     if (!answers && in_front) disturbed_ = disturbed_ || part.kind != Unused::Kind::damaged;
-    if (part.kind == Unused::Kind::damaged &&
-        !begins_with_request(part.bytes, echo_.frame(), orders_)) {
-        append_up_to(modbus::ReplyFramer::kMaxHeard, damaged_bytes_, part.bytes);
-        fragment_ = fragment_ || (in_front && holds_fragment(part.bytes, echo_.frame()));
+    if (part.kind == Unused::Kind::damaged) {
+        const bool foreign = begins_with_request(part.bytes, echo_.frame(), orders_);
+        if (!foreign) append_up_to(modbus::ReplyFramer::kMaxHeard, damaged_bytes_, part.bytes);
+        disturbed_ = disturbed_ || foreign;
+        fragment_ = fragment_ || (in_front && holds_beginning(part.bytes, echo_.frame()));
     }
     heard_.push_back({std::move(part), answers, in_front});
 }
@@ -151,10 +153,9 @@ TimePoint Attempt::deadline() const {
     // What has no known length goes on as long as it is no frame; so do the bytes that the echo
     // filter buffers, which begin like the reply.
     const bool may_be_reply = framer_.has_candidate() || echo_.pending();
-    const bool has_hole =
-        echo_.pending() ||
-        (framer_.has_candidate() &&
-         (framer_.knows_length() || !modbus::crc_ok(framer_.pending(), orders_)));
+    const bool has_hole = echo_.pending() ||
+                          (framer_.has_candidate() &&
+                           (framer_.knows_length() || !modbus::crc_ok(framer_.pending(), orders_)));
     Duration silence = has_hole ? timing_.hole : timing_.end_of_frame;
     if (framer_.is_inside()) silence = silent_interval(timing_.serial);
     const TimePoint silent = std::max(timing_.sent, last_byte_) + silence;
@@ -169,7 +170,8 @@ Verdict Attempt::verdict(TimePoint now) const {
     if ((framer_.was_damaged_whole() && !own) || lost_beginning()) return Verdict::damaged;
     if (now < give_up()) return Verdict::open;
     if (instead_ == Instead::unrelated) return Verdict::wrong;
-    const bool damaged = (framer_.was_damaged() && !own) || echo_.mismatch() || instead_ == Instead::contested;
+    const bool damaged =
+        (framer_.was_damaged() && !own) || echo_.mismatch() || instead_ == Instead::contested;
     return damaged ? Verdict::damaged : Verdict::silent;
 }
 

@@ -18,11 +18,9 @@ bool begins_with_request(ByteView heard, ByteView own, const modbus::CrcOrders& 
            !std::ranges::equal(heard.first(size), own);
 }
 
-bool holds_fragment(ByteView heard, ByteView frame) {
-    for (std::size_t i = 0; i + 1 < heard.size(); ++i) {
-        if (!std::ranges::search(frame, heard.subspan(i, 2)).empty()) return true;
-    }
-    return false;
+bool holds_beginning(ByteView heard, ByteView frame) {
+    constexpr std::size_t kHead = 2;  // address and function
+    return frame.size() >= kHead && !std::ranges::search(heard, frame.first(kHead)).empty();
 }
 
 ByteView EchoFilter::feed(ByteView bytes) {

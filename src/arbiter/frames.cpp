@@ -1,4 +1,4 @@
-// What is true of a frame that was heard, and what is done with it.
+// Frames: facts are gathered, the table decides, the decision is carried out.
 
 #include <algorithm>
 #include <utility>
@@ -24,7 +24,8 @@ bool is_request(ByteView adu) {
     return !fits_reply && modbus::request_adu_length(adu) == adu.size();
 }
 
-/// True for our own frame, also without its last byte: where that is 0 the CRC is good all the same.
+/// True for our own frame, also without its last byte: where that is 0 the CRC is good all the
+/// same.
 bool is_own(ByteView adu, ByteView own) {
     return std::ranges::equal(adu, own) ||
            (adu.size() + 1 == own.size() && std::ranges::equal(adu, own.first(adu.size())));
@@ -34,7 +35,7 @@ bool is_refusal(ByteView pdu) { return modbus::exception_of(pdu).has_value(); }
 
 }  // namespace
 
-/// Judges what the attempt has heard; one of the frames may be its answer, and end it.
+/// Judges each frame that the attempt has heard. The answer ends the attempt.
 void Arbiter::conclude(TimePoint now) {
     if (active_->heard()) mute_.ever_heard = true;
     for (const Attempt::Heard& heard : active_->take_heard())
@@ -58,10 +59,9 @@ Facts Arbiter::facts_of(TimePoint now, const Unused& part, bool answers) const {
     const ByteView adu = part.bytes;
     const bool damaged = part.kind == Unused::Kind::damaged;
     const bool begins = begins_with_request(adu, last_frame_, orders_);
-    const Facts facts = when(answers, fact::answers) |
-                        when(is_own(adu, last_frame_), fact::own_frame) |
-                        when(begins && (damaged || is_request(adu)), fact::request) |
-                        when(damaged, fact::damaged);
+    const Facts facts =
+        when(answers, fact::answers) | when(is_own(adu, last_frame_), fact::own_frame) |
+        when(begins && (damaged || is_request(adu)), fact::request) | when(damaged, fact::damaged);
     if (damaged) return facts;
     const std::uint8_t id = adu[0];
     const ByteView pdu = modbus::pdu_of(adu);
@@ -74,7 +74,7 @@ Facts Arbiter::facts_of(TimePoint now, const Unused& part, bool answers) const {
     // Where copies are not known, a late reply comes first.
     const bool copy = station != nullptr && (station->trail().copies() || !outstanding) &&
                       asked.is_last_reply(now, id, pdu, station->trail().longest());
-    return facts | when(answers, facts_of_answer(now, pdu)) |
+    return facts | (answers ? facts_of_answer(now, pdu) : 0) |
            when(may_answer(Asked::By::other_master), fact::other_master) |
            when(may_answer(Asked::By::broadcast), fact::broadcast) | when(copy, fact::copy) |
            when(outstanding, fact::outstanding) |
@@ -110,12 +110,7 @@ Duration Arbiter::carry_out(TimePoint now, const Unused& part, Done done) {
             quiet_.has_come();
             break;
         case Done::request:
-            stations_.outstanding().add(
-                part.bytes[0], {.by = Asked::By::other_master,
-                                .sent = now,
-                                .until = now + timing::kForeignReply,
-                                .pdu = Bytes(part.bytes.begin() + 1, part.bytes.end())});
-            let_reply_pass(now, part.bytes);
+            leave_to_other_master(now, part.bytes);
             break;
         case Done::damaged:
             if (Station* const last = active_ ? nullptr : stations_.find(replied_))
@@ -132,25 +127,21 @@ Duration Arbiter::carry_out(TimePoint now, const Unused& part, Done done) {
         case Done::late:
             return take_late(now, part);
         case Done::wrong:
-            if (active_ && active_->group().station == part.bytes[0]) {
-                const std::uint8_t function = modbus::plain_function(part.bytes[1]);
-                active_->on_wrong(function == active_->group().request.function(),
-                                  is_refusal(modbus::pdu_of(part.bytes)));
-            }
+            take_wrong(part.bytes);
             break;
     }
     return {};
 }
 
-/// Another station's reply shows that nothing is held back; the same station's, besides, that it has
-/// served what was asked before.
+/// Another station's reply shows that nothing is held back; the same station's, besides, that it
+/// has served what was asked before.
 Duration Arbiter::take_late(TimePoint now, const Unused& part) {
     const std::uint8_t id = part.bytes[0];
     Station& station = stations_.of(id);
     const ByteView pdu = modbus::pdu_of(part.bytes);
-    const bool is_open = active_ && active_->group().station == id &&
-                         modbus::answers(active_->group().request.pdu(), pdu,
-                                         active_->group().request.byte_count());
+    const bool is_open =
+        active_ && active_->group().station == id &&
+        modbus::answers(active_->group().request.pdu(), pdu, active_->group().request.byte_count());
     const auto asked = stations_.outstanding().on_late(now, id, pdu, is_open);
     const Duration lateness =
         std::max(now - asked->sent - station.settings().response_timeout, Duration{});
@@ -165,15 +156,25 @@ Duration Arbiter::take_late(TimePoint now, const Unused& part) {
     return lateness;
 }
 
-/// Another master asks: sending now would damage the reply to it (T9). The line rests as long as our
-/// slowest panel has needed, or a usual time.
-void Arbiter::let_reply_pass(TimePoint now, ByteView request) {
+/// The station has said something else: the reply may still come where the function is another one.
+void Arbiter::take_wrong(ByteView adu) {
+    if (!active_ || active_->group().station != adu[0]) return;
+    const bool is_asked = modbus::plain_function(adu[1]) == active_->group().request.function();
+    active_->on_wrong(is_asked, is_refusal(modbus::pdu_of(adu)));
+}
+
+/// Another master asks: sending now would damage the reply to it (T9). The line rests as long as
+/// our slowest panel has needed, or a usual time.
+void Arbiter::leave_to_other_master(TimePoint now, ByteView request) {
     const std::size_t size = modbus::request_adu_length(request);
-    if (request.size() > size || request[0] == kBroadcast) return;  // its reply was heard as well
     const ByteView pdu = modbus::pdu_of(request.first(size));
-    const Duration reply =
-        frame_time(settings_.serial,
-                   modbus::reply_length_from_request(pdu).value_or(modbus::kReadRequestAdu));
+    stations_.outstanding().add(request[0], {.by = Asked::By::other_master,
+                                             .sent = now,
+                                             .until = now + timing::kForeignReply,
+                                             .pdu = Bytes(pdu.begin(), pdu.end())});
+    if (request.size() > size || request[0] == kBroadcast) return;  // its reply was heard as well
+    const Duration reply = frame_time(
+        settings_.serial, modbus::reply_length_from_request(pdu).value_or(modbus::kReadRequestAdu));
     const Duration think = std::clamp(3 * stations_.slowest().value_or(timing::kForeignThink),
                                       timing::kShortestForeign, timing::kLongestForeign);
     quiet_.await_until(now + silent_interval(settings_.serial) + think + reply);

@@ -163,9 +163,11 @@ void Outbox::on_unsolicited(TimePoint now, const modbus::Unused& part, Done done
     const bool in_time = late && lateness <= Duration::zero();
     // A copy of a write's reply, which is its request, is no echo.
     const bool unsure = done == Done::echo && modbus::answers(pdu_of(part), pdu_of(part));
-    const bool elsewhere = unsure || (done == Done::damaged && inside);
+    const bool counted_at_end = inside && (done == Done::damaged || done == Done::echo);
+    const bool elsewhere = unsure || counted_at_end;
     if (!in_time && !elsewhere) ++(symptoms.*shown.symptom);
-    if (inside && (done == Done::nobodys || done == Done::wrong) && part.station != asked)
+    const bool answers_none = done == Done::nobodys || done == Done::wrong || done == Done::second;
+    if (inside && answers_none && part.station != asked)
         other_frame_.assign(pdu_of(part).begin(), pdu_of(part).end());
     actions_.push_back(Note{now, shown.kind, part.bytes, {}});
 }

@@ -65,16 +65,10 @@ bool Outstanding::has_last_form(TimePoint now, std::uint8_t station, ByteView re
            all->reply.size() == reply.size() && all->reply[0] == reply[0];
 }
 
-TimePoint Outstanding::replied(std::uint8_t station) const {
-    const Page* const all = find(station);
-    return all == nullptr ? TimePoint{} : all->replied;
-}
-
 bool Outstanding::any(TimePoint now, std::uint8_t station) const {
     const Page* const all = find(station);
-    return all != nullptr && std::ranges::any_of(all->asked, [&](const Asked& asked) {
-               return is_ours(asked, now);
-           });
+    return all != nullptr &&
+           std::ranges::any_of(all->asked, [&](const Asked& asked) { return is_ours(asked, now); });
 }
 
 bool Outstanding::is_in_transit(std::uint8_t station) const {
@@ -91,8 +85,8 @@ bool Outstanding::may_be_taken(const Asked& asked, const modbus::Request& reques
            !(again && is_same(asked, request.pdu()));
 }
 
-TimePoint Outstanding::clear_at(TimePoint now, std::uint8_t station,
-                                const modbus::Request& request, bool again) const {
+TimePoint Outstanding::clear_at(TimePoint now, std::uint8_t station, const modbus::Request& request,
+                                bool again) const {
     TimePoint clear{};
     const Page* const all = find(station);
     if (all == nullptr) return clear;
@@ -130,8 +124,8 @@ bool Outstanding::is_proof(TimePoint now, std::uint8_t station, const modbus::Re
 const Asked* Outstanding::last_read(TimePoint now, std::uint8_t station) const {
     const Page* const all = find(station);
     if (all == nullptr) return nullptr;
-    const auto found = std::find_if(
-        all->asked.rbegin(), all->asked.rend(), [&](const Asked& asked) {
+    const auto found =
+        std::find_if(all->asked.rbegin(), all->asked.rend(), [&](const Asked& asked) {
             return is_ours(asked, now) && modbus::read_span(asked.pdu).has_value();
         });
     return found == all->asked.rend() ? nullptr : &*found;
@@ -169,13 +163,6 @@ void Outstanding::add(std::uint8_t station, Asked asked) {
     all.push_back(std::move(asked));
 }
 
-void Outstanding::add_broadcast(const Asked& broadcast) {
-    for (std::size_t id = 1; id < pages_.size(); ++id) {
-        if (pages_[id].replied != TimePoint{} || !pages_[id].asked.empty())
-            add(static_cast<std::uint8_t>(id), broadcast);
-    }
-}
-
 /// Takes out what left over this connection at `sent` or before.
 void Outstanding::close(Page& page, unsigned epoch, TimePoint sent) {
     std::erase_if(page.asked, [&](const Asked& asked) {
@@ -193,9 +180,8 @@ bool Outstanding::on_reply(TimePoint now, std::uint8_t station, Asked asked, Byt
     set_last_reply(now, station, reply);
     Page& all = page(station);
     asked.epoch = epoch_;
-    const auto equal = std::ranges::find_if(all.asked, [&](const Asked& old) {
-        return is_ours(old, now) && is_same(old, asked.pdu);
-    });
+    const auto equal = std::ranges::find_if(
+        all.asked, [&](const Asked& old) { return is_ours(old, now) && is_same(old, asked.pdu); });
     if (equal == all.asked.end()) {
         close(all, asked.epoch, asked.sent);
         return true;
@@ -214,8 +200,7 @@ std::optional<Asked> Outstanding::on_late(TimePoint now, std::uint8_t station, B
     set_last_reply(now, station, reply);
     Page& all = page(station);
     const bool is_sure = std::ranges::none_of(all.asked, [&](const Asked& asked) {
-        return is_ours(asked, now) && asked.epoch != answered.epoch &&
-               asked.may_be_answered(reply);
+        return is_ours(asked, now) && asked.epoch != answered.epoch && asked.may_be_answered(reply);
     });
     if (is_sure && (!is_open || answered.epoch == epoch_))
         close(all, answered.epoch, answered.sent);

@@ -23,7 +23,7 @@ void append(Jobs& jobs, Jobs more) {
     jobs.insert(jobs.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
 }
 
-/// Makes a read that no client asked for, and whose reply shows that the station is there.
+/// Makes a read of the gateway's own: the reply shows that the station is there.
 Group internal_read(const Station& station, const modbus::Request& read) {
     const bool any_length = station.settings().any_length;
     return {.station = station.id(), .request = any_length ? read.with_any_length() : read};
@@ -140,9 +140,7 @@ Jobs Backlog::clear() {
 }
 
 Schedule::Schedule(const Settings& settings)
-    : quarantine_(settings.quarantine),
-      backlog_(settings.queue),
-      sharing_(settings.share_reads) {}
+    : quarantine_(settings.quarantine), backlog_(settings.queue), sharing_(settings.share_reads) {}
 
 void Schedule::apply(const Settings& settings) {
     quarantine_ = settings.quarantine;
@@ -215,7 +213,7 @@ std::optional<Group> Schedule::next(TimePoint now, Stations& stations, Quiet& qu
     return {};
 }
 
-/// The longer of the gaps that the last station and this one require.
+/// The line needs the longer gap of the last station and of this station.
 bool Schedule::gap_is_over(const Line& line, std::uint8_t station) {
     const Duration gap =
         std::max(line.stations.gap(line.quiet.station()), line.stations.gap(station));
@@ -231,8 +229,8 @@ std::optional<Group> Schedule::next_retry(const Line& line) {
     });
 }
 
-/// Behind a silence those who wait go first, for the retry may cost them as much again (P4). Not on a
-/// line that loses frames: there the last retry was answered, and this one's client waits, too.
+/// Behind a silence those who wait go first, for the retry may cost them as much again (P4). Not on
+/// a line that loses frames: there the last retry was answered, and this one's client waits, too.
 bool Schedule::others_go_first(const Line& line) const {
     if (backlog_.retries().empty()) return false;
     const Group& retry = backlog_.retries().front();
@@ -259,8 +257,8 @@ bool Schedule::may_run(const Line& line, const Job& job) const {
            line.now >= ready_at(line.now, line.stations, job) && !backlog_.has_retry(job.station);
 }
 
-/// A read that no client asked for and that goes before this job: a proof (T2), or a read that shows
-/// whether the line has an echo (T6).
+/// A read that no client asked for and that goes before this job: a proof (T2), or a read that
+/// shows whether the line has an echo (T6).
 std::optional<Group> Schedule::read_before(const Line& line, const Job& job) {
     const Station* const station = line.stations.find(job.station);
     if (job.station == kBroadcast || station == nullptr) return std::nullopt;

@@ -20,9 +20,10 @@ void Station::apply(const StationSettings& settings, const OfflineSettings& offl
 }
 
 Condition Station::condition() const {
+    constexpr int kFlaky = 4;  // of the last eight attempts
     if (health_.offline()) return Condition::offline;
     if (failed_reads_ + failed_writes_ > 1) return Condition::failing;
-    if (is_flaky()) return Condition::flaky;
+    if (std::popcount(lately_) >= kFlaky) return Condition::flaky;
     if (failed_reads_ + failed_writes_ > 0 || (lately_ & 1) != 0) return Condition::missed;
     return health_.last_heard() ? Condition::well : Condition::unheard;
 }
@@ -58,8 +59,8 @@ Station::Replied Station::on_reply(TimePoint came, const Attempt& attempt, bool 
     late_window_.on_timely();
     hole_.on_reply(came, attempt.longest_pause());
     const bool is_write = !group.request.is_read();
-    const Duration rest = std::max(settings_.station_gap,
-                                   is_write ? settings_.after_write : Duration{});
+    const Duration rest =
+        std::max(settings_.station_gap, is_write ? settings_.after_write : Duration{});
     rests_until_ = came + rest;
     if (!refused && group.request.span()) reads_.on_answered(group.request);
     return result;
@@ -72,13 +73,19 @@ bool Station::on_late(TimePoint now, Duration lateness) {
     return health_.on_late_reply(now);
 }
 
-void Station::on_failed(TimePoint now, const Attempt& attempt, Verdict verdict, bool learns_holes) {
+void Station::on_failed(TimePoint now, const Attempt& attempt, Verdict verdict, Duration cost,
+                        bool learns_holes) {
     failed_ = now;
     if (attempt.group().probe && !health_.offline()) reads_.on_unanswered(attempt.group().request);
     const bool is_read = attempt.group().request.is_read();
     // An ignored write says nothing about reads (T14).
     const bool counts = verdict == Verdict::silent && (is_read || !answers_reads());
     lately_ = static_cast<std::uint8_t>(lately_ << 1 | (counts ? 1 : 0));
+    if (!health_.offline() && (is_read || !answers_reads())) {
+        constexpr int kMemory = 4;  // whole timeouts, or failures of this cost
+        const Duration most = std::max(settings_.response_timeout, cost);
+        silences_.spend(now, cost, kMemory * silences_.time_for(most));
+    }
     if (!is_read) rests_until_ = std::max(rests_until_, now + settings_.after_write);
     if (learns_holes && verdict == Verdict::damaged && attempt.was_cut_off())
         hole_.on_broken(now, std::max(attempt.longest_pause(), attempt.timing().hole),

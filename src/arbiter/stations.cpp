@@ -19,6 +19,7 @@ void Stations::apply(const Settings& settings) {
     for (const StationSettings& station : settings.stations) configured_[station.id] = station;
     for (auto& [id, station] : stations_)
         station.apply(own_settings(id), offline_settings_, configured_.contains(id));
+    for (const auto& [id, station] : configured_) of(id);
 }
 
 const StationSettings& Stations::settings(std::uint8_t id) const {
@@ -97,18 +98,22 @@ bool Stations::refuses(TimePoint now, const Job& job) {
 
 bool Stations::may_spend(TimePoint now, const Job& job) const {
     const Station* const station = find(job.station);
+    if (station == nullptr) return true;
     const bool is_read = job.request.is_read();
-    return station == nullptr || !station->is_doubtful(is_read) ||
-           budget_for(*station, is_read).allows(now, credit());
+    const bool pays = is_read || !station->answers_reads();
+    return (!pays || now >= station->affordable_at()) &&
+           (!station->is_doubtful(is_read) || budget_for(*station, is_read).allows(now, credit()));
 }
 
 TimePoint Stations::held_until(const Job& job) const {
     const Station* const station = find(job.station);
     if (station == nullptr) return {};
     const bool is_read = job.request.is_read();
-    if (!station->is_suspect(is_read) && !station->speculative()) return {};
-    return std::min(budget_for(*station, is_read).next() - credit(),
-                    others_active_until(job.station));
+    TimePoint held{};
+    if (is_read || !station->answers_reads()) held = station->affordable_at();
+    if (station->is_doubtful(is_read))
+        held = std::max(held, budget_for(*station, is_read).next() - credit());
+    return held == TimePoint{} ? held : std::min(held, others_active_until(job.station));
 }
 
 TimePoint Stations::others_active_until(std::uint8_t id) const {
@@ -121,6 +126,16 @@ TimePoint Stations::others_active_until(std::uint8_t id) const {
             until = std::max(until, *heard + timing::kOthersActive);
     }
     return until;
+}
+
+bool Stations::affords_retry(TimePoint now, const Station& station) const {
+    constexpr int kSeveral = 2;
+    if (now >= others_active_until(station.id())) return true;
+    const auto silent = std::ranges::count_if(stations_, [&](const auto& entry) {
+        const Station& other = entry.second;
+        return &other != &station && other.was_silent() && !other.health().offline();
+    });
+    return now >= station.affordable_at() && (silent < kSeveral || suspects_.allows(now, credit()));
 }
 
 void Stations::on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration cost) {
@@ -136,8 +151,10 @@ void Stations::on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration 
 }
 
 void Stations::on_broadcast(const Asked& broadcast) {
-    outstanding_.add_broadcast(broadcast);
-    for (auto& [id, station] : stations_) station.on_broadcast(broadcast.sent);
+    for (auto& [id, station] : stations_) {
+        outstanding_.add(id, broadcast);
+        station.on_broadcast(broadcast.sent);
+    }
 }
 
 void Stations::on_line_down() {

@@ -1,4 +1,5 @@
-// How attempts end: their jobs are answered, or the request is sent again, and the station is judged.
+// How attempts end: their jobs are answered, or the request is sent again, and the station is
+// judged.
 
 #include <algorithm>
 #include <utility>
@@ -49,8 +50,8 @@ void Arbiter::end_broadcast(TimePoint now) {
         outbox_.finish(job, modbus::normal_write_reply(job.request.pdu()));
 }
 
-/// The request of an attempt that has ended. `in_transit`: a transport that may stall holds it back,
-/// for all that is known (T8).
+/// The request of an attempt that has ended. `in_transit`: a transport that may stall holds it
+/// back, for all that is known (T8).
 Asked Arbiter::asked_of(const Attempt& attempt, bool in_transit) const {
     const Group& group = attempt.group();
     const TimePoint sent = attempt.timing().sent;
@@ -78,12 +79,7 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
     const TimePoint answered = outstanding.sampled(now, group.station, group.request.pdu(), sent);
     group.started = std::min(group.started, answered);
     const Station::Replied replied = station.on_reply(came, attempt, refused, needed);
-    // A transport that held the reply back may hold the next one; only a proof tells.
-    Asked asked = asked_of(attempt, settings_.may_stall && station.reads().longer());
-    if (asked.until != Outstanding::kInTransit)
-        asked.until = std::max(asked.until, now + latency_ + station.latest_reply());
-    const bool is_own = outstanding.on_reply(now, group.station, asked, reply);
-    if (is_own && announces_reply(reply)) outstanding.add(group.station, asked);
+    const bool is_own = close_request(now, attempt, reply);
     outstanding.on_delivered(now, answered, station.latest_reply());
     stations_.on_reply(now);
     if (group.silent) schedule_.on_retried(true);
@@ -105,6 +101,20 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
         outbox_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
 }
 
+/// Closes the request of an answered attempt, and what its station was asked before. Returns false
+/// if the reply may be that to an earlier attempt: then this one is outstanding.
+bool Arbiter::close_request(TimePoint now, const Attempt& attempt, const Bytes& reply) {
+    const std::uint8_t id = attempt.group().station;
+    const Station& station = stations_.of(id);
+    // A transport that held the reply back may hold the next one; only a proof tells.
+    Asked asked = asked_of(attempt, settings_.may_stall && station.reads().longer());
+    if (asked.until != Outstanding::kInTransit)
+        asked.until = std::max(asked.until, now + latency_ + station.latest_reply());
+    const bool is_own = stations_.outstanding().on_reply(now, id, asked, reply);
+    if (is_own && announces_reply(reply)) stations_.outstanding().add(id, std::move(asked));
+    return is_own;
+}
+
 void Arbiter::fail(TimePoint now, Verdict verdict) {
     Attempt attempt = take_active(now);
     outbox_.on_failed(attempt, verdict);
@@ -114,10 +124,10 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     const TimePoint sent = attempt.timing().sent;
     const Duration cost = now - attempt.timing().started + stations_.gap(group.station);
     const Condition before = station.condition();
-    const bool affordable = stations_.affords_retry(now, station);
     stations_.outstanding().add(group.station, asked_of(attempt, settings_.may_stall));
-    station.on_failed(now, attempt, verdict, settings_.learns_holes);
+    station.on_failed(now, attempt, verdict, cost, settings_.learns_holes);
     stations_.on_failed(now, group.station, group.request.is_read(), cost);
+    const bool affordable = stations_.affords_retry(now, station);
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
         quiet_.quarantine(now, group.station, *until);
         outbox_.decide({.at = now,
@@ -149,8 +159,8 @@ void Arbiter::reopen_if_mute(TimePoint now, const Attempt& attempt, Verdict verd
     mute_.attempts = mute ? mute_.attempts + 1 : 0;
     if (!settings_.may_stall || !mute || now < mute_.next) return;
     if (mute_.ever_heard && mute_.attempts < kMute) return;
-    mute_.pause = std::clamp<Duration>(2 * mute_.pause, timing::kSilentReopen,
-                                       timing::kLongestReopen);
+    mute_.pause =
+        std::clamp<Duration>(2 * mute_.pause, timing::kSilentReopen, timing::kLongestReopen);
     mute_.next = now + mute_.pause;
     resetting_ = true;
     outbox_.reset("nothing was heard over the connection: what was sent may be held back");

@@ -179,7 +179,7 @@ void Matcher::ask(const Piece& piece, bool doubtful) {
     if (station == modbus::kBroadcast && modbus::is_broadcastable(pdu.front())) {
         arbiter::Asked broadcast = asked(made);
         broadcast.by = By::broadcast;
-        outstanding_.add_broadcast(broadcast);
+        for (std::uint8_t id = 1; id <= modbus::kMaxStation; ++id) outstanding_.add(id, broadcast);
     }
     events_.emplace_back(std::move(made));
 }

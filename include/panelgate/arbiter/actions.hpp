@@ -88,7 +88,7 @@ struct Decision {
     std::size_t count = 0;  ///< requests that wait, or silent transactions in a row
     Condition condition{};  ///< of the station, now
 };
-/// A station changed its health, or shows something that its operator should know.
+/// The health of a station has changed, or an operator should know something about the station.
 struct StationEvent {
     enum class Kind : std::uint8_t {
         offline,
@@ -106,7 +106,11 @@ struct StationEvent {
     std::uint8_t station = 0;
     Duration by{};
 };
-std::string_view label(StationEvent::Kind kind);
+inline std::string_view label(StationEvent::Kind kind) {
+    constexpr std::string_view kWords[] = {"offline", "online", "suspect",   "heard", "unknown",
+                                           "late",    "drift",  "collision", "echo",  "trail"};
+    return kWords[static_cast<std::size_t>(kind)];
+}
 /// A write is about to be sent, or its attempt is over, answered or not. Emitted for each attempt,
 /// before its Finish.
 struct Written {
@@ -115,8 +119,8 @@ struct Written {
     bool ended = false;
     Client client = 0;  ///< 0: no client waits for it any more
 };
-/// Close the transport and open it again, so that nothing that was sent on it is answered any more:
-/// then on_line_down and on_line_up.
+/// Close the transport and open the transport again, so that no earlier request is answered any
+/// more: then call on_line_down and on_line_up.
 struct Reset {
     std::string_view why;  ///< a string literal, for the log
 };

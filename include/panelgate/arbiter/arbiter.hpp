@@ -140,18 +140,20 @@ class Arbiter {
     TimePoint idle_ends() const { return quiet_.since() + settings_.end_of_frame; }
     void judge_idle(TimePoint now);
 
-    // Frames (frames.cpp): what is true of one, and what is done with it
+    // Frames (frames.cpp): facts, decision, deed
     void conclude(TimePoint now);
     Facts facts_of(TimePoint now, const modbus::Unused& part, bool answers) const;
     Facts facts_of_answer(TimePoint now, ByteView pdu) const;
     void judge_part(TimePoint now, const modbus::Unused& part, bool answers);
     Duration carry_out(TimePoint now, const modbus::Unused& part, Done done);
     Duration take_late(TimePoint now, const modbus::Unused& part);
-    void let_reply_pass(TimePoint now, ByteView request);
+    void take_wrong(ByteView adu);
+    void leave_to_other_master(TimePoint now, ByteView request);
 
     // Ends of attempts (verdict.cpp)
     Asked asked_of(const Attempt& attempt, bool in_transit = false) const;
     void settle(TimePoint now, const Bytes& reply);
+    bool close_request(TimePoint now, const Attempt& attempt, const Bytes& reply);
     void fail(TimePoint now, Verdict verdict);
     void end_broadcast(TimePoint now);
     void reopen_if_mute(TimePoint now, const Attempt& attempt, Verdict verdict);
@@ -183,7 +185,7 @@ class Arbiter {
     bool resetting_ = false;  ///< the line is to be opened anew: nothing is sent
     /// T8: how long the connection has been mute.
     struct {
-        int attempts = 0;        ///< silent ones in a row, without a byte from any station
+        int attempts = 0;         ///< silent ones in a row, without a byte from any station
         bool ever_heard = false;  ///< over this connection
         Duration pause{};         ///< between two openings for silence alone; doubles
         TimePoint next{};         ///< the next opening, at the earliest

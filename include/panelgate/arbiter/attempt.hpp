@@ -29,13 +29,14 @@ enum class Verdict : std::uint8_t {
 
 /// One request on the wire: what is heard meanwhile, in frames, and the times. Who a frame is from
 /// and what is done with it is decided elsewhere (judge.hpp). Damage does not end an attempt while
-/// the reply may still come (FRM-04); a silence inside a reply of known length is a hole (T4). Pure.
+/// the reply may still come (FRM-04); a silence inside a reply of known length is a hole (T4).
+/// Pure.
 class Attempt {
   public:
     struct Timing {
-        TimePoint started;        ///< handed over; the request leaves at once or after the line's lead
-        TimePoint sent;           ///< last bit out, computed
-        Duration patience{};      ///< from `sent`: without a sign of a reply until then, a timeout
+        TimePoint started;    ///< handed over; the request leaves at once or after the line's lead
+        TimePoint sent;       ///< last bit out, computed
+        Duration patience{};  ///< from `sent`: without a sign of a reply until then, a timeout
         Duration end_of_frame{};  ///< silence that ends a frame of unknown length
         Duration hole{};          ///< longest silence inside a reply of known length
         Duration longest_reply{};
@@ -79,8 +80,8 @@ class Attempt {
 
     /// The frame was our own, which the filter did not find.
     void on_echo() { echo_.on_whole_frame(); }
-    /// The station has said something else than the reply, `refused`: an exception. The attempt ends,
-    /// if `ends`.
+    /// The station has said something else than the reply, `refused`: an exception. The attempt
+    /// ends, if `ends`.
     void on_wrong(bool ends, bool refused) {
         refused_other_ = refused_other_ || (refused && !ends);
         instead_ = std::max(instead_, ends ? Instead::reply : Instead::unrelated);
@@ -93,8 +94,9 @@ class Attempt {
     /// A broadcast is over when its last bit has left.
     bool is_broadcast() const { return group_.station == kBroadcast; }
 
-    /// Bytes before this time decide nothing: what may be the reply (or our echo) has begun, and the
-    /// rest of its header, or all of it, takes until then at the line's rate. Empty: each may decide.
+    /// Bytes before this time decide nothing: what may be the reply (or our echo) has begun, and
+    /// the rest of its header, or all of it, takes until then at the line's rate. Empty: each may
+    /// decide.
     std::optional<TimePoint> busy_until() const;
 
     bool wants_end(TimePoint now) const { return !end_confirmed_ && now >= timing_.sent; }
@@ -122,8 +124,8 @@ class Attempt {
         return !disturbed_ && !fragment_ && !echo_.complete() && !echo_.mismatch() &&
                2 * damaged_bytes_.size() < echo_.frame().size();
     }
-    /// From the end of the request to the start of a reply of `size` bytes whose last byte came now;
-    /// 0 for a reply that began before.
+    /// From the end of the request to the start of a reply of `size` bytes whose last byte came
+    /// now; 0 for a reply that began before.
     Duration waited(std::size_t size) const {
         return std::max(last_byte_ - timing_.sent - frame_time(timing_.serial, size), Duration{});
     }

@@ -41,9 +41,9 @@ struct Symptoms {
     std::uint64_t lower_case = 0;         ///< damaged frames of ASCII in lower-case digits
     std::uint64_t trailed = 0;            ///< replies followed by bytes or a duplicate
     std::uint64_t beheaded = 0;           ///< of all damaged: right but for lost first bytes
-    std::uint64_t misaddressed = 0;  ///< of silent and disturbed: answered by another address
-    std::uint64_t repeated = 0;      ///< answered reads that went unanswered a while ago
-    std::uint64_t silences = 0;      ///< runs of unanswered attempts that an answer ended
+    std::uint64_t misaddressed = 0;       ///< of silent and disturbed: answered by another address
+    std::uint64_t repeated = 0;           ///< answered reads that went unanswered a while ago
+    std::uint64_t silences = 0;           ///< runs of unanswered attempts that an answer ended
 
     /// Attempts by the silence before them: below 2 ms, 4 ms, 8 ms … 256 ms, and above.
     /// silent_after counts only reads that were answered when soon asked again: no offline

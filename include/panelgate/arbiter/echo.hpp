@@ -35,7 +35,6 @@ class EchoFilter {
 
     /// True if bytes are buffered that may still turn out to be no echo.
     bool pending() const { return expect_ == Expect::perhaps && matched_ > 0; }
-    std::size_t pending_size() const { return pending() ? matched_ : 0; }
     /// Bytes until an echo that has begun is complete or disproved, at least; 0: none has begun.
     std::size_t missing() const;
     /// The frame that was sent.
@@ -69,8 +68,8 @@ bool teaches_echo(const modbus::Request& request);
 /// True if the bytes begin with another master's request, and not with our `own` frame.
 bool begins_with_request(ByteView heard, ByteView own, const modbus::CrcOrders& orders);
 
-/// True if two or more bytes in a row of `heard` also stand in `frame`: a part of the echo.
-bool holds_fragment(ByteView heard, ByteView frame);
+/// True if address and function of `frame` stand in `heard`: a part of the echo.
+bool holds_beginning(ByteView heard, ByteView frame);
 
 /// What is known of a line's echo (P8, T6): configured, or learned from requests whose replies
 /// cannot be mistaken for their echo, anew after each opening of the device. Pure.

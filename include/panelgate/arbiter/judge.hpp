@@ -13,8 +13,8 @@ namespace fact {
 constexpr Facts when(bool is_true, Facts what) { return is_true ? what : 0; }
 
 // Of a frame that answers the open request.
-inline constexpr Facts answers = 1 << 0;   ///< station, function, length and echoed fields fit
-inline constexpr Facts own_echo = 1 << 1;  ///< equals the request, whose echo has not come yet
+inline constexpr Facts answers = 1 << 0;        ///< station, function, length and echoed fields fit
+inline constexpr Facts own_echo = 1 << 1;       ///< equals the request, whose echo has not come yet
 inline constexpr Facts refuses_older = 1 << 2;  ///< an exception that an older request may have had
 
 // Of any frame.
@@ -23,10 +23,10 @@ inline constexpr Facts request = 1 << 4;       ///< begins with a request of ano
 inline constexpr Facts damaged = 1 << 5;       ///< is no good frame
 inline constexpr Facts other_master = 1 << 6;  ///< may answer another master's request
 inline constexpr Facts broadcast = 1 << 7;     ///< may answer a broadcast
-inline constexpr Facts copy = 1 << 8;          ///< equals the last reply of the station, soon behind it
-inline constexpr Facts outstanding = 1 << 9;   ///< may answer an outstanding request
-inline constexpr Facts last_form = 1 << 10;    ///< has the form of the last reply, soon behind it
-inline constexpr Facts known = 1 << 11;        ///< its station was asked before
+inline constexpr Facts copy = 1 << 8;  ///< equals the last reply of the station, soon behind it
+inline constexpr Facts outstanding = 1 << 9;  ///< may answer an outstanding request
+inline constexpr Facts last_form = 1 << 10;   ///< has the form of the last reply, soon behind it
+inline constexpr Facts known = 1 << 11;       ///< its station was asked before
 
 }  // namespace fact
 

@@ -11,10 +11,11 @@
 #include "panelgate/arbiter/timing.hpp"
 #include "panelgate/base/time.hpp"
 
-/// The four numbers that are learned of a station, each from what was heard, none from another one.
+/// The four numbers that are learned of a station, each from frames alone.
 namespace panelgate::arbiter {
 
-/// How long a station needs until the first sign of its reply (T1): the last kSamples replies. Pure.
+/// How long a station needs until the first sign of its reply (T1): the last kSamples replies.
+/// Pure.
 class ThinkTimes {
   public:
     static constexpr std::size_t kSamples = 64;
@@ -43,8 +44,8 @@ class ThinkTimes {
         const auto slow = static_cast<std::size_t>(
             std::count_if(samples_.begin(), samples_.begin() + static_cast<std::ptrdiff_t>(count_),
                           [&](Duration sample) { return sample >= bar; }));
-        const bool is_near = known() && static_cast<double>(slow) >= (1 - kMost) *
-                                                                         static_cast<double>(count_);
+        const bool is_near =
+            known() && static_cast<double>(slow) >= (1 - kMost) * static_cast<double>(count_);
         if (std::exchange(reported_, is_near) || !is_near) return std::nullopt;
         return quantile(kMost);
     }
@@ -56,50 +57,41 @@ class ThinkTimes {
     bool reported_ = false;
 };
 
-/// How long after a timeout the reply may still come (T2). Auto starts at the response timeout,
-/// grows to one and a half times the lateness seen, at most to eight timeouts, and shrinks again
-/// while replies are in time. Pure.
+/// How long after a timeout the reply may still come (T2): as configured, or one and a half times
+/// the lateness seen, between one response timeout and eight. Pure.
 class LateWindow {
   public:
-    static constexpr int kForget = 512;  ///< replies in time, after which it shrinks by a third
+    static constexpr int kForget =
+        128;  ///< replies in time, after which the lateness loses a third
 
     LateWindow(std::optional<Duration> fixed, Duration response_timeout)
-        : fixed_(fixed), timeout_(response_timeout), window_(response_timeout) {}
+        : fixed_(fixed), timeout_(response_timeout) {}
 
-    /// The current window does not shrink.
     void apply(std::optional<Duration> fixed, Duration response_timeout) {
-        fixed_ = fixed;
-        timeout_ = response_timeout;
-        window_ = std::max(window_, timeout_);
+        *this = {fixed, std::max(timeout_, response_timeout), worst_};
     }
-    Duration value() const { return fixed_.value_or(window_); }
+    Duration value() const {
+        return fixed_.value_or(std::clamp(worst_ * 3 / 2, timeout_, 8 * timeout_));
+    }
     /// A reply came this long after the timeout of its request.
     void on_late(Duration lateness) {
         worst_ = std::max(worst_, lateness);
-        ++late_;
-        window_ = std::clamp(lateness * 3 / 2, window_, std::max(window_, 8 * timeout_));
         timely_ = 0;
     }
     void on_timely() {
-        ++timely_;
-        if (timely_ % kHabit == 0) late_ /= 2;
-        if (late_ == 0) worst_ = {};
-        if (timely_ < kForget) return;
-        timely_ = 0;
-        window_ = std::max(timeout_, window_ * 2 / 3);
+        if (++timely_ % kForget == 0) worst_ = worst_ > 1ms ? worst_ * 2 / 3 : Duration{};
     }
-    /// Longest recent lateness; 0: the station is not late regularly.
-    Duration worst() const { return late_ < 2 ? Duration::zero() : worst_; }
+    /// The longest lateness lately; 0: none.
+    Duration worst() const { return worst_; }
 
   private:
-    static constexpr int kHabit = 64;  ///< replies in time, after which half of late_ is forgotten
+    LateWindow(std::optional<Duration> fixed, Duration response_timeout, Duration worst)
+        : fixed_(fixed), timeout_(response_timeout), worst_(worst) {}
 
     std::optional<Duration> fixed_;
     Duration timeout_;
-    Duration window_;
     Duration worst_{};
     int timely_ = 0;
-    int late_ = 0;  ///< recent late replies
 };
 
 /// How long a station pauses inside its replies, where that is longer than the line's `reply_hole`
@@ -132,9 +124,9 @@ class ReplyHole {
     TimePoint used_{};
 };
 
-/// What follows the replies of a station and would meet the next request: the reply once more (T12),
-/// learned from the first one, or glitches of its transceiver (T3), learned from three of eight
-/// replies. The line rests for a quarter longer than the latest took. Pure.
+/// What follows the replies of a station and would meet the next request: the reply once more
+/// (T12), learned from the first one, or glitches of its transceiver (T3), learned from three of
+/// eight replies. The line rests for a quarter longer than the latest took. Pure.
 class Trail {
   public:
     /// `frame`: duration of a usual reply on this line; a copy ends that much later.

@@ -17,7 +17,8 @@ namespace panelgate::arbiter {
 struct Asked {
     enum class By : std::uint8_t {
         us,           ///< a request of this gateway to the station
-        broadcast,    ///< a request of this gateway to all stations, which no station may answer (T11)
+        broadcast,    ///< a request of this gateway to all stations, which no station may answer
+                      ///< (T11)
         other_master  ///< a request of another master to the station (T9)
     };
     By by = By::us;
@@ -54,8 +55,6 @@ class Outstanding {
     /// True if this reply PDU has function and length of the last reply of the station, which ended
     /// at most `within` before `now`.
     bool has_last_form(TimePoint now, std::uint8_t station, ByteView reply, Duration within) const;
-    /// When the last reply of the station ended; TimePoint{}: the station has not replied.
-    TimePoint replied(std::uint8_t station) const;
 
     // Could a reply be taken for the reply to a new request?
 
@@ -67,13 +66,13 @@ class Outstanding {
     /// `again`: a retry, for which the reply to its own earlier attempt counts as well.
     TimePoint clear_at(TimePoint now, std::uint8_t station, const modbus::Request& request,
                        bool again = false) const;
-    /// The same of requests that left over an earlier connection and are delivered: no reply over
-    /// this connection proves anything about them.
+    /// clear_at() of the requests that left over an earlier connection and are delivered: a reply
+    /// over this connection proves nothing about those.
     TimePoint earlier_clear_at(TimePoint now, std::uint8_t station,
                                const modbus::Request& request) const;
     /// True if the normal reply to this read differs from each outstanding reply in function or
-    /// length: that reply proves that the station has served all earlier requests. `again`: the very
-    /// same read does not count, though its reply proves only that the station is there.
+    /// length: that reply proves that the station has served all earlier requests. `again`: the
+    /// very same read does not count, though its reply proves only that the station is there.
     bool is_proof(TimePoint now, std::uint8_t station, const modbus::Request& read,
                   bool again = false) const;
     /// The last outstanding read of the station, or null.
@@ -88,17 +87,16 @@ class Outstanding {
 
     /// The line was opened: what leaves from now on leaves over a new connection.
     void on_opened() { ++epoch_; }
-    /// A request has ended without its reply, or another master's request was heard.
+    /// A request has ended without its reply, a broadcast has left, which this station may answer,
+    /// or another master's request was heard.
     void add(std::uint8_t station, Asked asked);
-    /// A broadcast has left: each station that was asked before may answer it, which is wrong.
-    void add_broadcast(const Asked& broadcast);
     /// A reply to `asked` was accepted. Returns false if an earlier equal request may have been
     /// answered in its place: then the reply to `asked` itself is outstanding from now on.
     bool on_reply(TimePoint now, std::uint8_t station, Asked asked, ByteView reply);
     /// A reply came that is not the open request's. Closes the oldest request that the reply may
-    /// answer and, of the same connection, those before; none where requests of two connections fit,
-    /// for their order is unknown. `is_open`: the open request fits as well. Returns the oldest;
-    /// empty: the reply answers none.
+    /// answer and, of the same connection, those before; none where requests of two connections
+    /// fit, for their order is unknown. `is_open`: the open request fits as well. Returns the
+    /// oldest; empty: the reply answers none.
     std::optional<Asked> on_late(TimePoint now, std::uint8_t station, ByteView reply, bool is_open);
     /// This is the last reply of the station, whatever it answers.
     void set_last_reply(TimePoint now, std::uint8_t station, ByteView reply);
@@ -130,7 +128,8 @@ class Outstanding {
 class KnownReads {
   public:
     void on_answered(const modbus::Request& read);
-    /// A client wants this of a station that has never answered: it may answer nothing else.
+    /// A client wants this of a station that has never answered: perhaps the only request to
+    /// answer.
     void on_wanted(const modbus::Request& request) {
         if (request.span()) wanted_ = request;
     }
@@ -143,7 +142,8 @@ class KnownReads {
     modbus::Request probe() const;
     /// The longest read that the station has answered; empty: none.
     const std::optional<modbus::Request>& longest() const { return longest_; }
-    /// The longest read, with one item more; empty: none is known, or the panel does not answer more.
+    /// The longest read, with one item more; empty: none is known, or the panel does not answer
+    /// more.
     std::optional<modbus::Request> longer() const;
     /// Items of the longest read of this table that the station has answered.
     std::uint32_t longest(modbus::Table table) const {

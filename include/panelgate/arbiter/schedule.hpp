@@ -19,7 +19,7 @@
 
 namespace panelgate::arbiter {
 
-/// Which reads share one transaction (P6), and which joins were refused. Pure.
+/// Reads that share one transaction (P6), and joins that panels refused. Pure.
 class Sharing {
   public:
     static constexpr std::size_t kRemembered = 64;
@@ -33,8 +33,8 @@ class Sharing {
     Group gather(TimePoint now, Job leader, const Station& station, const Outstanding& outstanding,
                  JobQueue& queue) const;
     /// The joined read failed: its parts are sent alone from now on. Returns the parts in the order
-    /// in which to put them back; jobs that asked for the whole, and jobs of clients that have left,
-    /// stay in the group.
+    /// in which to put them back; jobs that asked for the whole, and jobs of clients that have
+    /// left, stay in the group.
     Jobs split(Group& group);
     /// Returns the part of `reply` that answers this job of the group.
     static Bytes part_for(const Group& group, const Bytes& reply, const Job& job);
@@ -88,8 +88,8 @@ class Backlog {
     std::vector<Group> dropped_;
 };
 
-/// Decides what is sent next on a free line: a retry, a probe, a proof, or a request in turn with the
-/// jobs that the same transaction answers. Changes only the backlog. Pure.
+/// Decides what is sent next on a free line: a retry, a probe, a proof, or a request in turn with
+/// the jobs that the same transaction answers. Changes only the backlog. Pure.
 class Schedule {
   public:
     explicit Schedule(const Settings& settings);
@@ -112,8 +112,8 @@ class Schedule {
     const Backlog& backlog() const { return backlog_; }
     /// The retry behind a silence was `answered`: a frame was lost, and the station is there (T1).
     void on_retried(bool answered) { loses_frames_ = answered; }
-    /// Queues a retry. Behind a silence the jobs that wait by now go first, for half of the station's
-    /// timeout, unless the line loses frames.
+    /// Queues a retry. Behind a silence the jobs that wait by now go first, for half of the
+    /// station's timeout, unless the line loses frames.
     void retry(TimePoint now, Group group);
     /// Puts the parts of a joined read back, each alone. Returns the jobs whose client has left:
     /// they are not sent again.

@@ -14,8 +14,8 @@
 
 namespace panelgate::arbiter {
 
-/// One station: three states (StationHealth), four learned numbers (learned.hpp), and the reads that
-/// it answers. What was asked of it is in the line's Outstanding. Pure.
+/// One station: three states (StationHealth), four learned numbers (learned.hpp), and the reads
+/// that it answers. What was asked of it is in the line's Outstanding. Pure.
 class Station {
   public:
     /// `frame`: duration of a usual reply on this line.
@@ -31,7 +31,7 @@ class Station {
     const KnownReads& reads() const { return reads_; }
     const Trail& trail() const { return trail_; }
     const ThinkTimes& think_times() const { return think_times_; }
-    /// How it has done lately, in one word for people; nothing depends on it.
+    /// How the station has done lately, in one word for people; no decision depends on the word.
     Condition condition() const;
 
     // When it may be asked
@@ -42,12 +42,15 @@ class Station {
     bool is_suspect(bool is_read) const {
         return failed_reads_ > 0 || (failed_writes_ > 0 && !(is_read && answers_reads()));
     }
-    /// True if it was silent to more than two of its last eight attempts.
-    bool is_flaky() const { return std::popcount(lately_) > 2; }
-    /// True if its silences must be within the budget of suspects (P4).
-    bool is_doubtful(bool is_read) const {
-        return is_suspect(is_read) || is_flaky() || speculative();
+    /// True if the budget of suspects holds its requests (P4).
+    bool is_doubtful(bool is_read) const { return is_suspect(is_read) || speculative(); }
+    /// Time from which its silences are within its own share of the line, with two whole timeouts
+    /// in advance (P4).
+    TimePoint affordable_at() const {
+        return silences_.next() - 2 * silences_.time_for(settings_.response_timeout);
     }
+    /// True if its last attempt was silent.
+    bool was_silent() const { return (lately_ & 1) != 0; }
     /// True if nothing shows that its next request may be unanswered: only then reads are retried.
     bool answers_now(bool is_read) const {
         return !is_suspect(is_read) && (lately_ & 1) == 0 && !health_.offline() && !speculative();
@@ -101,14 +104,17 @@ class Station {
         std::optional<Duration> drift;  ///< new: its replies come this near the response timeout
         std::optional<Duration> trail;  ///< new: this long something follows its replies
     };
-    /// An attempt was answered at `came`, `needed` after its request by the first sign of the reply.
+    /// An attempt was answered at `came`, `needed` after its request by the first sign of the
+    /// reply.
     Replied on_reply(TimePoint came, const Attempt& attempt, bool refused, Duration needed);
-    /// A reply of it came that nobody waits for, so long after its timeout. True if it was offline.
+    /// A late reply of the station came, so long after the timeout. True if the station was
+    /// offline.
     bool on_late(TimePoint now, Duration lateness);
     /// A copy of its last reply came, or bytes that belong to no reply.
     void on_followed(TimePoint now, bool is_copy) { trail_.on_followed(now, is_copy); }
-    /// An attempt failed.
-    void on_failed(TimePoint now, const Attempt& attempt, Verdict verdict, bool learns_holes);
+    /// An attempt failed that occupied the line for `cost`.
+    void on_failed(TimePoint now, const Attempt& attempt, Verdict verdict, Duration cost,
+                   bool learns_holes);
     /// A whole transaction failed. Returns true if that took the station offline.
     bool on_given_up(TimePoint now, Fault fault, bool is_read);
     bool take_half_open(TimePoint now) { return health_.take_half_open(now); }
@@ -122,6 +128,7 @@ class Station {
     LateWindow late_window_;
     ReplyHole hole_;
     Trail trail_;
+    ProbeBudget silences_{ProbeBudget::kSuspect};  ///< of its own, whatever it answers in between
     std::uint8_t lately_ = 0;  ///< the last 8 attempts, latest lowest: 1 was silent
     int failed_reads_ = 0;     ///< transactions in a row
     int failed_writes_ = 0;    ///< likewise

@@ -39,7 +39,7 @@ class StationHealth {
     /// How often it was heard again after a silence: each may have been a restart.
     std::uint64_t returns() const { return returns_; }
 
-    /// Its answer came in time. Returns true if that brought it back.
+    /// An answer came in time. Returns true if the station was offline.
     bool on_reply(TimePoint now);
     /// A good frame of the station came too late to answer a request: alive, though not well.
     /// Returns true if that brought it back.
@@ -78,9 +78,10 @@ class StationHealth {
 /// allowed for d * (1 / share - 1). Unforeseen costs may exceed it, and are paid off later. Pure.
 class ProbeBudget {
   public:
-    static constexpr double kSuspect = 0.2;   ///< of stations whose last requests failed, together
-    static constexpr double kOffline = 0.045;  ///< of offline stations, together: below 5 % with what a probe overruns
-    static constexpr double kAlone = 0.5;     ///< ... while an outage of all has only just begun
+    static constexpr double kSuspect = 0.2;  ///< of stations whose last requests failed, together
+    static constexpr double kOffline =
+        0.045;  ///< of offline stations, together: below 5 % with what a probe overruns
+    static constexpr double kAlone = 0.5;  ///< ... while an outage of all has only just begun
 
     explicit ProbeBudget(double share) : share_(share) {}
 

@@ -44,12 +44,9 @@ class Stations {
     bool may_spend(TimePoint now, const Job& job) const;
     /// Time until which a suspect waits for its share while others use the line.
     TimePoint held_until(const Job& job) const;
-    /// True if a retry is within what silence may cost the others: that of a station that is seldom
-    /// silent always is.
-    bool affords_retry(TimePoint now, const Station& station) const {
-        return !station.is_flaky() || suspects_.allows(now, credit()) ||
-               now >= others_active_until(station.id());
-    }
+    /// True if a retry is within what silence may cost the others: the share of the station and,
+    /// where several others are silent as well, that of all suspects.
+    bool affords_retry(TimePoint now, const Station& station) const;
     /// An attempt that occupied the line for `cost` failed.
     void on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration cost);
     /// A station answered.
@@ -66,13 +63,13 @@ class Stations {
     void on_broadcast(const Asked& broadcast);
     void on_line_down();
 
-    /// The listed station, offline or not answering writes, whose probe is most overdue; empty: none
-    /// is due.
+    /// The listed station, offline or not answering writes, whose probe is most overdue; empty:
+    /// none is due.
     std::optional<std::uint8_t> next_to_probe(TimePoint now) const;
     /// When the next probe is due; empty: never.
     std::optional<TimePoint> next_probe(TimePoint now) const;
-    /// A read that shows whether this station is there: a proof, or, where none is known, a read whose
-    /// reply may at most be that to its own earlier attempt.
+    /// A read that shows whether this station is there: a proof, or, where none is known, a read
+    /// whose reply may at most be that to its own earlier attempt.
     modbus::Request probe_for(TimePoint now, const Station& station) const;
     /// A read whose normal reply proves that the station has served all earlier requests (T2): of
     /// another length than each outstanding reply, and a part of a read that it has answered, or

@@ -11,7 +11,7 @@ namespace panelgate::arbiter::timing {
 inline constexpr Duration kListensAgain = 4ms;
 /// T1: an outage of all stations is young: their probes may use half of the line.
 inline constexpr Duration kYoungOutage = 30s;
-/// T1: other stations that have answered within this time use the line.
+/// T1: stations with an answer within this time use the line.
 inline constexpr Duration kOthersActive = 5s;
 /// T1: an unlisted station that was never heard is forgotten when nobody has asked for so long.
 inline constexpr Duration kForgetUnheard = 60s;

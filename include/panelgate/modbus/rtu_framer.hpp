@@ -36,7 +36,6 @@ struct Unused {
     Kind kind = Kind::damaged;
     std::uint8_t station = 0;  ///< of a valid frame; of damage that shows that it is there
     Bytes bytes;
-    TimePoint came{};  ///< its last byte, if that is known
 };
 
 /// Finds the reply to one request in the bytes received after it. Lives for one attempt. Function

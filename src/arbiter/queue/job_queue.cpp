@@ -49,7 +49,7 @@ const JobQueue::Entry* JobQueue::Source::first(std::uint8_t station) const {
     return std::ranges::all_of(lanes | std::views::values, is_before) ? first : nullptr;
 }
 
-/// Of the first host in its round that has a runnable one.
+/// The job of the first host in the round that has a runnable job.
 std::pair<const Job*, JobQueue::Place> JobQueue::first_of(std::size_t rank,
                                                           const Test& may_run) const {
     std::pair<const Job*, Place> first;
@@ -224,7 +224,7 @@ void JobQueue::put_back(Job&& job) {
     jobs.insert(at, std::move(entry));
 }
 
-/// One lane more or less of this host has such a job first.
+/// One lane of this host more, or less, has a job of this class first.
 void JobQueue::count_first(const HostKey& host, const Job& job, int by) {
     const std::size_t rank = rank_of(job);
     Origin& origin = hosts_.at(host);

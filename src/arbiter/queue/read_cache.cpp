@@ -114,8 +114,8 @@ void WaitingReads::remove(const Job& job, const ReadSpan& span, const Count& cou
     }
 }
 
-/// Spans that only this one contained become widest. Of two that begin together the wider comes
-/// first, so that none is contained in a later one.
+/// Spans inside the span that goes, and inside no other span, become widest. Of two spans with one
+/// beginning the wider span comes first, so that no span is inside a later span.
 void WaitingReads::drop_span(Spans::iterator it, const Count& count) {
     const ReadSpan gone = it->first;
     auto next = spans_.erase(it);

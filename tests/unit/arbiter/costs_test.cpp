@@ -177,9 +177,12 @@ INSTANTIATE_TEST_SUITE_P(
                     Row{[](int) { return std::optional<Duration>(600ms); }, 0.21},  // always late
                     Row{[](int) { return std::optional<Duration>(1000ms); }, 0.21},
                     Row{[](int n) { return when(true, n % 2 == 0 ? 3ms : 700ms); }, 0.21},
-                    // Of two failures in a row the second is paid for in part.
-                    Row{[](int n) { return when(n % 3 == 0); }, 0.28},
-                    Row{[](int n) { return when(n % 3 == 0, 400ms); }, 0.28}));
+                    Row{[](int n) { return when(n % 3 == 0); }, 0.21},
+                    Row{[](int n) { return when(n % 3 == 0, 400ms); }, 0.21},
+                    Row{[](int n) { return when(n % 4 != 0); }, 0.21},  // each fourth is missed
+                    Row{[](int n) { return when(n % 4 != 0, 400ms); }, 0.21},
+                    Row{[](int n) { return when(n % 5 != 0); }, 0.21},
+                    Row{[](int n) { return when(n % 8 != 0); }, 0.21}));
 
 TEST(Costs, P4APanelThatLosesOneFrameInFortyHardlyNotices) {
     std::uint32_t random = 1;

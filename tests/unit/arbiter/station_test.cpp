@@ -35,7 +35,7 @@ class StationTest : public testing::Test {
     void miss(Verdict verdict = Verdict::silent, const Bytes& pdu = kRead) {
         now += kTimeout;
         const Attempt attempt(group_of(kId, pdu), test::timing_of(now - kTimeout, 8), {}, {});
-        station.on_failed(now, attempt, verdict, true);
+        station.on_failed(now, attempt, verdict, kTimeout, true);
     }
     /// A transaction of one attempt fails. Returns true if the failure took the station offline.
     bool fail(Verdict verdict = Verdict::silent, const Bytes& pdu = kRead) {

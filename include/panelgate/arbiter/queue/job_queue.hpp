@@ -52,11 +52,11 @@ class JobQueue {
         bool taken = false;
         Jobs shed;
     };
-    /// A job that is refused stays as it was; one that is taken is moved from.
+    /// A refused job stays as it was; a taken job is moved from.
     PushResult push(Job& job);
     PushResult push(Job&& job) { return push(job); }
-    /// Returns a job that was taken before: ahead of its client's younger ones for that station;
-    /// never refused, never drops others.
+    /// Puts a taken job back, ahead of the client's younger jobs for that station. Never refused;
+    /// drops no job.
     void put_back(Job&& job);
 
     class Choice;
@@ -108,7 +108,7 @@ class JobQueue {
         Turns turns{};
         std::size_t counting = 0;
 
-        /// The first of this lane, if there is one and order allows it to run, else null.
+        /// The first job of this lane where order allows the job to run, else null.
         const Entry* first(std::uint8_t station) const;
     };
     /// What one host has waiting.
@@ -130,7 +130,7 @@ class JobQueue {
     };
     /// A job that may be dropped: the greatest is.
     struct Victim {
-        /// How greedy it is beside the newcomer, what its host has waiting, and its client.
+        /// Greed beside the newcomer, then the requests that the host and the client have waiting.
         std::tuple<int, std::size_t, std::size_t> greed;
         bool is_no_write = false;  ///< a write goes last
         bool makes_room = false;
@@ -168,7 +168,7 @@ class JobQueue {
     WaitingReads reads_;
     PoolMultiset<TimePoint> expiries_;  ///< of all waiting jobs
     std::size_t size_ = 0;
-    /// Of each class the hosts that have a lane whose first job is of it, by their turns.
+    /// By class: hosts with a lane whose first job is of the class, in the order of their turns.
     std::array<PoolMap<std::uint64_t, HostKey>, kRanks> rounds_;
     std::uint64_t turns_ = 0;
     /// Turns of other classes while one of this class was runnable.

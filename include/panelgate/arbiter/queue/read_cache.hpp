@@ -16,7 +16,7 @@
 
 namespace panelgate::arbiter {
 
-/// The items of one table (01..04) that a read asks of one station.
+/// Items of one table (01..04) of one station, as a read asks for them.
 struct ReadSpan {
     std::uint8_t station = 0;
     modbus::Span items;
@@ -83,7 +83,7 @@ class WaitingReads {
     /// True if removing this read lowers the count: it counts, and no carried read would take its
     /// place.
     bool frees(Ticket ticket, const ReadSpan& span) const;
-    /// Visits the clients whose reads of this station wait: one for each of these.
+    /// Visits the client of each waiting read of this station.
     template <class Visit>
     void visit(std::uint8_t station, const Visit& visit) const {
         auto it = spans_.lower_bound({station, {modbus::kTables.front(), 0, 0x10000}});
@@ -94,7 +94,7 @@ class WaitingReads {
     std::size_t counting() const { return widest_.size(); }
 
   private:
-    /// Spans within another come directly after it, or after others that begin inside it.
+    /// A span inside a wider span comes behind the wider span, or behind a span that begins inside.
     struct WiderFirst {
         bool operator()(const ReadSpan& a, const ReadSpan& b) const;
     };
@@ -110,7 +110,7 @@ class WaitingReads {
     void drop_span(Spans::iterator it, const Count& count);
 
     Spans spans_;
-    /// Spans that no other contains, so their ends rise as they begin.
+    /// Widest spans: no waiting span contains another of these, so ends rise with beginnings.
     PoolMap<Place, ReadSpan> widest_;
 };
 
