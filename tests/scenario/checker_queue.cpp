@@ -108,15 +108,9 @@ void Checker::on_settled() {
              std::to_string(settings_.queue.limit));
 }
 
-bool Checker::rests_behind_damage(std::uint8_t station, TimePoint since) const {
-    const auto found = behind_damage_.find(station);
-    return found != behind_damage_.end() && found->second > since;
-}
-
-/// P9: a waiting reader gets every fifth turn at least, unless its station rests for what it owes,
-/// or may say again (P1), or has not answered when it was asked last: then it has a share of its
-/// own (P4); or it says its replies twice, and is let finish. A write that is repeated takes no
-/// other turn.
+/// P9: a waiting reader gets every fifth turn at least, unless its station rests, for what it owes
+/// (P1) or as its settings say, or has not answered when it was asked last: then it has a share of
+/// its own (P4). A write that is repeated takes no other turn.
 void Checker::check_turn(TimePoint now, bool write) {
     constexpr std::uint64_t kWritesInARow = 4;
     constexpr std::size_t kRemembered = 8;
@@ -135,9 +129,7 @@ void Checker::check_turn(TimePoint now, bool write) {
         return !o.sent && !o.gone && o.job.priority == PriorityClass::read &&
                o.turn + kWritesInARow < turns_ && client != clients_.end() &&
                client->second.single && watch_.is_good(o.job.station, o.submitted) &&
-               !watch_.is_failing(o.job.station) && !doublers_.contains(o.job.station) &&
-               watch_.rests_until(o.job.station) <= first &&
-               !rests_behind_damage(o.job.station, first);
+               !watch_.is_failing(o.job.station) && rests_for(o) <= first;
     });
     if (starves != open_.end())
         fail("P9: five writes in a row while a reader waits: " + std::to_string(starves->first));

@@ -48,7 +48,7 @@ class Scenario : public testing::TestWithParam<Kind> {};
 TEST_P(Scenario, KeepsItsPromises) {
     const Kind kind = GetParam();
     const std::uint64_t only = number_from("PANELGATE_SCENARIO_SEED", 0);
-    const std::uint64_t wanted = wanted_frames() / (std::size(kKinds) + 1);
+    const std::uint64_t wanted = wanted_frames() / (std::size(kKindRows) + 1);
     Outcome all;
     std::uint64_t seed = only == 0 ? first_seed() : only;
     for (; all.frames < wanted; ++seed) {
@@ -65,7 +65,7 @@ TEST_P(Scenario, KeepsItsPromises) {
     EXPECT_GT(all.good, 0u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Every, Scenario, testing::ValuesIn(kKinds),
+INSTANTIATE_TEST_SUITE_P(Every, Scenario, testing::ValuesIn(kinds_of(Limit::none)),
                          [](const auto& info) { return std::string(label(info.param)); });
 
 class AsciiScenario : public testing::TestWithParam<Kind> {};
@@ -73,7 +73,7 @@ class AsciiScenario : public testing::TestWithParam<Kind> {};
 TEST_P(AsciiScenario, KeepsItsPromises) {
     const Kind kind = GetParam();
     const std::uint64_t only = number_from("PANELGATE_SCENARIO_SEED", 0);
-    const std::uint64_t wanted = wanted_frames() / (10 * std::size(kKinds));
+    const std::uint64_t wanted = wanted_frames() / (10 * std::size(kKindRows));
     Outcome all;
     std::uint64_t seed = only == 0 ? first_seed() : only;
     for (; all.frames < wanted; ++seed) {
@@ -87,7 +87,7 @@ TEST_P(AsciiScenario, KeepsItsPromises) {
     EXPECT_GT(all.good, 0u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Every, AsciiScenario, testing::ValuesIn(kKinds),
+INSTANTIATE_TEST_SUITE_P(Every, AsciiScenario, testing::ValuesIn(kinds_of(Limit::none)),
                          [](const auto& info) { return std::string(label(info.param)); });
 
 /// Seeds beyond those that each run plays, in which something was once wrong.
@@ -237,32 +237,6 @@ TEST(Scenario, SeedsThatOnceBrokeAPromiseKeepThemAll) {
     }
 }
 
-/// One run with the oddity and one without; what was broken, or nothing.
-std::string compare(Oddity oddity, std::uint64_t seed, Outcome& with, bool history = false) {
-    const Plan plan = draw_odd(oddity, seed);
-    with = play(plan, history);
-    if (!with.violation.empty()) return with.violation;
-    const Outcome without = play(without_oddity(plan));
-    if (!without.violation.empty()) return "without it: " + without.violation;
-    const Duration much = p90(with.waits);
-    const Duration usual = p90(without.waits);
-    // Who says a reply twice has the line until the second one, and as long again as that may be
-    // late: nobody can be asked meanwhile without a collision, and at a high rate that is longer
-    // than all the others take. A request that misses its turn waits for one such rest more.
-    const PanelPlan& odd = plan.panels.back();
-    // Behind one whose replies have been late the line rests for as long as they may be (P1).
-    const Duration timeout = plan.settings.unlisted.response_timeout;
-    const Duration late =
-        odd.late > 0 ? std::chrono::duration_cast<Duration>(timeout * odd.late_limit) : Duration{};
-    // One that answers broadcasts when the line is in use again costs a request its timeout.
-    const bool collides = odd.broadcast_think > plan.settings.broadcast_turnaround;
-    const Duration rest = late + (collides ? timeout : Duration{}) +
-                          (odd.duplicate > 0 ? odd.duplicate_delay * 3 / 2 : Duration{});
-    if (much < 3 * usual + rest) return {};
-    return "P9: of one odd panel the others wait " + std::to_string(much / 1us) + " us, else " +
-           std::to_string(usual / 1us) + " us";
-}
-
 /// A panel that says its replies twice answered the very same question with its copy; one such copy
 /// may have been that of a much earlier equal reply, and each request waited as long from then on.
 TEST(Scenario, SeedsInWhichAnOddPanelOnceBrokeAPromiseKeepThemAll) {
@@ -298,7 +272,8 @@ class OneOddPanel : public testing::TestWithParam<Oddity> {};
 TEST_P(OneOddPanel, CostsTheOthersLittle) {
     const Oddity oddity = GetParam();
     const std::uint64_t only = number_from("PANELGATE_SCENARIO_SEED", 0);
-    const std::uint64_t wanted = wanted_frames() / (std::size(kKinds) + 1) / std::size(kOddities);
+    const std::uint64_t wanted =
+        wanted_frames() / (std::size(kKindRows) + 1) / std::size(kOddityRows);
     std::uint64_t frames = 0;
     for (std::uint64_t seed = only == 0 ? first_seed() : only; frames < wanted; ++seed) {
         Outcome with;
@@ -309,7 +284,7 @@ TEST_P(OneOddPanel, CostsTheOthersLittle) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Every, OneOddPanel, testing::ValuesIn(kOddities),
+INSTANTIATE_TEST_SUITE_P(Every, OneOddPanel, testing::ValuesIn(oddities_of(Limit::none)),
                          [](const auto& info) { return std::string(label(info.param)); });
 
 /// For whoever mends an arbiter: every violation of the first seeds, how often, and seeds of it.
@@ -339,16 +314,16 @@ TEST(Survey, DISABLED_OfViolations) {
             std::cout << '\n';
         }
     };
-    for (const Kind kind : kKinds)
-        survey(label(kind), [&](std::uint64_t seed) {
-            const Outcome one = play(draw(kind, seed));
+    for (const Row<Kind>& row : kKindRows)
+        survey(row.name, [&](std::uint64_t seed) {
+            const Outcome one = play(draw(row.world, seed));
             add(all, one);
             return one.violation;
         });
-    for (const Oddity oddity : kOddities) {
-        survey(label(oddity), [&](std::uint64_t seed) {
+    for (const Row<Oddity>& row : kOddityRows) {
+        survey(row.name, [&](std::uint64_t seed) {
             Outcome with;
-            const std::string broken = compare(oddity, seed, with);
+            const std::string broken = compare(row.world, seed, with);
             add(all, with);
             return broken;
         });
@@ -357,28 +332,6 @@ TEST(Survey, DISABLED_OfViolations) {
               << all.collisions << " collisions, " << all.lucky << " answers by chance, "
               << all.first_copies << " first copies in place of an answer, " << all.excused
               << " of them to the very same question\n";
-}
-
-/// What no gateway can exclude: a reply that is later than the quarantine reaches and has the shape
-/// of the one that is then awaited. How often, with panels of which many are that late?
-TEST(Beyond, ALateReplyThatOutlastsTheAutomaticWindowIsRare) {
-    std::uint64_t frames = 0;
-    std::uint64_t wrong = 0;
-    for (std::uint64_t seed = 1; frames < wanted_frames() / 10; ++seed) {
-        Plan plan = draw(Kind::faults, seed);
-        for (arbiter::StationSettings& station : plan.settings.stations)
-            station.late_window.reset();
-        for (PanelPlan& panel : plan.panels) {
-            panel.late = 0.02;
-            panel.late_limit = 3;
-        }
-        const Outcome one = play(plan);  // ends at the first wrong value
-        frames += one.frames;
-        wrong += one.violation.empty() ? 0 : 1;
-    }
-    std::cout << "  2 % of the replies up to 3 timeouts late, automatic window: " << wrong
-              << " wrong values in " << frames << " transactions\n";
-    EXPECT_LT(wrong * 1000, frames);
 }
 
 }  // namespace

@@ -21,7 +21,10 @@ World::World(const Plan& plan, Subject& subject, Checker& checker)
     for (const PanelPlan& panel : plan_.panels)
         panels_.emplace_back(panel, plan_, agenda_, wire_, random_, checker_);
     wire_.connect([this](ByteView bytes, std::uint8_t answer_of) { hear(bytes, answer_of); },
-                  [this](ByteView adu, std::uint64_t connection) { ask_panels(adu, connection); });
+                  [this](ByteView adu, std::uint64_t connection) { ask_panels(adu, connection); },
+                  [this] {
+                      for (Panel& panel : panels_) panel.overhear();
+                  });
 }
 
 void World::run() {
@@ -155,7 +158,7 @@ void World::hear(ByteView bytes, std::uint8_t answer_of) {
 void World::ask_panels(ByteView wire, std::uint64_t connection) {
     const Bytes adu = understood(plan_.settings.serial, wire);
     for (Panel& panel : panels_) {
-        if (adu[0] == 0 || panel.id() == adu[0]) panel.hear(adu, connection);
+        if (panel.takes(adu)) panel.hear(adu, connection);
     }
 }
 
