@@ -63,7 +63,7 @@ void Checker::on_refused(TimePoint now, const arbiter::Job& job, Fault fault) {
     const Client& client = clients_[job.client];
     // A late reply is told from what may follow it by a silence.
     constexpr Duration kSilence = 50ms;
-    if (fault == Fault::offline && watch_.is_good(job.station, now - kSilence))
+    if (fault == Fault::offline && watch_.is_good(job.station, now - kSilence) && !is_noisy(now))
         fail("P4: a good station was refused as offline: " + std::to_string(job.station));
     if (fault != Fault::busy) return;
     if (client.polite) fail("P9: a polite client was refused");
@@ -182,8 +182,11 @@ void Checker::check_write(TimePoint now, const Open& open, const Bytes& reply) {
     const auto done = truth_.executed(open.job.station, open.job.request.pdu());
     // The start of our own frame comes back, and its last byte is what somebody makes of a reply.
     if ((!done || *done > now) && is_luck(heard_for(open, reply))) return;
-    if ((!done || *done > now) && !is_behind_first_copy(now, open.job.station))
-        return fail_value("P8: a write was confirmed that no station executed");
+    const bool is_late = !done || *done > now;
+    if (is_late && plan_.limit != Limit::none)
+        return too_soon_.push_back(key_of(open.job.station, open.job.request.pdu()));
+    if (is_late && !is_behind_first_copy(now, open.job.station))
+        return fail("P8: a write was confirmed that no station executed");
     if (!done) return;
     clients_[open.job.client].own_write[open.job.station] = *done;
 }
@@ -242,6 +245,8 @@ void Checker::at_end(TimePoint now) {
              std::to_string(first.job.client) + " to station " + std::to_string(first.job.station) +
              " was never answered");
     }
+    for (const std::string& write : too_soon_)
+        if (!truth_.executed(write)) fail_value("P8: a write was confirmed that nobody executed");
     const std::string dear = costs_.at_end(now - started_);
     if (!dear.empty()) fail(dear);
     for (const auto& [id, client] : clients_) {

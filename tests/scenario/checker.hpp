@@ -163,6 +163,7 @@ class Checker : public Witness {
     std::string violation_;
     std::string wrong_value_;
     std::uint64_t wrong_values_ = 0;
+    std::vector<std::string> too_soon_;  ///< writes that were confirmed and not yet executed
     Truth truth_;
     Watch watch_;
     Costs costs_;

@@ -119,6 +119,8 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     attempt_.dead = dead;
     attempt_.answered = station == kBroadcast;
     attempt_.heard = false;
+    attempt_.like_echo =
+        !modbus::is_pure_read(pdu) && std::ranges::equal(modbus::normal_write_reply(pdu), pdu);
     attempt_.span = test::read_span(station, pdu);
     attempt_.again = what == FrameKind::retry;
     asked_[station].assign(pdu.begin(), pdu.end());
@@ -208,7 +210,9 @@ void Checker::check_idling(TimePoint now) {
     const Duration idle = now - *waited;
     longest_idle_ = std::max(longest_idle_, idle);
     Duration most = slack;
-    if (!attempt_.answered) most += settings_.unlisted.response_timeout;
+    // P8: what equals its request may be the echo, where there are echoes.
+    const bool in_doubt = echoes_ && attempt_.like_echo;
+    if (!attempt_.answered || in_doubt) most += settings_.unlisted.response_timeout;
     if (attempt_.station == kBroadcast) most += settings_.broadcast_turnaround;
     // A reply of another length is, byte for byte, the late one to an earlier request of that
     // length that had no answer: nobody on the wire can tell. Behind a station that is late the
@@ -247,7 +251,7 @@ std::optional<TimePoint> Checker::good_work_since(TimePoint since) const {
         if (is_new && client != clients_.end() && client->second.held_until > since)
             own.any = TimePoint::max();
         if (!o.sent && station == kBroadcast) own.broadcast = own.any;
-        const bool silent = watch_.is_silent(station);
+        const bool silent = watch_.is_failing(station);  // a suspect has a share of its own (P4)
         TimePoint& before = own.station[station];
         const TimePoint rest = rests_for(o);
         own.any = silent ? TimePoint::max() : std::max(own.any, rest);

@@ -18,9 +18,10 @@ struct Attempt {
     bool dead = false;        ///< its panel could not answer
     bool was_silent = false;  ///< the station was silent before
     bool answered = true;
-    bool heard = false;  ///< anything
-    bool again = false;  ///< it was on the wire before
-    bool owed = false;   ///< an earlier one may still be answered
+    bool heard = false;      ///< anything
+    bool like_echo = false;  ///< a write whose confirmation equals the request
+    bool again = false;      ///< it was on the wire before
+    bool owed = false;       ///< an earlier one may still be answered
     std::optional<arbiter::ReadSpan> span;
 };
 

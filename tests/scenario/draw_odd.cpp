@@ -2,6 +2,7 @@
 #include <cstdlib>
 
 #include "draw.hpp"
+#include "panelgate/base/serial_format.hpp"
 
 namespace panelgate::scenario {
 namespace {
@@ -54,7 +55,10 @@ constexpr Oddness kThreats[] = {
     {Oddity::reboots, [](Plan&, PanelPlan& p) { p.reboots = 10s; }},
     {Oddity::babbles,
      [](Plan& all, PanelPlan&) {
-         all.line.babble = all.seed % 2 == 0 ? Duration(100ms) : Duration(5s);
+         // As much as leaves nine tenths of the line to others.
+         constexpr std::size_t kLongest = 13;
+         const Duration frame = frame_time(all.settings.serial, kLongest);
+         all.line.babble = all.seed % 2 == 0 ? std::max<Duration>(100ms, 10 * frame) : Duration(5s);
      }},
     {Oddity::answers_broadcasts,
      [](Plan& all, PanelPlan& p) {

@@ -42,7 +42,7 @@ void Panel::reboot() {
 }
 
 bool Panel::takes(ByteView adu) {
-    const TimePoint start = agenda_.now() - wire_.time_of(adu.size(), 1);
+    const TimePoint start = wire_.asked_since();
     const bool concerns = adu[0] == 0 || adu[0] == plan_.id;
     if (plan_.expects_replies > Duration::zero()) {
         const bool taken_for_reply = start < std::exchange(expects_until_, TimePoint{});

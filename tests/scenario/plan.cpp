@@ -33,9 +33,11 @@ bool Plan::is_sound(const PanelPlan& panel) const {
 }
 
 bool Plan::is_calm() const {
+    // What comes later than a copy does is a late reply, for all that anybody knows.
+    static constexpr Duration kLatestCopy = 60ms;
     const auto in_time = [](const PanelPlan& p) {
-        return p.late == 0 && p.nap == 0 && p.damaged_first == 0 &&
-               p.slow_think == Duration::zero();
+        return (p.duplicate == 0 || p.duplicate_delay <= kLatestCopy) && p.late == 0 &&
+               p.nap == 0 && p.damaged_first == 0 && p.slow_think == Duration::zero();
     };
     const bool nothing_held = !settings.may_stall && line.pauses == 0 && line.losses == 0;
     const bool alone =

@@ -9,7 +9,9 @@
 namespace panelgate::scenario {
 
 Outcome play(const Plan& plan, bool with_history) {
-    Subject subject(plan.settings);
+    arbiter::Settings settings = plan.settings;
+    settings.explain = with_history;
+    Subject subject(settings);
     Checker checker(plan);
     World world(plan, subject, checker);
     if (with_history) world.keep_history();

@@ -46,7 +46,11 @@ class Truth {
     bool is_chance(ByteView bytes) const;
 
     std::uint64_t served(std::uint8_t station) const;
-    std::optional<TimePoint> executed(std::uint8_t station, ByteView pdu) const;
+    /// `write`: its key_of().
+    std::optional<TimePoint> executed(const std::string& write) const;
+    std::optional<TimePoint> executed(std::uint8_t station, ByteView pdu) const {
+        return executed(key_of(station, pdu));
+    }
     /// It refused this very request at `since` or later.
     bool refused(std::uint8_t station, ByteView pdu, TimePoint since) const;
 

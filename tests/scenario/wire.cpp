@@ -87,6 +87,7 @@ void Wire::leave(Bytes adu, std::uint64_t connection) {
     echo(frame);
     hand_over(*frame);
     agenda_.at(frame->end, [this, frame] {
+        asked_since_ = frame->start;
         if (!frame->garbled_from) ask_(frame->bytes, frame->connection);
     });
 }
@@ -101,7 +102,7 @@ void Wire::hand_over(const Frame& request) {
     handed_over_ = agenda_.now();
     agenda_.at(request.start + (request.end - request.start) / 2, [this, held = last_reply_] {
         agenda_.tell("next is what the adapter has held");
-        arrive({.bytes = held, .connection = connection_});
+        arrive({.bytes = held, .answer_of = plan_.odd, .connection = connection_, .reply = held});
     });
 }
 

@@ -57,6 +57,8 @@ class Wire {
     Duration time_of(std::size_t characters, double rate) const;
 
     bool is_up() const { return up_; }
+    /// When the request began that has ended now.
+    TimePoint asked_since() const { return asked_since_; }
     std::uint64_t connection() const { return connection_; }
     void go_down() { up_ = false; }
     /// Nothing that was said before, or is said in answer to something sent before, is heard.
@@ -107,7 +109,8 @@ class Wire {
     TimePoint spoken_until_{};
     TimePoint stalled_until_{};
     TimePoint says_held_until_{};  ///< what a stall has held back, and what came since
-    Bytes last_reply_;             ///< of the odd panel
+    TimePoint asked_since_{};
+    Bytes last_reply_;  ///< of the odd panel
     TimePoint handed_over_{};
     FramePtr buffered_;  ///< a part of our own frame that an adapter has not handed over yet
     std::vector<Held> held_in_;

@@ -112,6 +112,17 @@ void World::act(const arbiter::Note& note) {
     }
 }
 
+void World::act(const arbiter::Decision& decision) {
+    if (decision.kind != arbiter::Decision::Kind::line_rests) return;
+    agenda_.tell("the line rests for " + std::to_string(decision.time / 1us) +
+                 " us because of station " + std::to_string(decision.station));
+}
+
+void World::act(const arbiter::StationEvent& event) {
+    agenda_.tell("station " + std::to_string(event.station) + " is " +
+                 std::string(label(event.kind)) + ", " + std::to_string(event.by / 1us) + " us");
+}
+
 void World::act(const arbiter::Transmit& transmit) {
     agenda_.tell("sent, " + std::string(label(what_next_)), transmit.adu);
     const Bytes adu = understood(plan_.settings.serial, transmit.adu);
