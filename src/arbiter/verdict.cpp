@@ -74,7 +74,9 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
     const Duration needed = std::max(attempt.waited(reply.size() + modbus::kAduOverhead),
                                      std::max(attempt.first_byte() - sent, Duration{}));
     const bool refused = modbus::exception_of(reply).has_value();
-    group.started = outstanding.sampled(now, group.station, group.request.pdu(), group.started);
+    // The reply may be that to the first of several equal requests.
+    const TimePoint answered = outstanding.sampled(now, group.station, group.request.pdu(), sent);
+    group.started = std::min(group.started, answered);
     const Station::Replied replied = station.on_reply(came, attempt, refused, needed);
     // A transport that held the reply back may hold the next one; only a proof tells.
     Asked asked = asked_of(attempt, settings_.may_stall && station.reads().longer());
@@ -82,7 +84,7 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
         asked.until = std::max(asked.until, now + latency_ + station.latest_reply());
     const bool is_own = outstanding.on_reply(now, group.station, asked, reply);
     if (is_own && announces_reply(reply)) outstanding.add(group.station, asked);
-    outstanding.on_delivered(now, sent, station.latest_reply());
+    outstanding.on_delivered(now, answered, station.latest_reply());
     stations_.on_reply(now);
     if (replied.back) stations_.on_recovery();
     explain_condition(now, group.station, before);
