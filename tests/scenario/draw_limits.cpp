@@ -36,7 +36,8 @@ constexpr Oddness kLimits[] = {
     {Oddity::copies_seldom,
      [](Plan& all, PanelPlan& p) {
          p.duplicate = 0.02;
-         p.duplicate_delay = 30ms;
+         p.duplicate_delay = std::chrono::milliseconds(static_cast<int>(2 + all.seed * 7 % 40));
+         for (ClientPlan& client : all.clients) client.pause = 500ms;
          hurry(all);
      }},
     {Oddity::unasked, [](Plan& all, PanelPlan& p) { imitate(all, p, false); }},

@@ -30,16 +30,16 @@ struct Bound {
     double broken;
 };
 constexpr Bound kBounds[] = {
-    {Limit::late_beyond_window, 1000, 0},
-    {Limit::overtaking, 1000, 0},
-    {Limit::copies_first, 1000, 0},
-    {Limit::one_behind, 100000, 0},
-    {Limit::early, 100000, 0},
-    {Limit::confirmations, 1000, 0},
-    {Limit::two_answers, 1000, 0},
-    {Limit::echo_kinds, 100000, 0},
-    {Limit::misnumbered, 1000, 0},
-    {Limit::damaged_repeated, 1000, 0},
+    {Limit::late_beyond_window, 30, 0},
+    {Limit::overtaking, 20, 2},
+    {Limit::copies_first, 30, 0},
+    {Limit::one_behind, 6000, 0},
+    {Limit::early, 670, 0},
+    {Limit::confirmations, 30, 20},
+    {Limit::two_answers, 250, 10},
+    {Limit::echo_kinds, 1700, 19},
+    {Limit::misnumbered, 5, 2},
+    {Limit::damaged_repeated, 0, 7},
 };
 
 struct Measured {
