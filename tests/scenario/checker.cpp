@@ -42,7 +42,7 @@ Duration Checker::gap() const { return silent_interval(settings_.serial); }
 void Checker::on_accepted(TimePoint now, arbiter::Ticket ticket, const arbiter::Job& job) {
     if (ticket <= last_ticket_) fail("P3: a ticket was given twice");
     last_ticket_ = ticket;
-    waiting_before_ = open_.size() >= settings_.queue.limit ? waiting() : 0;
+    came_ = true;
     const bool joins = joins_attempt(now, job);
     const Open open{.job = job,
                     .submitted = now,
@@ -63,7 +63,8 @@ void Checker::on_refused(TimePoint now, const arbiter::Job& job, Fault fault) {
     const Client& client = clients_[job.client];
     // A late reply is told from what may follow it by a silence.
     constexpr Duration kSilence = 50ms;
-    if (fault == Fault::offline && watch_.is_good(job.station, now - kSilence) && !is_noisy(now))
+    const bool told = noisy_since_ > replied_[job.station] || now > heard_until_ + kSilence;
+    if (fault == Fault::offline && told && watch_.is_good(job.station, now - kSilence))
         fail("P4: a good station was refused as offline: " + std::to_string(job.station));
     if (fault != Fault::busy) return;
     if (client.polite) fail("P9: a polite client was refused");

@@ -143,7 +143,8 @@ class Checker : public Witness {
     void mark_sent(std::uint8_t station, ByteView pdu, FrameKind what);
     void mark_answered(std::uint8_t station);
     bool joins_attempt(TimePoint now, const arbiter::Job& job) const;
-    std::size_t waiting() const;
+    std::size_t waiting(arbiter::Ticket but_for = 0) const;
+    bool rides(const Open& newcomer) const;
     void check_turn(TimePoint now, bool write);
     // What may be answered (checker.cpp)
     void check_reply(TimePoint now, const Open& open, const arbiter::Finish& finish);
@@ -169,10 +170,9 @@ class Checker : public Witness {
     Costs costs_;
     std::map<arbiter::Ticket, Open> open_;
     arbiter::Ticket last_ticket_ = 0;
-    static constexpr std::size_t kNobodyCame = SIZE_MAX;
-    std::uint64_t frames_settled_ = 0;          ///< frames_ when everything had settled last
-    std::size_t waiting_before_ = kNobodyCame;  ///< the newcomer that was taken last
-    bool displaced_ = false;                    ///< somebody had to go for it
+    std::uint64_t frames_settled_ = 0;  ///< frames_ when everything had settled last
+    bool came_ = false;                 ///< a newcomer that was taken
+    bool displaced_ = false;            ///< somebody had to go for it
     std::map<arbiter::Client, Client> clients_;
     std::map<std::string, int> written_;             ///< times that each write was on the wire
     std::unordered_set<std::string> closed_writes_;  ///< answered, or of nobody any more

@@ -68,12 +68,12 @@ std::uint64_t rank_of(const arbiter::ReadSpan& span) {
 /// Of reads that one transaction answers in any case only one counts: one that another contains
 /// rides. Those that only touch are joined as far as a panel is known to take the length, which is
 /// not known here: they count.
-std::size_t Checker::waiting() const {
+std::size_t Checker::waiting(arbiter::Ticket but_for) const {
     std::size_t waiting = 0;
     std::vector<std::uint64_t> reads;
     reads.reserve(open_.size());
     for (const auto& [ticket, open] : open_) {
-        if ((open.sent && !open.again) || open.gone) continue;
+        if ((open.sent && !open.again) || open.gone || ticket == but_for) continue;
         if (!open.span || !settings_.share_reads) {
             ++waiting;
         } else {
@@ -92,18 +92,29 @@ std::size_t Checker::waiting() const {
     return waiting;
 }
 
+/// One that waits contains it: it does not count.
+bool Checker::rides(const Open& newcomer) const {
+    if (!newcomer.span || !settings_.share_reads) return false;
+    return std::ranges::any_of(open_, [&](const auto& entry) {
+        const Open& o = entry.second;
+        return &o != &newcomer && (!o.sent || o.again) && !o.gone && o.span &&
+               o.span->contains(*newcomer.span);
+    });
+}
+
 /// A newcomer may not raise what waits beyond the limit. More than it may wait all the same: what
 /// was taken for a joined read and refused by the panel waits again, and what rode along with a
 /// read that has gone counts again, when it was behind something older of its own client. A
 /// newcomer takes somebody's place then. Where a frame has left in the same moment nobody can tell
 /// which it was.
 void Checker::on_settled() {
-    const std::size_t before = std::exchange(waiting_before_, kNobodyCame);
+    const bool came = std::exchange(came_, false);
     const bool gone = std::exchange(frames_settled_, frames_) != frames_;
-    if (before == kNobodyCame || gone || displaced_ || open_.size() <= settings_.queue.limit)
-        return;
+    if (!came || gone || displaced_ || open_.size() <= settings_.queue.limit) return;
+    const auto newcomer = open_.find(last_ticket_);
+    if (newcomer == open_.end() || rides(newcomer->second)) return;
     const std::size_t after = waiting();
-    if (after > settings_.queue.limit && after > before)
+    if (after > settings_.queue.limit && after > waiting(last_ticket_))
         fail("P9: more requests wait than the limit allows: " + std::to_string(after) + " of " +
              std::to_string(settings_.queue.limit));
 }
