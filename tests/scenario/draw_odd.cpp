@@ -2,7 +2,6 @@
 #include <cstdlib>
 
 #include "draw.hpp"
-#include "panelgate/base/serial_format.hpp"
 
 namespace panelgate::scenario {
 namespace {
@@ -55,10 +54,8 @@ constexpr Oddness kThreats[] = {
     {Oddity::reboots, [](Plan&, PanelPlan& p) { p.reboots = 10s; }},
     {Oddity::babbles,
      [](Plan& all, PanelPlan&) {
-         // As much as leaves nine tenths of the line to others.
-         constexpr std::size_t kLongest = 13;
-         const Duration frame = frame_time(all.settings.serial, kLongest);
-         all.line.babble = all.seed % 2 == 0 ? std::max<Duration>(100ms, 10 * frame) : Duration(5s);
+         // What hits a request costs its timeout (T1): more often, and the line is of no use.
+         all.line.babble = all.seed % 2 == 0 ? Duration(1s) : Duration(5s);
      }},
     {Oddity::answers_broadcasts,
      [](Plan& all, PanelPlan& p) {
