@@ -85,7 +85,7 @@ void Arbiter::apply(Settings settings) {
 }
 
 Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
-    if ((!up_ && !suspended_) || resetting_) return Fault::line_down;
+    if (!up_ && !suspended_) return Fault::line_down;
     if (auto known = from_memory(now, job)) {
         outbox_.finish_from_memory(++last_ticket_, std::move(known->pdu), known->age);
         return last_ticket_;
@@ -204,8 +204,11 @@ void Arbiter::on_line_up(TimePoint now) {
 }
 
 /// A sent request stays outstanding: a device server may hand its reply to the next connection (T8).
+/// Requests that wait stay where the line itself asked for a new connection, and had been heard.
 void Arbiter::on_line_down(TimePoint now) {
+    const bool keeps = resetting_ && mute_.ever_heard;
     forget_line();
+    suspended_ = keeps;
     if (active_) {
         for (const Attempt::Heard& heard : active_->take_heard())
             judge_part(now, heard.part, false);
@@ -223,6 +226,7 @@ void Arbiter::on_line_down(TimePoint now) {
         outbox_.report(attempt, TransactionEnd::line_down);
         for (const Job& job : group.jobs) outbox_.finish(job, Fault::line_lost);
     }
+    if (keeps) return;
     for (const Job& job : schedule_.backlog().clear())
         outbox_.finish(job, job.attempts > 0 ? Fault::line_lost : Fault::line_down);
 }
@@ -409,7 +413,7 @@ void Arbiter::check_invariants() const {
     const Backlog& backlog = schedule_.backlog();
     must(backlog.queue().waiting() >= backlog.queue().size(), "those that count are among all");
     must(up_ || !active_, "a line that is down carries nothing");
-    must(up_ || backlog.empty(), "a line that is down has nothing waiting");
+    must(up_ || suspended_ || backlog.empty(), "a line that is down has nothing waiting");
     must(up_ || !resetting_, "a line that is down is not to be reset");
     for (const Group& group : backlog.retries()) {
         must(!group.abandoned(), "a request waits for each retry");

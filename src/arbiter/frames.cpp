@@ -147,7 +147,11 @@ Duration Arbiter::carry_out(TimePoint now, const Unused& part, Done done) {
 Duration Arbiter::take_late(TimePoint now, const Unused& part) {
     const std::uint8_t id = part.bytes[0];
     Station& station = stations_.of(id);
-    const auto asked = stations_.outstanding().on_late(now, id, modbus::pdu_of(part.bytes));
+    const ByteView pdu = modbus::pdu_of(part.bytes);
+    const bool is_open = active_ && active_->group().station == id &&
+                         modbus::answers(active_->group().request.pdu(), pdu,
+                                         active_->group().request.byte_count());
+    const auto asked = stations_.outstanding().on_late(now, id, pdu, is_open);
     const Duration lateness =
         std::max(now - asked->sent - station.settings().response_timeout, Duration{});
     stations_.outstanding().on_delivered(now, asked->sent, station.latest_reply());

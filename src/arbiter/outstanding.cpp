@@ -183,11 +183,16 @@ void Outstanding::close(Page& page, unsigned epoch, TimePoint sent) {
     });
 }
 
-bool Outstanding::on_reply(TimePoint now, std::uint8_t station, Asked asked, ByteView reply) {
+void Outstanding::set_last_reply(TimePoint now, std::uint8_t station, ByteView reply) {
     Page& all = page(station);
-    asked.epoch = epoch_;
     all.reply.assign(reply.begin(), reply.end());
     all.replied = now;
+}
+
+bool Outstanding::on_reply(TimePoint now, std::uint8_t station, Asked asked, ByteView reply) {
+    set_last_reply(now, station, reply);
+    Page& all = page(station);
+    asked.epoch = epoch_;
     const auto equal = std::ranges::find_if(all.asked, [&](const Asked& old) {
         return is_ours(old, now) && is_same(old, asked.pdu);
     });
@@ -201,25 +206,20 @@ bool Outstanding::on_reply(TimePoint now, std::uint8_t station, Asked asked, Byt
     return false;
 }
 
-std::optional<Asked> Outstanding::on_late(TimePoint now, std::uint8_t station, ByteView reply) {
+std::optional<Asked> Outstanding::on_late(TimePoint now, std::uint8_t station, ByteView reply,
+                                          bool is_open) {
     const Asked* const found = answered_by(now, station, reply);
     if (found == nullptr) return std::nullopt;
     Asked answered = *found;
+    set_last_reply(now, station, reply);
     Page& all = page(station);
-    all.reply.assign(reply.begin(), reply.end());
-    all.replied = now;
     const bool is_sure = std::ranges::none_of(all.asked, [&](const Asked& asked) {
         return is_ours(asked, now) && asked.epoch != answered.epoch &&
                asked.may_be_answered(reply);
     });
-    if (is_sure) close(all, answered.epoch, answered.sent);
+    if (is_sure && (!is_open || answered.epoch == epoch_))
+        close(all, answered.epoch, answered.sent);
     return answered;
-}
-
-void Outstanding::on_repeated(TimePoint now, std::uint8_t station, ByteView reply) {
-    Page& all = page(station);
-    all.reply.assign(reply.begin(), reply.end());
-    all.replied = now;
 }
 
 void Outstanding::on_other_answered(TimePoint now, std::uint8_t station, ByteView reply) {

@@ -20,10 +20,9 @@ void Station::apply(const StationSettings& settings, const OfflineSettings& offl
 }
 
 Condition Station::condition() const {
-    constexpr int kFlaky = 4;  // of the last eight attempts
     if (health_.offline()) return Condition::offline;
     if (failed_reads_ + failed_writes_ > 1) return Condition::failing;
-    if (std::popcount(lately_) >= kFlaky) return Condition::flaky;
+    if (is_flaky()) return Condition::flaky;
     if (failed_reads_ + failed_writes_ > 0 || (lately_ & 1) != 0) return Condition::missed;
     return health_.last_heard() ? Condition::well : Condition::unheard;
 }
@@ -76,10 +75,11 @@ bool Station::on_late(TimePoint now, Duration lateness) {
 void Station::on_failed(TimePoint now, const Attempt& attempt, Verdict verdict, bool learns_holes) {
     failed_ = now;
     if (attempt.group().probe && !health_.offline()) reads_.on_unanswered(attempt.group().request);
-    const int silent = verdict == Verdict::silent ? 1 : 0;
-    lately_ = static_cast<std::uint8_t>(lately_ << 1 | silent);
-    if (!attempt.group().request.is_read())
-        rests_until_ = std::max(rests_until_, now + settings_.after_write);
+    const bool is_read = attempt.group().request.is_read();
+    // An ignored write says nothing about reads (T14).
+    const bool counts = verdict == Verdict::silent && (is_read || !answers_reads());
+    lately_ = static_cast<std::uint8_t>(lately_ << 1 | (counts ? 1 : 0));
+    if (!is_read) rests_until_ = std::max(rests_until_, now + settings_.after_write);
     if (learns_holes && verdict == Verdict::damaged && attempt.was_cut_off())
         hole_.on_broken(now, std::max(attempt.longest_pause(), attempt.timing().hole),
                         settings_.response_timeout);

@@ -97,15 +97,18 @@ bool Stations::refuses(TimePoint now, const Job& job) {
 
 bool Stations::may_spend(TimePoint now, const Job& job) const {
     const Station* const station = find(job.station);
-    if (station == nullptr || !station->is_doubtful(job.request.is_read())) return true;
-    return suspects_.allows(now, credit());
+    const bool is_read = job.request.is_read();
+    return station == nullptr || !station->is_doubtful(is_read) ||
+           budget_for(*station, is_read).allows(now, credit());
 }
 
 TimePoint Stations::held_until(const Job& job) const {
     const Station* const station = find(job.station);
     if (station == nullptr) return {};
-    if (!station->is_suspect(job.request.is_read()) && !station->speculative()) return {};
-    return std::min(suspects_.next() - credit(), others_active_until(job.station));
+    const bool is_read = job.request.is_read();
+    if (!station->is_suspect(is_read) && !station->speculative()) return {};
+    return std::min(budget_for(*station, is_read).next() - credit(),
+                    others_active_until(job.station));
 }
 
 TimePoint Stations::others_active_until(std::uint8_t id) const {
@@ -120,15 +123,16 @@ TimePoint Stations::others_active_until(std::uint8_t id) const {
     return until;
 }
 
-void Stations::on_failed(TimePoint now, std::uint8_t id, Duration cost) {
+void Stations::on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration cost) {
     constexpr int kMemory = 3;  // whole timeouts, or failures of this cost
-    if (of(id).health().offline()) {
+    const Station& station = of(id);
+    if (station.health().offline()) {
         offline_.spend(now, cost);
         alone_.spend(now, cost);
         return;
     }
     const Duration most = kMemory * suspects_.time_for(std::max(unlisted_.response_timeout, cost));
-    suspects_.spend(now, cost, most);
+    (!is_read && station.answers_reads() ? ignored_writes_ : suspects_).spend(now, cost, most);
 }
 
 void Stations::on_broadcast(const Asked& broadcast) {

@@ -113,10 +113,10 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     const TimePoint sent = attempt.timing().sent;
     const Duration cost = now - attempt.timing().started + stations_.gap(group.station);
     const Condition before = station.condition();
-    const bool affordable = stations_.affords_retry(now, group.station);
+    const bool affordable = stations_.affords_retry(now, station);
     stations_.outstanding().add(group.station, asked_of(attempt, settings_.may_stall));
     station.on_failed(now, attempt, verdict, settings_.learns_holes);
-    stations_.on_failed(now, group.station, cost);
+    stations_.on_failed(now, group.station, group.request.is_read(), cost);
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
         quiet_.quarantine(now, group.station, *until);
         outbox_.decide({.at = now,

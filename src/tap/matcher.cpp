@@ -128,7 +128,7 @@ void Matcher::on_reply(const Piece& piece) {
     // T12. Looked at first: a duplicate does not close a request that is still to be answered.
     if (outstanding_.is_last_reply(piece.end, station, pdu_of(piece), settings_.usual_give_up))
         return note(FrameKind::copy, station, piece);
-    auto late = outstanding_.on_late(piece.end, station, pdu_of(piece));
+    auto late = outstanding_.on_late(piece.end, station, pdu_of(piece), false);
     if (!late && open_ && open_->request.station == station) open_->wrong = true;
     note(late ? FrameKind::late : FrameKind::foreign, station, piece);
     if (late && announces_reply(pdu_of(piece))) expect_announced(station, *late, piece.end);
@@ -247,8 +247,8 @@ void Matcher::remember(const Transaction& made) {
     if (!made.doubtful) {
         outstanding_.on_reply(made.ended, made.station, request, made.reply);
     } else {
-        const auto late = outstanding_.on_late(made.ended, made.station, made.reply);
-        if (!late) outstanding_.on_repeated(made.ended, made.station, made.reply);
+        const auto late = outstanding_.on_late(made.ended, made.station, made.reply, false);
+        if (!late) outstanding_.set_last_reply(made.ended, made.station, made.reply);
         if (late && announced) expect_announced(made.station, *late, made.ended);
         outstanding_.add(made.station, request);
     }

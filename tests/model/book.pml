@@ -1,17 +1,19 @@
-/* The rules by which one line tells whose a reply is (src/arbiter/README.md, "Outstanding replies"), for spin.
+/* The rules by which one line tells whose a reply is (T2, T8, T10; src/arbiter/outstanding.hpp), for spin.
  *
- * Two stations on one wire, requests of two clients, every order of loss, delay, repetition and reconnection.
- * A frame shows its station and its form (function and length, or the fields that a write echoes), never for whom
- * it was made: two requests of one form to one station cannot be told apart by their replies.
+ * Stations on one wire, requests of clients and proofs, every order of loss, delay and reconnection. A frame shows
+ * its station, its function and its form (a length, or the fields that a write echoes), an exception its function
+ * alone: two requests that a frame fits cannot be told apart by the frame.
  *
  * P1: whatever is accepted was made for the very request that it answers.   P2: no write is transmitted twice.
  *
- * Time is one assumption (A): what a window waits for has come or never comes when it ends. Broken on purpose:
+ * Time is one assumption (A): what a window waits for has come or never comes when the window ends. Left out:
+ * copies (T12), broadcasts (T11), other masters (T9), echoes (T6). Broken on purpose:
  *   -DNO_FORM     a request is sent although its reply looks like an outstanding one
+ *   -DNO_FUNCTION ... although an exception could be that to an outstanding request
  *   -DNO_WINDOW   a window ends whenever it likes
  *   -DNO_BOOK     an attempt that ends without its reply is forgotten
- *   -DNO_DOUBT    a repetition of an earlier reply is taken for an answer
- *   -DNO_OLDEST   a refusal is the open request's, whatever else is outstanding
+ *   -DNO_OLDEST   a refusal is the proof's, whatever else is outstanding
+ *   -DNO_AGAIN    the reply to a retry is the retry's, and nothing of its request is outstanding any more
  *   -DNO_ORDER    a reply closes the oldest request that it fits, also where others left over another connection
  *   -DFORGET_OLD  a reconnection forgets what was outstanding
  *   -DRETRY_ALL   a write is repeated like a read
@@ -30,34 +32,41 @@
 
 /* What clients ask. */
 byte asked;                             /* requests so far */
-byte station[REQUESTS], form[REQUESTS], tries[REQUESTS];
-bool writes[REQUESTS], done[REQUESTS], executed[REQUESTS];
+byte station[REQUESTS], function[REQUESTS], form[REQUESTS], tries[REQUESTS];
+bool writes[REQUESTS], proves[REQUESTS], done[REQUESTS], executed[REQUESTS];
 
 /* Each transmission, in the order in which they leave. */
 byte sent;
 byte whose[ATTEMPTS], epoch[ATTEMPTS], reply[ATTEMPTS];
-mtype = { unsent, travels, answers, repeats, gone };
+mtype = { unsent, travels, answers, gone };
 mtype way[ATTEMPTS] = unsent;           /* where it, or its reply, really is */
 bool outstanding[ATTEMPTS];             /* what the gateway believes */
-bool seen[ATTEMPTS];                    /* these bytes have been heard */
 
 byte now_epoch;
 byte open = NONE;                       /* the attempt that is waited for */
-bool refusal_rejected;                  /* of this attempt */
 
 #define OF(t) whose[t]
 #define SAME_STATION(t, q) (station[OF(t)] == station[q])
-#define FITS(f, q) (f == REFUSED || f == form[q])
+/* The frame that answers t may answer q. */
+#define FITS(t, q) (SAME_STATION(t, q) && function[OF(t)] == function[q] && (reply[t] == REFUSED || reply[t] == form[q]))
 
 bool ok; byte i, oldest;
 
-/* True if nothing outstanding could be taken for the reply to q. */
+/* True if nothing outstanding could be taken for the reply to q; of a proof: for its normal reply. */
 inline judge_admission(q)
 {
     ok = true;
     for (i : 0 .. ATTEMPTS - 1) {
         if
-        :: outstanding[i] && SAME_STATION(i, q) && form[OF(i)] == form[q] && !(OF(i) == q) -> ok = false
+        :: outstanding[i] && SAME_STATION(i, q) && function[OF(i)] == function[q] && !(OF(i) == q) ->
+            if
+#ifndef NO_FUNCTION
+            :: !proves[q] || form[OF(i)] == form[q] -> ok = false
+#else
+            :: form[OF(i)] == form[q] -> ok = false
+#endif
+            :: else
+            fi
         :: else
         fi
     }
@@ -66,13 +75,13 @@ inline judge_admission(q)
 #endif
 }
 
-/* The oldest outstanding request to the station of t that a reply of this form may answer. */
+/* The oldest outstanding request that the frame which answers t may answer. */
 inline find_oldest(t)
 {
     oldest = NONE;
     for (i : 0 .. ATTEMPTS - 1) {
         if
-        :: oldest == NONE && outstanding[i] && SAME_STATION(i, OF(t)) && FITS(reply[t], OF(i)) -> oldest = i
+        :: oldest == NONE && outstanding[i] && FITS(t, OF(i)) -> oldest = i
         :: else
         fi
     }
@@ -95,29 +104,17 @@ inline leave_open()
 #ifndef NO_BOOK
     outstanding[open] = true;
 #endif
-    open = NONE; refusal_rejected = false
+    open = NONE
 }
 
-/* True if an outstanding request other than q may have been refused. */
-inline find_other(t, q)
-{
-    ok = false;
-    for (i : 0 .. ATTEMPTS - 1) {
-        if
-        :: outstanding[i] && SAME_STATION(i, q) && !(OF(i) == q) && FITS(reply[t], OF(i)) -> ok = true
-        :: else
-        fi
-    }
-}
-
-/* True if what this may answer, the open request included, left over different connections. Their order is
-   unknown: it may be the reply to either, so nothing is closed before its window ends. */
+/* True if what this may answer, the open request included, left over different connections: their order is
+   unknown, so nothing is closed before its window ends. */
 inline find_two_connections(t)
 {
-    ok = open != NONE && SAME_STATION(open, OF(t)) && FITS(reply[t], OF(open)) && epoch[open] != epoch[oldest];
+    ok = open != NONE && FITS(t, OF(open)) && epoch[open] != epoch[oldest];
     for (i : 0 .. ATTEMPTS - 1) {
         if
-        :: outstanding[i] && SAME_STATION(i, OF(t)) && FITS(reply[t], OF(i)) && epoch[i] != epoch[oldest] -> ok = true
+        :: outstanding[i] && FITS(t, OF(i)) && epoch[i] != epoch[oldest] -> ok = true
         :: else
         fi
     }
@@ -126,64 +123,51 @@ inline find_two_connections(t)
 #endif
 }
 
-inline late(t)
+inline close_oldest(t)
 {
-    find_oldest(t);
+    find_two_connections(t);
     if
-    :: oldest != NONE ->
-        find_two_connections(t);
-        if
-        :: !ok -> close_before(oldest); outstanding[oldest] = false
-        :: else
-        fi
+    :: !ok -> close_before(oldest); outstanding[oldest] = false
     :: else
     fi
 }
 
 inline accept(t)
 {
-    assert(OF(t) == OF(open));                          /* P1 */
+    assert(proves[OF(open)] || OF(t) == OF(open));      /* P1 */
     assert(!writes[OF(open)] || reply[t] == REFUSED || executed[OF(open)]);
     done[OF(open)] = true;
-    find_oldest(t);
+    oldest = NONE;
+#ifndef NO_AGAIN
+    for (i : 0 .. ATTEMPTS - 1) {
+        if
+        :: oldest == NONE && outstanding[i] && OF(i) == OF(open) -> oldest = i
+        :: else
+        fi
+    }
+#endif
     if
     :: oldest != NONE ->                                /* each attempt may have been answered with it */
-        find_two_connections(t);
-        if
-        :: !ok -> close_before(oldest); outstanding[oldest] = false
-        :: else
-        fi;
+        close_oldest(t);
         outstanding[open] = true
     :: else -> close_before(open)
     fi;
-    open = NONE; refusal_rejected = false
+    open = NONE
 }
 
 inline hear(t)
 {
+    find_oldest(t);
     if
-    :: open != NONE && SAME_STATION(open, OF(t)) && FITS(reply[t], OF(open)) ->
-        ok = false;
+    :: open != NONE && FITS(t, OF(open)) ->
         if
-        :: reply[t] == REFUSED -> find_other(t, OF(open))
-        :: else
-        fi;
-#ifdef NO_OLDEST
-        ok = false;
+#ifndef NO_OLDEST
+        :: reply[t] == REFUSED && oldest != NONE && !(OF(oldest) == OF(open)) -> close_oldest(t)
 #endif
-        if
-        :: ok || (reply[t] == REFUSED && refusal_rejected) -> refusal_rejected = true; late(t)
-        :: else ->
-            if
-#ifndef NO_DOUBT
-            :: seen[t] -> skip                             /* a candidate: the answer is still to come */
-#endif
-            :: else -> accept(t)
-            fi
+        :: else -> accept(t)
         fi
-    :: else -> if :: !seen[t] -> late(t) :: else fi
-    fi;
-    seen[t] = true
+    :: else -> if :: oldest != NONE -> close_oldest(t) :: else fi
+    fi
 }
 
 /* Nothing older of this station is still on its way: assumption A. */
@@ -234,7 +218,13 @@ end:
             fi;
             if
             :: writes[q] = true
+            :: proves[q] = true
             :: true
+            fi;
+            if
+            :: q > 0 && !writes[q] && !writes[0] -> function[q] = 0
+            :: q > 0 -> function[q] = (writes[q] == writes[0] -> 0 : 1)
+            :: else
             fi
         :: asked > 0 -> select(q : 0 .. REQUESTS - 1)
         fi;
@@ -287,10 +277,8 @@ end:
             judge_turn(t, answers);
             if
             :: ok -> hear(t); way[t] = gone
-            :: ok && reply[t] != REFUSED && !writes[OF(t)] -> hear(t); way[t] = repeats
             :: way[t] = gone                            /* lost on its way back, or damaged */
             fi
-        :: way[t] == repeats -> if :: hear(t) :: skip fi; way[t] = gone
         :: else
         fi; t = 0; i = 0; ok = false; oldest = NONE }
     od

@@ -28,7 +28,7 @@ check() {
 
 memory=-DCOLLAPSE
 hash=
-for rule in NO_FORM NO_WINDOW NO_BOOK NO_DOUBT NO_OLDEST NO_ORDER FORGET_OLD RETRY_ALL; do
+for rule in NO_FORM NO_FUNCTION NO_WINDOW NO_BOOK NO_OLDEST NO_AGAIN NO_ORDER FORGET_OLD RETRY_ALL; do
     check 1 "without: $rule" -D$rule
 done
 check 0 "3 requests, 4 attempts" -DATTEMPTS=4

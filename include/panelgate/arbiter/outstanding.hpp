@@ -95,11 +95,13 @@ class Outstanding {
     /// A reply to `asked` was accepted. Returns false if an earlier equal request may have been
     /// answered in its place: then the reply to `asked` itself is outstanding from now on.
     bool on_reply(TimePoint now, std::uint8_t station, Asked asked, ByteView reply);
-    /// A reply came that nobody waits for. Closes the oldest request that it may answer and, of the
-    /// same connection, those before. Returns that request; empty: the reply answers none.
-    std::optional<Asked> on_late(TimePoint now, std::uint8_t station, ByteView reply);
-    /// A reply came once more, or in place of another one.
-    void on_repeated(TimePoint now, std::uint8_t station, ByteView reply);
+    /// A reply came that is not the open request's. Closes the oldest request that the reply may
+    /// answer and, of the same connection, those before; none where requests of two connections fit,
+    /// for their order is unknown. `is_open`: the open request fits as well. Returns the oldest;
+    /// empty: the reply answers none.
+    std::optional<Asked> on_late(TimePoint now, std::uint8_t station, ByteView reply, bool is_open);
+    /// This is the last reply of the station, whatever it answers.
+    void set_last_reply(TimePoint now, std::uint8_t station, ByteView reply);
     /// Another master's request has had its reply.
     void on_other_answered(TimePoint now, std::uint8_t station, ByteView reply);
     /// A request that left at `sent` was answered: what left before is delivered, and its reply

@@ -110,7 +110,7 @@ class Schedule {
 
     Backlog& backlog() { return backlog_; }
     const Backlog& backlog() const { return backlog_; }
-    /// Queues a retry. Behind a silence the jobs that wait by now go first, for as long as the
+    /// Queues a retry. Behind a silence the jobs that wait by now go first, for a quarter of the
     /// station's timeout.
     void retry(TimePoint now, Group group);
     /// Puts the parts of a joined read back, each alone. Returns the jobs whose client has left:

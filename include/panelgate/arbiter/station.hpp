@@ -42,10 +42,11 @@ class Station {
     bool is_suspect(bool is_read) const {
         return failed_reads_ > 0 || (failed_writes_ > 0 && !(is_read && answers_reads()));
     }
-    /// True if it is a suspect, was silent to one of its last eight attempts, or was never heard
-    /// though it was asked: its failures must be within the budget of suspects (P4).
+    /// True if it was silent to more than two of its last eight attempts.
+    bool is_flaky() const { return std::popcount(lately_) > 2; }
+    /// True if its silences must be within the budget of suspects (P4).
     bool is_doubtful(bool is_read) const {
-        return is_suspect(is_read) || lately_ != 0 || (!listed_ && !health_.last_heard());
+        return is_suspect(is_read) || is_flaky() || speculative();
     }
     /// True if nothing shows that its next request may be unanswered: only then reads are retried.
     bool answers_now(bool is_read) const {

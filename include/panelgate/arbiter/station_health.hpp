@@ -79,7 +79,7 @@ class StationHealth {
 class ProbeBudget {
   public:
     static constexpr double kSuspect = 0.2;   ///< of stations whose last requests failed, together
-    static constexpr double kOffline = 0.03;  ///< of offline stations, together
+    static constexpr double kOffline = 0.045;  ///< of offline stations, together: below 5 % with what a probe overruns
     static constexpr double kAlone = 0.5;     ///< ... while an outage of all has only just begun
 
     explicit ProbeBudget(double share) : share_(share) {}

@@ -44,12 +44,14 @@ class Stations {
     bool may_spend(TimePoint now, const Job& job) const;
     /// Time until which a suspect waits for its share while others use the line.
     TimePoint held_until(const Job& job) const;
-    /// True if a retry is within what silence may cost the others.
-    bool affords_retry(TimePoint now, std::uint8_t id) const {
-        return suspects_.allows(now, credit()) || now >= others_active_until(id);
+    /// True if a retry is within what silence may cost the others: that of a station that is seldom
+    /// silent always is.
+    bool affords_retry(TimePoint now, const Station& station) const {
+        return !station.is_flaky() || suspects_.allows(now, credit()) ||
+               now >= others_active_until(station.id());
     }
     /// An attempt that occupied the line for `cost` failed.
-    void on_failed(TimePoint now, std::uint8_t id, Duration cost);
+    void on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration cost);
     /// A station answered.
     void on_reply(TimePoint now) { lively_ = now; }
     /// A station is back: others may be back for the same reason, and are asked at once.
@@ -97,7 +99,13 @@ class Stations {
     std::map<std::uint8_t, StationSettings> configured_;
     std::map<std::uint8_t, Station> stations_;
     Outstanding outstanding_;
+    /// The budget that this request of a doubtful station must be within.
+    const ProbeBudget& budget_for(const Station& station, bool is_read) const {
+        return !is_read && station.answers_reads() ? ignored_writes_ : suspects_;
+    }
+
     ProbeBudget suspects_{ProbeBudget::kSuspect};
+    ProbeBudget ignored_writes_{ProbeBudget::kSuspect};  ///< reads do not pay for them (T14)
     ProbeBudget offline_{ProbeBudget::kOffline};
     ProbeBudget alone_{ProbeBudget::kAlone};
     TimePoint lively_{};  ///< the last reply of any station, or when the line was opened
