@@ -2,6 +2,7 @@
 #include <cstdlib>
 
 #include "draw.hpp"
+#include "panelgate/base/serial_format.hpp"
 
 namespace panelgate::scenario {
 namespace {
@@ -55,7 +56,9 @@ constexpr Oddness kThreats[] = {
     {Oddity::babbles,
      [](Plan& all, PanelPlan&) {
          // What hits a request costs its timeout (T1): more often, and the line is of no use.
-         all.line.babble = all.seed % 2 == 0 ? Duration(1s) : Duration(5s);
+         constexpr std::size_t kFrame = 13;
+         const Duration often = 60 * frame_time(all.settings.serial, kFrame);
+         all.line.babble = all.seed % 2 == 0 ? std::max<Duration>(1s, often) : Duration(5s);
      }},
     {Oddity::answers_broadcasts,
      [](Plan& all, PanelPlan& p) {
