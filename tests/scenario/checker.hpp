@@ -193,7 +193,8 @@ class Checker : public Witness {
     TimePoint garbled_{};
     std::uint64_t lucky_ = 0;  ///< see is_luck()
     Attempt attempt_;
-    std::map<std::uint8_t, bool> silent_before_;  ///< each station's transaction began
+    std::map<std::uint8_t, bool> silent_before_;               ///< each station's transaction began
+    std::unordered_set<std::uint8_t> silent_to_reads_before_;  ///< likewise
     TimePoint sent_until_{};
     TimePoint heard_until_{};
     TimePoint noisy_since_{};  ///< no silence since then

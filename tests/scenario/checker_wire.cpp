@@ -23,7 +23,7 @@ void Checker::on_line_up(TimePoint now) {
 }
 
 void Checker::on_line_down(TimePoint now) {
-    if (!attempt_.answered) watch_.on_unanswered(attempt_.station, !attempt_.heard);
+    if (!attempt_.answered) watch_.on_unanswered(attempt_.station, !attempt_.heard, attempt_.read);
     watch_.on_upset(now);
     attempt_.answered = true;
 }
@@ -56,6 +56,7 @@ void Checker::on_answered(TimePoint now, std::uint8_t station) {
     // The request has left sooner than anybody computes (T7).
     if (!settings_.paced) sent_until_ = std::min(sent_until_, now);
     silent_before_[station] = false;
+    silent_to_reads_before_.erase(station);
     replied_[station] = now;
     const bool is_first = watch_.on_answered(now, station);
     // What the way held back may have reached the station only now, and of two attempts nobody
@@ -101,7 +102,11 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     check_again(station, pdu, what);
     // A retry belongs to the silence that it follows, whoever was asked between.
     bool& was_silent = silent_before_[station];
-    if (what != FrameKind::retry) was_silent = watch_.is_silent(station);
+    if (what != FrameKind::retry) {
+        was_silent = watch_.is_silent(station);
+        silent_to_reads_before_.erase(station);
+        if (watch_.is_silent_to_reads(station)) silent_to_reads_before_.insert(station);
+    }
     if (what == FrameKind::retry) {
         retried_.insert(station);
     } else {
@@ -119,6 +124,7 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     attempt_.dead = dead;
     attempt_.answered = station == kBroadcast;
     attempt_.heard = false;
+    attempt_.read = modbus::is_pure_read(pdu);
     attempt_.like_echo =
         !modbus::is_pure_read(pdu) && std::ranges::equal(modbus::normal_write_reply(pdu), pdu);
     attempt_.span = test::read_span(station, pdu);
@@ -172,7 +178,7 @@ void Checker::close_attempt(TimePoint now) {
         fail("P4: an attempt at a silent station cost " + std::to_string(cost / 1ms) + " ms");
     const std::string broken = costs_.on_unanswered(now, attempt_, wanted);
     if (!broken.empty()) fail(broken);
-    watch_.on_unanswered(attempt_.station, !attempt_.heard);
+    watch_.on_unanswered(attempt_.station, !attempt_.heard, attempt_.read);
     watch_.on_owed(attempt_.station, owed_until());
 }
 
@@ -296,9 +302,7 @@ void Checker::check_write_sent(std::uint8_t station, ByteView pdu) {
 /// Retries are for those who are there, and not for the silent.
 void Checker::check_again(std::uint8_t station, ByteView pdu, FrameKind what) {
     if (what != FrameKind::retry) return;
-    const auto before = silent_before_.find(station);
-    const bool was_silent = before != silent_before_.end() && before->second;
-    if (was_silent && watch_.only_dies(station) && calm_)
+    if (silent_to_reads_before_.contains(station) && watch_.only_dies(station) && calm_)
         fail("P4: a silent station was asked again at once");
     const auto span = test::read_span(station, pdu);
     const bool wanted = std::ranges::any_of(open_, [&](const auto& entry) {

@@ -18,6 +18,7 @@ struct Attempt {
     bool dead = false;        ///< its panel could not answer
     bool was_silent = false;  ///< the station was silent before
     bool answered = true;
+    bool read = false;
     bool heard = false;      ///< anything
     bool like_echo = false;  ///< a write whose confirmation equals the request
     bool again = false;      ///< it was on the wire before

@@ -30,14 +30,15 @@ bool Watch::on_answered(TimePoint now, std::uint8_t station) {
     Station& s = stations_[station];
     const bool was_disturbed = s.disturbed;
     if (was_disturbed) s.settled = now;
-    s.disturbed = s.silent = s.failing = false;
+    s.disturbed = s.silent = s.silent_to_reads = s.failing = false;
     return was_disturbed;
 }
 
-void Watch::on_unanswered(std::uint8_t station, bool silent) {
+void Watch::on_unanswered(std::uint8_t station, bool silent, bool is_read) {
     Station& s = stations_[station];
     s.failing = true;
     s.silent = s.silent || silent;
+    s.silent_to_reads = s.silent_to_reads || (silent && is_read);
 }
 
 void Watch::on_owed(std::uint8_t station, TimePoint until) {
@@ -63,6 +64,11 @@ bool Watch::is_good(std::uint8_t station, TimePoint since) const {
 bool Watch::only_dies(std::uint8_t station) const {
     const Station* s = find(station);
     return s == nullptr || s->only_dies;
+}
+
+bool Watch::is_silent_to_reads(std::uint8_t station) const {
+    const Station* s = find(station);
+    return s != nullptr && s->silent_to_reads;
 }
 
 bool Watch::is_silent(std::uint8_t station) const {

@@ -19,7 +19,7 @@ class Watch {
     void on_upset(TimePoint now);
     /// It answered. True if that is the first time since a disturbance.
     bool on_answered(TimePoint now, std::uint8_t station);
-    void on_unanswered(std::uint8_t station, bool silent);
+    void on_unanswered(std::uint8_t station, bool silent, bool is_read);
     /// A reply of it may come until then that answers an earlier request.
     void on_owed(std::uint8_t station, TimePoint until);
 
@@ -33,6 +33,8 @@ class Watch {
     bool is_failing(std::uint8_t station) const;
     /// It has not answered since it was last silent.
     bool is_silent(std::uint8_t station) const;
+    /// The same, and it was silent to a read: a write may be ignored (T14).
+    bool is_silent_to_reads(std::uint8_t station) const;
 
   private:
     struct Station {
@@ -40,6 +42,7 @@ class Watch {
         bool only_dies = false;
         bool disturbed = false;
         bool silent = false;
+        bool silent_to_reads = false;
         bool failing = false;
         TimePoint rests{};
         TimePoint settled{};  ///< the last disturbance was over
