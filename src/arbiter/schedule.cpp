@@ -231,13 +231,13 @@ std::optional<Group> Schedule::next_retry(const Line& line) {
     });
 }
 
-/// Behind a silence those who wait go first, for the retry may cost them as much again (P4); for a
-/// quarter of the timeout, because the retry's own client has waited as long as they have.
+/// Behind a silence those who wait go first, for the retry may cost them as much again (P4). Not on a
+/// line that loses frames: there the last retry was answered, and this one's client waits, too.
 bool Schedule::others_go_first(const Line& line) const {
     if (backlog_.retries().empty()) return false;
     const Group& retry = backlog_.retries().front();
-    const Duration most = line.stations.response_timeout(retry.station) / 4;
-    if (!retry.silent || line.now >= retry.retry_since + most) return false;
+    const Duration most = line.stations.response_timeout(retry.station) / 2;
+    if (!retry.silent || loses_frames_ || line.now >= retry.retry_since + most) return false;
     return backlog_.queue().any_first([&](const Job& job) {
         return job.arrived <= retry.retry_since && may_run(line, job) &&
                line.stations.may_spend(line.now, job);

@@ -86,6 +86,7 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
     if (is_own && announces_reply(reply)) outstanding.add(group.station, asked);
     outstanding.on_delivered(now, answered, station.latest_reply());
     stations_.on_reply(now);
+    if (group.silent) schedule_.on_retried(true);
     if (replied.back) stations_.on_recovery();
     explain_condition(now, group.station, before);
     // The reply to a retry may be that to the attempt before: the retry may still be leaving.
@@ -124,6 +125,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
                         .station = group.station,
                         .time = *until - now});
     }
+    if (group.silent) schedule_.on_retried(verdict != Verdict::silent);
     group.silent = verdict == Verdict::silent;
     finish_barred(group);
     const std::uint8_t id = group.station;
