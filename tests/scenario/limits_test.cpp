@@ -37,10 +37,10 @@ constexpr Bound kBounds[] = {
     {Limit::one_behind, 7000, 0},
     {Limit::early, 900, 0},
     {Limit::confirmations, 80, 25},
-    {Limit::two_answers, 450, 20},
+    {Limit::two_answers, 450, 25},
     {Limit::echo_kinds, 2500, 25},
     {Limit::misnumbered, 20, 7},
-    {Limit::damaged_repeated, 20, 20},
+    {Limit::damaged_repeated, 20, 30},
 };
 
 struct Measured {
