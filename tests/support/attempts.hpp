@@ -3,19 +3,13 @@
 #include <cstdint>
 #include <utility>
 
-#include "panelgate/arbiter/attempt/attempt.hpp"
-#include "panelgate/base/serial_format.hpp"
+#include "panelgate/arbiter/attempt.hpp"
+#include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/request.hpp"
 
 namespace panelgate::test {
-
-/// A pty with the default settings.
-inline arbiter::Attempt::Wire default_wire() {
-    return {
-        .serial = {}, .end_of_frame = 20ms, .reply_hole = 60ms, .paced = false, .may_stall = false};
-}
 
 /// One job alone, sent `attempts` times with this one.
 inline arbiter::Group group_of(std::uint8_t station, const Bytes& pdu, int attempts = 1) {
@@ -27,15 +21,21 @@ inline arbiter::Group group_of(std::uint8_t station, const Bytes& pdu, int attem
             .attempts = attempts};
 }
 
-/// An attempt that began in time to have left at `sent`, and was answered at `now`.
+/// Times of a request of `size` bytes that is handed over at `now` and waited for 500 ms.
+inline arbiter::Attempt::Timing timing_of(TimePoint now, std::size_t size,
+                                          const arbiter::Settings& line = {}) {
+    arbiter::Attempt::Timing timing =
+        arbiter::Attempt::timing_of(line, now, size, Duration::zero());
+    timing.patience = 500ms;
+    return timing;
+}
+
+/// An attempt whose request had left at `sent`, and which has heard `reply` at `now`.
 inline arbiter::Attempt answered(TimePoint sent, TimePoint now, arbiter::Group group,
                                  const Bytes& reply) {
-    arbiter::Attempt::Timing timing =
-        arbiter::Attempt::timing_of(default_wire(), sent, 0, Duration::zero());
-    timing.patience = timing.usual = 1min;
     const Bytes adu = modbus::encode_adu(group.station, reply);
-    arbiter::Attempt attempt(std::move(group), timing, {});
-    attempt.on_rx(now, adu, [](ByteView) { return false; });
+    arbiter::Attempt attempt(std::move(group), timing_of(sent, 0), {}, {});
+    attempt.on_rx(now, adu);
     return attempt;
 }
 

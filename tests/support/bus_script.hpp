@@ -65,6 +65,13 @@ class BusScript {
         drain();
         return ticket;
     }
+    /// Not recorded: a job that no step describes.
+    arbiter::Ticket submit_job(const arbiter::Job& job) {
+        const Result<arbiter::Ticket> ticket = arbiter_.submit(now_, job);
+        EXPECT_TRUE(ticket.has_value());
+        drain();
+        return ticket ? *ticket : 0;
+    }
     void cancel(arbiter::Client client) {
         record({.verb = BusStep::Verb::cancel, .client = client});
         arbiter_.cancel(now_, client);

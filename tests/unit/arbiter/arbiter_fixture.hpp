@@ -7,6 +7,7 @@
 
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "support/bus_script.hpp"
@@ -19,6 +20,8 @@ using test::BusScript;
 inline const Bytes kRead = "03 00 6B 00 03"_hex;
 inline const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
 inline const Bytes kWrite = "06 00 01 00 03"_hex;
+/// From the end of a request to the end of the wait for its reply.
+inline constexpr Duration kSilence = 500ms + timing::kListensAgain;
 
 /// A read of three registers that touches no other one with another number.
 inline Bytes read_at(unsigned number) { return Writer().u8(3).u16(100 * number).u16(3).take(); }
@@ -61,24 +64,6 @@ inline void expect_answer_at(BusScript& bus, Ticket ticket, TimePoint at) {
     EXPECT_TRUE(bus.answered(ticket));
 }
 
-/// P1: a late reply of the same shape answers no request and ends the rest.
-inline void expect_no_answer_by_a_late_reply(Settings settings) {
-    settings.stations[0].retries = 0;
-    BusScript bus{settings};
-    const Ticket first = bus.submit(17, read_at(1), 1);
-    const Ticket second = bus.submit(17, read_at(2), 2);
-    while (!bus.answered(first)) bus.run_for(1ms);
-    bus.run_for(300ms);
-    bus.hear_reply(17, kReply);  // of the first: same station, function and length
-    bus.run_for(100ms);
-    EXPECT_FALSE(bus.answered(second));
-    ASSERT_EQ(bus.events.size(), 1u);
-    EXPECT_EQ(bus.events[0].kind, StationEvent::Kind::late);
-    ASSERT_EQ(bus.sent.size(), 2u);
-    bus.hear_reply(17, reply_number(2));
-    EXPECT_EQ(bus.answer(second).pdu.value(), reply_number(2));
-}
-
 /// The arbiter of a line with the stations 17 and 18.
 class ArbiterTest : public testing::Test {
   protected:
@@ -89,54 +74,6 @@ class ArbiterTest : public testing::Test {
     Settings settings = settings_38400();
     BusScript bus{settings};
     Duration gap = silent_interval(settings.serial);
-};
-
-/// Two panels that need 12 ms, heard often enough.
-class ArbiterAnswersTest : public ArbiterTest {
-  protected:
-    void know(std::uint8_t station = 17, Duration after = 12ms) {
-        for (unsigned i = 1; i <= RecentTimes::kEnough; ++i) read(station, i, after);
-    }
-    void read(std::uint8_t station, unsigned number, Duration after = 12ms) {
-        script.run_for(10ms);
-        script.submit(station, read_at(number), 1);
-        answer(script, station, reply_number(number), after);
-    }
-    Ticket ask(unsigned number) {
-        script.run_for(10ms);
-        return script.submit(17, read_at(number), 1);
-    }
-    /// All that comes is an answer before the request has left; asked again it answers in time.
-    void ask_behind_an_early(unsigned number, const Bytes& early) {
-        const Ticket ticket = ask(number);
-        script.hear_reply(17, early);
-        EXPECT_FALSE(script.answered(ticket));
-        ASSERT_TRUE(script.next_sent(200ms));
-        answer(script, 17, reply_number(1000 + number), 12ms);
-        EXPECT_EQ(value(ticket), reply_number(1000 + number));
-        script.run_for(2s);
-    }
-    /// Behind the first answer a second one comes, 4 ms later.
-    void answer_twice(unsigned first, unsigned second) {
-        answer(script, 17, reply_number(first), 12ms);
-        script.run_for(4ms);
-        script.hear_reply(17, reply_number(second));
-    }
-    /// Answers that nobody asked for have come behind those that were.
-    void knows_surplus() {
-        for (const unsigned i : {1u, 20u}) {
-            read(17, i);
-            script.run_for(4ms);
-            script.hear_reply(17, reply_number(500 + i));
-            for (unsigned k = 1; k < 10; ++k) read(17, i + k);
-        }
-    }
-    Bytes value(Ticket ticket) {
-        const bool good = script.answered(ticket) && script.answer(ticket).pdu.has_value();
-        return good ? script.answer(ticket).pdu.value() : Bytes{};
-    }
-
-    BusScript script{settings};
 };
 
 }  // namespace panelgate::arbiter

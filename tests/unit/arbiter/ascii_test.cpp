@@ -54,18 +54,6 @@ TEST_F(AsciiLine, HandsTheReplyOnAtItsLastCharacter) {
     EXPECT_EQ(bus.answer(ticket).at, bus.now());
 }
 
-/// P4: its first characters, bytes that nobody says, and then all of it.
-TEST_F(AsciiLine, AReplyThatBreaksOffMayBeginAnew) {
-    const Ticket ticket = ask(kWrite);
-    const Bytes confirmed = modbus::encode_ascii(17, kWrite);
-    bus.hear_paced(ByteView(confirmed).first(5));
-    bus.hear_paced("00 12 3C CD 00 45 00 00 BF"_hex);
-    bus.hear_paced(modbus::encode_ascii(40, kReply));
-    EXPECT_FALSE(bus.answered(ticket));
-    bus.hear_paced(confirmed);
-    EXPECT_EQ(told(ticket).value(), kWrite);
-}
-
 /// Of a pause the characters count, not the bytes.
 TEST_F(AsciiLine, AReplyGoesOnWithEachCharacter) {
     for (const std::size_t front : {6u, 7u, 8u}) {
@@ -81,14 +69,6 @@ TEST_F(AsciiLine, AReplyGoesOnWithEachCharacter) {
         script.hear_paced(ByteView(kReplyText).subspan(front + 1));
         EXPECT_EQ(script.answer(ticket).pdu.value(), kReply) << front;
     }
-}
-
-TEST_F(AsciiLine, CountsTheTimeoutFromTheEndOfItsLongerRequest) {
-    settings.stations[0].retries = 0;
-    BusScript script{settings};
-    const Ticket ticket = script.submit(17, kRead);
-    expect_answer_at(script, ticket, script.now() + wire_time(settings.serial, 17) + 500ms);
-    EXPECT_EQ(script.answer(ticket).pdu.error(), Fault::timeout);
 }
 
 TEST_F(AsciiLine, LowerCaseIsTakenOnlyWhereConfiguredAndElseCountedAsThat) {
@@ -122,34 +102,6 @@ TEST_F(AsciiLine, AWrongLrcIsDamageAndTheReadGoesAgainAtOnce) {
     EXPECT_EQ(told(ticket).value(), kReply);
 }
 
-TEST_F(AsciiLine, P1TwoAnswersInOneReadThatDifferAreNone) {
-    const Bytes other = "03 06 00 00 00 00 00 64"_hex;
-    ask(read_at(7));
-    bus.hear(modbus::encode_ascii(17, reply_number(7)));
-    bus.run_for(10ms);
-    const Ticket ticket = ask();
-    Bytes both = modbus::encode_ascii(17, other);
-    both.insert(both.end(), kReplyText.begin(), kReplyText.end());
-    bus.hear(both);
-    EXPECT_FALSE(bus.answered(ticket));
-    ASSERT_TRUE(bus.next_sent(1s));
-    answer(bus, 17, kReply, 2ms);
-    EXPECT_EQ(told(ticket).value(), kReply);
-}
-
-TEST_F(AsciiLine, P1ALateReplyAnswersNoRequestAndEndsTheRest) {
-    expect_no_answer_by_a_late_reply(settings);
-}
-
-TEST_F(AsciiLine, APauseOfASecondInsideTheReplyIsWaitedFor) {
-    const Ticket ticket = ask();
-    bus.hear(ByteView(kReplyText).first(9));
-    bus.run_for(990ms);
-    EXPECT_FALSE(bus.answered(ticket));
-    bus.hear(ByteView(kReplyText).subspan(9));
-    EXPECT_EQ(told(ticket).value(), kReply);
-}
-
 TEST_F(AsciiLine, P1WhatComesAfterALongerPauseIsNoReply) {
     settings.stations[0].retries = 0;
     BusScript script{settings};
@@ -175,35 +127,13 @@ TEST_F(AsciiLine, StepsOverWhatStandsInFrontOfTheReply) {
     }
 }
 
-TEST_F(AsciiLine, AGoodFrameOfAnotherStationIsForeignAndTheReplyBehindItCounts) {
-    const Ticket ticket = ask();
-    bus.hear_reply(18, kReply);
-    EXPECT_FALSE(bus.answered(ticket));
-    bus.hear_reply(17, kReply);
-    EXPECT_EQ(told(ticket).value(), kReply);
-    EXPECT_EQ(counters().foreign_frames, 1u);
-}
-
 TEST_F(AsciiLine, P1AReplyOfAnotherLengthIsNone) {
     const Ticket ticket = ask();
     bus.hear_reply(17, "03 04 02 2B 00 00"_hex);
     EXPECT_FALSE(bus.answered(ticket) && told(ticket).has_value());
-    // A byte of 00 that was lost leaves the LRC right.
+    // A lost byte of 00 leaves the LRC right.
     bus.hear_reply(17, "03 06 02 2B 00 00 64"_hex);
     EXPECT_FALSE(bus.answered(ticket) && told(ticket).has_value());
-}
-
-TEST_F(AsciiLine, P1AFrameOfRtuIsNoReply) {
-    const Ticket ticket = ask();
-    bus.hear(modbus::encode_adu(17, kReply));
-    bus.run_for(5s);
-    EXPECT_FALSE(told(ticket).has_value());
-}
-
-TEST_F(AsciiLine, P1AReplyInsideAnotherFrameIsNone) {
-    const Ticket ticket = ask();
-    bus.hear_reply(18, Writer().u8(3).u8(11).raw(modbus::encode_adu(17, kReply)).take());
-    EXPECT_FALSE(bus.answered(ticket));
 }
 
 TEST_F(AsciiLine, TheEchoIsTakenOut) {
@@ -228,20 +158,6 @@ TEST_F(AsciiLine, TheEchoIsTakenOut) {
     EXPECT_TRUE(script.answered(write));
 }
 
-TEST_F(AsciiLine, ADamagedEchoIsACollision) {
-    settings.echo = EchoMode::on;
-    settings.stations[0].retries = 0;
-    BusScript script{settings};
-    const Ticket ticket = script.submit(17, kRead);
-    script.run_to_end_of_request();
-    Bytes bad = script.sent.back().adu;
-    bad[7] ^= 1;
-    script.hear(bad);
-    script.run_for(1s);
-    EXPECT_EQ(script.answer(ticket).pdu.error(), Fault::damaged);
-    EXPECT_EQ(script.arbiter().station_counters().at(17).echo_mismatches, 1u);
-}
-
 TEST_F(AsciiLine, NothingIsSentIntoAFrameThatHasBegun) {
     const TimePoint begun = bus.now();
     bus.hear(text(":"));
@@ -252,24 +168,6 @@ TEST_F(AsciiLine, NothingIsSentIntoAFrameThatHasBegun) {
     EXPECT_TRUE(bus.sent.empty());
     bus.hear(text("0269\r\n"));
     EXPECT_LT(bus.next_sent().value().at - begun, 30ms);
-}
-
-TEST_F(AsciiLine, ASingleColonBlocksTheLineOnlyBriefly) {
-    bus.hear(text(":"));
-    bus.submit(17, kRead);
-    const TimePoint begun = bus.now();
-    EXPECT_LE(bus.next_sent().value().at - begun, 25ms);
-}
-
-TEST_F(AsciiLine, ARefusalIsHandedOnAndOneOfAnotherFunctionEndsTheAttempt) {
-    const Ticket refused = ask();
-    bus.hear_reply(17, "83 02"_hex);
-    EXPECT_EQ(told(refused).value(), "83 02"_hex);
-    const Ticket other = ask(read_at(3));
-    bus.hear_reply(17, "90 02"_hex);
-    const TimePoint heard = bus.now();
-    EXPECT_LT(bus.next_sent().value().at - heard, 1s);
-    EXPECT_FALSE(bus.answered(other));
 }
 
 TEST_F(AsciiLine, AReplyOfUnknownLengthNeedsNoSilence) {

@@ -1,5 +1,5 @@
-// The line hears what it sends: that is learned, taken out, and confirms no write (P8).
-#include "panelgate/arbiter/habits/echo.hpp"
+// A line with an echo: the echo is learned, taken out, and confirms no write (P8, T6).
+#include "panelgate/arbiter/echo.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,6 @@
 #include <cstddef>
 
 #include "arbiter_fixture.hpp"
-#include "panelgate/arbiter/habits/reply_times.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 #include "support/request.hpp"
@@ -15,23 +14,87 @@
 namespace panelgate::arbiter::echo_test {
 namespace {
 
+using Expect = EchoFilter::Expect;
 using modbus::encode_adu;
+using test::request_of;
 
+const Bytes kFrame = "11 06 00 01 00 03 9A 9B"_hex;
 const Bytes kWriteCoil = "05 00 01 FF 00"_hex;
-constexpr int kNoMore = 16;  ///< replies without an echo after which a known one is gone
+constexpr int kNoMore = 16;  ///< replies without an echo, after which a known echo is gone
 
-class Echo : public testing::Test {
+Bytes copy(ByteView bytes) { return {bytes.begin(), bytes.end()}; }
+
+TEST(EchoFilter, TakesTheWholeFrameOutInAnyPieces) {
+    const Bytes all = Writer().raw(kFrame).u8(0xAA).u8(0xBB).take();
+    for (std::size_t piece = 1; piece <= kFrame.size(); ++piece) {
+        EchoFilter filter(kFrame, Expect::certainly);
+        Writer rest;
+        for (std::size_t at = 0; at < all.size(); at += piece)
+            rest.raw(filter.feed(ByteView(all).subspan(at, std::min(piece, all.size() - at))));
+        EXPECT_EQ(rest.take(), "AA BB"_hex);
+        EXPECT_TRUE(filter.complete());
+        EXPECT_FALSE(filter.mismatch());
+    }
+}
+
+TEST(EchoFilter, DetectsADifferenceAndReturnsWhatItBuffered) {
+    for (const Expect expect : {Expect::certainly, Expect::perhaps}) {
+        EchoFilter filter(kFrame, expect);
+        EXPECT_TRUE(filter.feed("11 06 00"_hex).empty());
+        EXPECT_EQ(filter.pending(), expect == Expect::perhaps);
+        EXPECT_EQ(copy(filter.feed("FF 01"_hex)), "11 06 00 FF 01"_hex);
+        EXPECT_EQ(filter.mismatch(), expect == Expect::certainly);
+        EXPECT_FALSE(filter.pending());
+    }
+}
+
+TEST(Echo, OnlyARequestWhoseReplyCannotEqualItTeaches) {
+    EXPECT_TRUE(teaches_echo(request_of(kRead)));
+    EXPECT_TRUE(teaches_echo(request_of("10 00 01 00 01 02 00 03"_hex)));
+    EXPECT_FALSE(teaches_echo(request_of(kWriteCoil)));
+    EXPECT_FALSE(teaches_echo(request_of("01 03 00 00 18"_hex)))
+        << "the reply with 24 coils has 8 bytes, too";
+}
+
+TEST(EchoMemory, P8FollowsTheModeOrLearnsWhatReadsShow) {
+    EXPECT_EQ(EchoMemory(EchoMode::on).expect(), Expect::certainly);
+    EXPECT_EQ(EchoMemory(EchoMode::off).expect(), Expect::nothing);
+    EchoMemory memory(EchoMode::automatic);
+    EXPECT_EQ(memory.expect(), Expect::perhaps);
+    EXPECT_TRUE(memory.must_be_learned_before(request_of(kWrite)));
+    EXPECT_FALSE(memory.must_be_learned_before(request_of(kRead)));
+    memory.on_no_echo();
+    EXPECT_EQ(memory.state(), EchoState::absent);
+    EXPECT_TRUE(memory.on_echo());
+    EXPECT_FALSE(memory.on_echo()) << "no news";
+    EXPECT_EQ(memory.state(), EchoState::present);
+    memory.on_mismatch();
+    EXPECT_EQ(memory.state(), EchoState::unknown) << "the line is learned again";
+}
+
+TEST(EchoMemory, P8AFewRepliesWithoutAnEchoDoNotShowThatAKnownEchoIsGone) {
+    EchoMemory memory(EchoMode::automatic);
+    memory.on_echo();
+    for (int i = 1; i < kNoMore; ++i) memory.on_no_echo();
+    EXPECT_EQ(memory.state(), EchoState::present);
+    memory.on_no_echo();
+    EXPECT_EQ(memory.state(), EchoState::absent);
+    EchoMemory configured(EchoMode::on);
+    for (int i = 0; i < 2 * kNoMore; ++i) configured.on_no_echo();
+    configured.on_mismatch();
+    EXPECT_EQ(configured.state(), EchoState::present);
+}
+
+/// A line with station 17, without retries.
+class EchoLine : public testing::Test {
   protected:
     static Settings with(EchoMode mode) {
-        Settings settings;
-        settings.serial = {38400, 8, Parity::none, 1};
-        settings.unlisted.retries = 0;
-        settings.stations = {settings.unlisted};
-        settings.stations[0].id = 17;
+        Settings settings = settings_38400();
+        for (StationSettings& station : settings.stations) station.retries = 0;
         settings.echo = mode;
         return settings;
     }
-    /// The adapter hears what was sent last; then the station answers, or not.
+    /// The adapter hears the frame that was sent last.
     static void hear_echo(BusScript& bus) {
         const Bytes adu = bus.sent.back().adu;
         bus.hear_paced(adu);
@@ -40,7 +103,7 @@ class Echo : public testing::Test {
         bus.run_for(3ms);
         bus.hear_reply(17, pdu);
     }
-    /// A line that has carried a read and is known to have an echo, or not to have one.
+    /// The line carries a read, with an echo or without an echo.
     static void read_once(BusScript& bus, bool echo) {
         const Ticket ticket = bus.submit(17, kRead);
         if (echo) hear_echo(bus);
@@ -48,29 +111,26 @@ class Echo : public testing::Test {
         EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
         bus.run_for(10ms);
     }
-};
+    const Symptoms& symptoms() { return bus.arbiter().station_counters().at(17).symptoms; }
 
-/// A line whose echo is learned.
-class LearnedEcho : public Echo {
-  protected:
     BusScript bus{with(EchoMode::automatic)};
 };
 
-TEST_F(Echo, P8AWriteIsNeverConfirmedByItsOwnEcho) {
+TEST_F(EchoLine, P8AWriteIsNeverConfirmedByItsOwnEcho) {
     for (const EchoMode mode : {EchoMode::automatic, EchoMode::on}) {
         for (const Bytes& write : {kWriteCoil, kWrite}) {
-            BusScript bus(with(mode));
-            read_once(bus, true);
-            const Ticket ticket = bus.submit(17, write);
-            hear_echo(bus);
-            bus.run_for(2s);
-            EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
-            EXPECT_TRUE(bus.answer(ticket).transmitted);
+            BusScript line(with(mode));
+            read_once(line, true);
+            const Ticket ticket = line.submit(17, write);
+            hear_echo(line);
+            line.run_for(2s);
+            EXPECT_EQ(line.answer(ticket).pdu.error(), Fault::timeout);
+            EXPECT_TRUE(line.answer(ticket).transmitted);
         }
     }
 }
 
-TEST_F(LearnedEcho, P8TheReplyBehindTheEchoConfirmsAWriteAlsoWhenGluedToIt) {
+TEST_F(EchoLine, P8TheReplyBehindTheEchoConfirmsAWriteAlsoWhenGluedToIt) {
     read_once(bus, true);
     const Ticket ticket = bus.submit(17, kWriteCoil);
     const Bytes adu = bus.sent.back().adu;
@@ -80,30 +140,26 @@ TEST_F(LearnedEcho, P8TheReplyBehindTheEchoConfirmsAWriteAlsoWhenGluedToIt) {
     EXPECT_EQ(bus.answer(ticket).pdu.value(), kWriteCoil);
 }
 
-TEST_F(LearnedEcho, P8AFreshLineIsAskedByAReadBeforeItsFirstWrite) {
+TEST_F(EchoLine, P8AFreshLineIsAskedByAReadBeforeItsFirstWrite) {
     const Ticket ticket = bus.submit(17, kWriteCoil);
     ASSERT_EQ(bus.sent.size(), 1u);
-    EXPECT_EQ(bus.sent[0].adu[1], 3);
+    EXPECT_EQ(bus.sent[0].kind, FrameKind::learn_echo);
+    EXPECT_EQ(bus.sent[0].adu, encode_adu(17, "03 00 00 00 01"_hex));
     answer(bus, 17, "03 02 00 07"_hex, 3ms);
     ASSERT_EQ(bus.next_sent().value().adu, encode_adu(17, kWriteCoil));
     answer(bus, 17, kWriteCoil, 3ms);
     EXPECT_EQ(bus.answer(ticket).pdu.value(), kWriteCoil);
-    EXPECT_EQ(bus.sent.size(), 2u);
-    // Once is enough.
     bus.run_for(10ms);
     bus.submit(17, kWrite);
-    EXPECT_EQ(bus.sent.back().adu[1], 6);
+    EXPECT_EQ(bus.sent.back().adu[1], 6) << "one read is enough";
+    bus.line_down();
+    bus.line_up();
+    bus.run_for(2s);
+    bus.submit(17, kWrite);
+    EXPECT_EQ(bus.sent.back().kind, FrameKind::learn_echo) << "another device may be there";
 }
 
-TEST_F(LearnedEcho, P8AnExceptionTeachesAsWellAsAValue) {
-    bus.submit(17, kWriteCoil);
-    hear_echo(bus);
-    reply(bus, "83 02"_hex);
-    EXPECT_EQ(bus.arbiter().echo(), EchoState::present);
-    EXPECT_EQ(bus.next_sent().value().adu, encode_adu(17, kWriteCoil));
-}
-
-TEST_F(LearnedEcho, P8AReplyAfterAForeignFrameShowsNothingAboutAnEcho) {
+TEST_F(EchoLine, P8AReplyBehindOtherFramesShowsNothingAboutAnEcho) {
     bus.submit(17, kRead);
     bus.run_to_end_of_request();
     bus.hear_paced(encode_adu(18, kReply));
@@ -111,59 +167,7 @@ TEST_F(LearnedEcho, P8AReplyAfterAForeignFrameShowsNothingAboutAnEcho) {
     EXPECT_EQ(bus.arbiter().echo(), EchoState::unknown);
 }
 
-TEST_F(LearnedEcho, P8AReplyAfterARequestOfAnotherMasterShowsNothingAboutAnEcho) {
-    bus.submit(17, kRead);
-    bus.run_to_end_of_request();
-    Bytes echo = bus.sent.back().adu;
-    echo[3] ^= 0x10;
-    bus.hear_paced(Writer().raw(encode_adu(18, "04 00 01 00 02"_hex)).raw(echo).take());
-    bus.hear_paced(encode_adu(17, kReply));
-    EXPECT_NE(bus.arbiter().echo(), EchoState::absent) << "a damaged echo stood there as well";
-}
-
-TEST_F(LearnedEcho, P8TheFirstWriteOfALineIsNotConfirmedByWhatComesSoonerThanAnyReplyHas) {
-    read_once(bus, false);
-    const Ticket ticket = bus.submit(17, kWrite);
-    hear_echo(bus);
-    bus.run_for(2s);
-    EXPECT_FALSE(bus.answer(ticket).pdu);
-}
-
-/// The panel may not have heard the request, and says its refusal of the one before once more.
-TEST_F(LearnedEcho, P1ARefusalSaidAgainBehindACollisionIsAskedForOnceMore) {
-    read_once(bus, true);
-    bus.submit(17, "03 00 6C 00 01"_hex);
-    hear_echo(bus);
-    reply(bus, "83 06"_hex);
-    bus.run_for(10ms);
-    const Ticket ticket = bus.submit(17, kRead);
-    Bytes damaged = bus.sent.back().adu;
-    damaged[damaged.size() - 3] ^= 0x10;
-    bus.hear_paced(damaged);
-    reply(bus, "83 06"_hex);
-    ASSERT_EQ(bus.next_sent(2s).value().kind, FrameKind::retry);
-    hear_echo(bus);
-    reply(bus, kReply);
-    EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
-}
-
-TEST_F(Echo, P4AnotherMastersRepliesOfOurStationMakeItRestForNothing) {
-    BusScript bus(with(EchoMode::off));
-    for (int i = 0; i < 20; ++i) {
-        const Ticket ticket = bus.submit(17, kRead);
-        const TimePoint asked = bus.now();
-        answer(bus, 17, kReply);
-        ASSERT_TRUE(bus.answered(ticket));
-        EXPECT_LT(bus.now() - asked, 150ms);
-        bus.run_for(20ms);
-        bus.hear(encode_adu(17, "03 00 00 00 03"_hex));
-        bus.run_for(10ms);
-        bus.hear_reply(17, i % 2 == 0 ? kReply : reply_number(1));
-        bus.run_for(10ms);
-    }
-}
-
-TEST_F(LearnedEcho, P8TheFirstWriteToASilentStationIsNotTransmitted) {
+TEST_F(EchoLine, P8TheFirstWriteToASilentStationIsNotTransmitted) {
     const Ticket ticket = bus.submit(17, kWriteCoil);
     bus.run_for(3s);
     EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
@@ -171,19 +175,18 @@ TEST_F(LearnedEcho, P8TheFirstWriteToASilentStationIsNotTransmitted) {
     for (const auto& sent : bus.sent) EXPECT_EQ(sent.adu[1], 3);
 }
 
-TEST_F(LearnedEcho, P8ALineWhereAReadWasInconclusiveConfirmsNothingByOneFrame) {
+TEST_F(EchoLine, P8WhereTheReadWasInconclusiveOneFrameConfirmsNothing) {
     const Ticket ticket = bus.submit(17, kWriteCoil);
-    const Bytes tail(bus.sent[0].adu.begin() + 2, bus.sent[0].adu.end());
-    bus.hear(tail);  // half an echo
+    bus.hear(Bytes(bus.sent[0].adu.begin() + 2, bus.sent[0].adu.end()));  // half an echo
     answer(bus, 17, "03 02 00 07"_hex, 3ms);
-    EXPECT_EQ(bus.arbiter().echo(), EchoState::unclear);
+    EXPECT_EQ(bus.arbiter().echo(), EchoState::unknown);
     ASSERT_EQ(bus.next_sent().value().adu, encode_adu(17, kWriteCoil)) << "one read is enough";
     hear_echo(bus);
     bus.run_for(2s);
     EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
 }
 
-TEST_F(LearnedEcho, P8AnEchoThatDiffersIsACollision) {
+TEST_F(EchoLine, P8AnEchoThatDiffersIsACollision) {
     read_once(bus, true);
     const Ticket ticket = bus.submit(17, kRead);
     Bytes damaged = bus.sent.back().adu;
@@ -191,305 +194,78 @@ TEST_F(LearnedEcho, P8AnEchoThatDiffersIsACollision) {
     bus.hear_paced(damaged);
     reply(bus, kReply);
     bus.run_for(1s);
-    EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply) << "which the panel gave all the same";
+    EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply) << "the panel has answered all the same";
     EXPECT_EQ(bus.arbiter().station_counters().at(17).echo_mismatches, 1u);
     EXPECT_EQ(bus.events.back().kind, StationEvent::Kind::collision);
-    EXPECT_EQ(bus.arbiter().echo(), EchoState::unclear);
-    read_once(bus, true);  // and is learned again
+    EXPECT_EQ(bus.arbiter().echo(), EchoState::unknown);
+    read_once(bus, true);
     EXPECT_EQ(bus.arbiter().echo(), EchoState::present);
 }
 
-TEST_F(LearnedEcho, P8AnAdapterThatNoLongerHearsItselfIsLearnedAnew) {
-    read_once(bus, true);
-    for (int i = 0; i <= kNoMore; ++i) {
-        const Ticket ticket = bus.submit(17, kRead);
-        answer(bus, 17, kReply, 3ms);
-        bus.run_for(1s);
-        if (i == 0) EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
+/// The CRC of the rest is good where the last byte is 0.
+TEST_F(EchoLine, T6OurOwnFrameWithoutALast0IsNoReply) {
+    Bytes pdu;
+    for (unsigned place = 0; pdu.empty() || encode_adu(17, pdu).back() != 0; ++place)
+        pdu = Writer().u8(6).u16(place).u16(4).take();
+    read_once(bus, false);
+    for (const bool answered : {false, true}) {
+        const Ticket ticket = bus.submit(17, pdu);
+        bus.run_to_end_of_request();
+        const Bytes frame = bus.sent.back().adu;
+        bus.hear(ByteView(frame).first(frame.size() - 1));
+        bus.run_for(100ms);
+        EXPECT_FALSE(bus.answered(ticket));
+        if (answered) bus.hear_reply(17, pdu);
+        bus.run_for(2s);
+        EXPECT_EQ(bus.answer(ticket).pdu.has_value(), answered);
     }
-    EXPECT_EQ(bus.arbiter().echo(), EchoState::absent);
+    EXPECT_EQ(symptoms().wrong, 0u);
 }
 
-TEST_F(Echo, P1AFrameBeforeTheEchoIsAnotherMasters) {
+TEST_F(EchoLine, P8WhatStandsInFrontOfTheEchoMakesItNoReply) {
+    const Bytes fronts[] = {"FF"_hex, "00"_hex, encode_adu(18, kReply)};
+    const Bytes write = "06 00 05 00 00"_hex;
     for (const EchoMode mode : {EchoMode::automatic, EchoMode::on}) {
-        BusScript bus(with(mode));
-        read_once(bus, true);
-        for (const bool alive : {true, false, true}) {
-            const Ticket ticket = bus.submit(17, kRead);
-            bus.hear_reply(17, "03 06 00 09 00 09 00 09"_hex);
-            hear_echo(bus);
-            EXPECT_FALSE(bus.answered(ticket));
-            if (alive) reply(bus, kReply);
-            bus.run_for(2s);
-            ASSERT_TRUE(bus.answered(ticket));
-            if (alive) EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
-            if (!alive) EXPECT_FALSE(bus.answer(ticket).pdu);
+        for (const Bytes& front : fronts) {
+            BusScript line(with(mode));
+            read_once(line, true);
+            const Ticket ticket = line.submit(17, write);
+            line.hear_paced(Writer().raw(front).raw(line.sent.back().adu).take());
+            line.run_for(2s);
+            ASSERT_TRUE(line.answered(ticket));
+            EXPECT_FALSE(line.answer(ticket).pdu) << to_hex(front);
         }
     }
 }
 
-TEST_F(Echo, P8AWriteIsNotConfirmedByWhatComesBeforeItsEcho) {
-    BusScript bus(with(EchoMode::on));
-    const Ticket ticket = bus.submit(17, "0F 00 10 00 08 01 55"_hex);
-    bus.hear_reply(17, "0F 00 10 00 08"_hex);
-    hear_echo(bus);
-    bus.run_for(2s);
-    EXPECT_FALSE(bus.answer(ticket).pdu);
+TEST_F(EchoLine, P8AnEchoThatTheConfigurationDeniesConfirmsNothingAndIsCounted) {
+    BusScript line(with(EchoMode::off));
+    read_once(line, true);
+    const StationCounters& counters = line.arbiter().station_counters().at(17);
+    EXPECT_GE(counters.symptoms.echoes, 1u) << "the finding `echo` tells";
+    EXPECT_EQ(counters.foreign_frames, 0u);
+    EXPECT_EQ(counters.symptoms.requests, 0u) << "no other master";
 }
 
-TEST_F(Echo, P1AReplyAfterAnotherMastersRequestOfItsShapeIsAmbiguous) {
-    BusScript bus(with(EchoMode::off));
-    const Ticket ticket = bus.submit(17, kRead);
-    bus.run_to_end_of_request();
-    bus.hear(encode_adu(17, "03 00 00 00 03"_hex));
-    bus.hear_reply(17, kReply);
-    EXPECT_FALSE(bus.answered(ticket));
-    bus.run_for(2s);
-    EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::damaged) << "not silent";
-    // Reads beyond it are distinguished.
-    const Ticket next = bus.submit(17, kRead);
-    bus.run_to_end_of_request();
-    bus.hear(encode_adu(17, "03 00 00 00 01"_hex));
-    bus.hear_reply(17, "03 02 00 07"_hex);
-    bus.hear_reply(17, kReply);
-    EXPECT_EQ(bus.answer(next).pdu.value(), kReply);
+TEST_F(EchoLine, P8TheEchoOfABroadcastIsNoForeignFrameAndTheNextRequestLeavesAtTheTurnaround) {
+    BusScript line(with(EchoMode::on));
+    line.submit(0, kWrite, 1);
+    const TimePoint start = line.now();
+    hear_echo(line);
+    line.submit(17, kRead, 2);
+    EXPECT_EQ(line.next_sent().value().at - start, wire_time(line.settings().serial, 8) + 100ms);
+    EXPECT_EQ(line.arbiter().station_counters().at(17).foreign_frames, 0u);
 }
 
-/// A repeater, or a radio.
-TEST_F(Echo, P8AnEchoThatComesLateConfirmsNothingAndIsNoValue) {
-    BusScript bus(with(EchoMode::automatic));
-    const auto come_back = [&] {
-        bus.run_for(40ms);
-        bus.hear(bus.sent.back().adu);
-    };
-    for (int i = 0; i < 5; ++i) {
-        bus.submit(17, kRead);
-        answer(bus, 17, kReply, 5ms);
-        come_back();
-        bus.run_for(50ms);
-    }
-    const std::uint64_t requests = bus.arbiter().station_counters().at(17).symptoms.requests;
-    for (const Bytes& pdu : {kWriteCoil, "01 03 75 00 18"_hex}) {
-        const Ticket ticket = bus.submit(17, pdu);
-        ASSERT_EQ(bus.sent.back().adu, encode_adu(17, pdu));
-        bus.run_to_end_of_request();
-        come_back();
-        bus.run_for(2s);
-        EXPECT_FALSE(bus.answer(ticket).pdu);
-    }
-    const Symptoms& symptoms = bus.arbiter().station_counters().at(17).symptoms;
-    EXPECT_EQ(symptoms.requests, requests) << "another master's";
-    EXPECT_GE(symptoms.echoed_again, 3u);
-}
-
-TEST_F(Echo, P8AnEchoThatTheConfigurationDeniesIsFoundAllTheSame) {
-    BusScript bus(with(EchoMode::off));
+TEST_F(EchoLine, P8TheEchoOfAnUnansweredRequestIsNoSignOfLife) {
+    BusScript line(with(EchoMode::on));
     for (int i = 0; i < 3; ++i) {
-        EXPECT_TRUE(bus.events.empty()) << "a panel may repeat a request once";
-        read_once(bus, true);
+        const Ticket ticket = line.submit(17, kRead);
+        hear_echo(line);
+        line.run_for(2s);
+        EXPECT_EQ(line.answer(ticket).pdu.error(), Fault::timeout);
     }
-    ASSERT_FALSE(bus.events.empty());
-    EXPECT_EQ(bus.events[0].kind, StationEvent::Kind::echo);
-    EXPECT_EQ(bus.arbiter().station_counters().at(17).discarded_bytes, 0u);
-}
-
-TEST_F(Echo, P8TheEchoOfABroadcastIsNoForeignFrameAndTheNextRequestLeavesAtTheTurnaround) {
-    BusScript bus(with(EchoMode::on));
-    bus.submit(0, kWrite, 1);
-    const TimePoint start = bus.now();
-    hear_echo(bus);
-    bus.submit(17, kRead, 2);
-    EXPECT_EQ(bus.next_sent().value().at - start, wire_time(bus.settings().serial, 8) + 100ms);
-    EXPECT_EQ(bus.arbiter().station_counters().at(17).discarded_bytes, 0u);
-}
-
-/// One panel that repeats a request made healthy ones wait for echoes that never came.
-TEST_F(Echo, P4APanelThatRepeatsOneRequestMakesNoLineThatHearsItself) {
-    BusScript bus(with(EchoMode::off));
-    read_once(bus, true);
-    EXPECT_EQ(bus.arbiter().echo(), EchoState::unknown);
-    bus.submit(17, kWrite);
-    EXPECT_EQ(bus.sent.back().kind, FrameKind::learn_echo) << "P8";
-    answer(bus, 17, kReply, 3ms);
-    EXPECT_EQ(bus.arbiter().echo(), EchoState::absent);
-}
-
-TEST_F(Echo, P8TheEchoOfAnUnansweredRequestIsNoSignOfLife) {
-    BusScript bus(with(EchoMode::on));
-    for (int i = 0; i < 3; ++i) {
-        const Ticket ticket = bus.submit(17, kRead);
-        hear_echo(bus);
-        bus.run_for(2s);
-        EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
-    }
-    EXPECT_TRUE(bus.arbiter().health(17).offline());
-}
-
-/// Two converters in a row: each request comes back twice. A read has shown it.
-class EchoTwice : public LearnedEcho {
-  protected:
-    EchoTwice() {
-        for (unsigned i = 0; i < RecentTimes::kEnough; ++i) read_once(bus, true);
-        const Ticket read = bus.submit(17, kRead);
-        hear_twice(kReply);
-        EXPECT_EQ(bus.answer(read).pdu.value(), kReply);
-        bus.run_for(10ms);
-        write = bus.submit(17, kWrite);
-        hear_echo(bus);
-        bus.hear(bus.sent.back().adu);
-        EXPECT_FALSE(bus.answered(write));
-    }
-    void hear_twice(ByteView reply) {
-        hear_echo(bus);
-        bus.hear(bus.sent.back().adu);
-        bus.run_for(3ms);
-        bus.hear_paced(encode_adu(17, reply));
-    }
-    /// A read of what was written finds this.
-    void find(ByteView pdu) {
-        ASSERT_EQ(bus.next_sent(600ms).value().adu, encode_adu(17, "03 00 01 00 01"_hex));
-        hear_twice(pdu);
-    }
-    Ticket write = 0;
-};
-
-TEST_F(EchoTwice, P8ConfirmsNoWrite) {
-    find("03 02 00 04"_hex);
-    EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
-}
-
-TEST_F(EchoTwice, P8ConfirmsAWriteWhoseValueIsThere) {
-    find("03 02 00 03"_hex);
-    EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
-}
-
-TEST_F(EchoTwice, P8TheReplyBehindItConfirmsTheWrite) {
-    reply(bus, kWrite);
-    EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
-    EXPECT_EQ(bus.sent.back().adu, encode_adu(17, kWrite)) << "no read is needed";
-    EXPECT_EQ(bus.arbiter().station_counters().at(17).symptoms.echoed_again, 1u);
-}
-
-/// A converter that returns what was sent when the panel has answered, or would have.
-TEST_F(LearnedEcho, P8AnEchoBehindTheReplyOfAReadConfirmsNoWrite) {
-    for (unsigned i = 0; i < RecentTimes::kEnough; ++i) read_once(bus, false);
-    bus.submit(17, kRead);
-    answer(bus, 17, kReply, 3ms);
-    bus.hear(bus.sent.back().adu);
-    bus.run_for(10ms);
-    for (const std::ptrdiff_t begun : {0, 3, 7, 8}) {  // bytes of it that are read with the reply
-        const bool done = begun < 8;
-        const Ticket write = bus.submit(17, kWrite);
-        const Bytes frame = bus.sent.back().adu;
-        Bytes first = frame;
-        if (done) first.insert(first.end(), frame.begin(), frame.begin() + begun);
-        bus.run_to_end_of_request();
-        bus.run_for(3ms);
-        bus.hear(first);
-        EXPECT_FALSE(bus.answered(write));
-        if (done) bus.hear(Bytes(frame.begin() + begun, frame.end()));
-        EXPECT_EQ(bus.answered(write), done);
-        bus.run_for(100ms);
-        if (!done) answer(bus, 17, "03 02 00 04"_hex, 3ms);
-        if (!done) EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
-    }
-}
-
-/// An adapter, or a receiver that is stuck, begins to echo while the device stays open: a line
-/// without an echo, whose station has answered; then a write, and its very frame comes back as it
-/// leaves.
-class EchoInMidLife : public LearnedEcho {
-  protected:
-    EchoInMidLife() {
-        for (unsigned i = 0; i < RecentTimes::kEnough; ++i) read_once(bus, false);
-        write = bus.submit(17, kWrite);
-        hear_echo(bus);
-        EXPECT_FALSE(bus.answered(write));
-    }
-    /// A read is sent that detects the echo.
-    void ask() { ASSERT_EQ(bus.next_sent(600ms).value().kind, FrameKind::learn_echo); }
-    Ticket write = 0;
-};
-
-TEST_F(EchoInMidLife, P8ConfirmsNoWriteOfAPanelThatIsOff) {
-    ask();
-    hear_echo(bus);
-    bus.run_for(2s);
-    EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
-    EXPECT_TRUE(bus.answer(write).transmitted);
-    EXPECT_EQ(bus.arbiter().echo(), EchoState::present);
-}
-
-TEST_F(EchoInMidLife, P8ConfirmsNoWriteWhereTheReadIsAnsweredBehindAnEcho) {
-    ask();
-    hear_echo(bus);
-    reply(bus, "03 02 00 03"_hex);
-    EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
-}
-
-TEST_F(EchoInMidLife, P8TheReplyBehindItConfirmsTheWrite) {
-    reply(bus, kWrite);
-    EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
-    bus.run_for(200ms);
-    bus.submit(17, kWrite);
-    EXPECT_EQ(bus.sent.back().kind, FrameKind::learn_echo) << "nothing is known of the echo";
-}
-
-TEST_F(EchoInMidLife, P2AnAnswerThatWasJustQuickConfirmsTheWriteOnce) {
-    ask();
-    EXPECT_EQ(bus.sent.back().adu, encode_adu(17, "03 00 01 00 01"_hex)) << "what was written";
-    answer(bus, 17, "03 02 00 03"_hex, 3ms);
-    EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
-    EXPECT_EQ(std::ranges::count(bus.sent, encode_adu(17, kWrite), &BusScript::Sent::adu), 1);
-}
-
-TEST_F(EchoInMidLife, P8WhereTheReadShowsAnotherValueOrNoneTheWriteIsNotConfirmed) {
-    ask();
-    answer(bus, 17, "03 02 00 04"_hex, 3ms);
-    EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
-    EXPECT_TRUE(bus.answer(write).transmitted);
-    bus.run_for(100ms);
-    EXPECT_EQ(bus.sent.back().kind, FrameKind::learn_echo) << "P2: the write is not repeated";
-    const Ticket other = bus.submit(17, kWrite);
-    hear_echo(bus);
-    ask();
-    answer(bus, 17, "83 02"_hex, 3ms);
-    EXPECT_EQ(bus.answer(other).pdu.error(), Fault::timeout);
-}
-
-inline const Bytes kLongWrite = "10 00 01 00 01 02 00 03"_hex;
-
-TEST_F(EchoInMidLife, P2WhereLongWritesAreAnsweredWithoutTheirEchoAReadThatTellsNothingConfirms) {
-    ask();
-    answer(bus, 17, "83 02"_hex, 3ms);
-    bus.run_for(100ms);
-    const Ticket longer = bus.submit(17, kLongWrite);
-    answer(bus, 17, "10 00 01 00 01"_hex, 3ms);
-    ASSERT_TRUE(bus.answer(longer).pdu);
-    bus.run_for(100ms);
-    const Ticket quick = bus.submit(17, kWrite);
-    hear_echo(bus);
-    ask();
-    answer(bus, 17, "83 02"_hex, 3ms);
-    EXPECT_EQ(bus.answer(quick).pdu.value(), kWrite);
-}
-
-/// An adapter that echoes writes alone, as long after them as the panel takes to answer.
-TEST_F(LearnedEcho, P8WhereALongWriteHasComeBackOneFrameConfirmsNoShortOne) {
-    for (unsigned i = 0; i < RecentTimes::kEnough; ++i) read_once(bus, false);
-    const Ticket longer = bus.submit(17, kLongWrite);
-    bus.run_to_end_of_request();
-    bus.run_for(3ms);
-    bus.hear(bus.sent.back().adu);
-    bus.run_for(2s);
-    ASSERT_EQ(bus.answer(longer).pdu.error(), Fault::timeout);
-    read_once(bus, false);
-    const Ticket write = bus.submit(17, kWrite);
-    answer(bus, 17, kWrite, 3ms);
-    EXPECT_FALSE(bus.answered(write));
-    ASSERT_TRUE(bus.next_sent(600ms));
-    answer(bus, 17, "03 02 00 00"_hex, 3ms);
-    EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
+    EXPECT_TRUE(line.arbiter().health(17).offline());
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ void in_pieces(BusScript& bus, std::uint8_t station, const Bytes& pdu) {
     bus.run_for(1ms);
     bus.hear(ByteView(adu).subspan(3));
 }
-/// ... and the one that is sent next.
+/// The station answers the request sent next in the same way.
 void next_in_pieces(BusScript& bus, std::uint8_t station, const Bytes& pdu) {
     bus.next_sent();
     in_pieces(bus, station, pdu);

@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "support/attempts.hpp"
 #include "support/hex.hpp"
 #include "support/queue_fixture.hpp"
 
@@ -27,15 +26,15 @@ class SharingTest : public test::QueueFixture {
         settings.id = 1;
         settings.vouched = count > 0;
         if (count > 0) settings.max_registers = count;
-        return {settings, OfflineSettings{}, true};
+        return {settings, OfflineSettings{}, true, 40ms};
     }
     Group gather(const Bytes& leader) { return gather(leader, station_); }
     Group gather(const Bytes& leader, const Station& station) {
-        return sharing_.gather(read_of(9, leader), station, book_, queue_);
+        return sharing_.gather(TimePoint{1h}, read_of(9, leader), station, outstanding_, queue_);
     }
     void wait(const Bytes& pdu) { EXPECT_TRUE(queue_.push(read_of(++client_, pdu)).taken); }
 
-    OutstandingRequests book_;
+    Outstanding outstanding_;
     Sharing sharing_{true};
     Station station_ = station_that_takes(125);
     Client client_ = 100;
@@ -52,11 +51,11 @@ TEST_F(SharingTest, P6ContainedReadsComeAlongAndTouchingOnesUpToWhatTheProfileVo
     const Bytes other_table = "04 00 0C 00 01"_hex;
     const Bytes a_write = "06 00 0A 00 01"_hex;
     const Row rows[] = {
-        // Contained ones, whatever is known of the station.
+        // Contained reads, whatever is known of the station.
         {{registers(12, 3), registers(10, 10)}, registers(10, 10), 0, 3, registers(10, 10)},
-        // A wider one, which a client asked for itself.
+        // A wider read, for which a client asked itself.
         {{registers(10, 10)}, registers(12, 2), 0, 2, registers(10, 10)},
-        // Touching ones, also by one that lies between.
+        // Touching reads, also by a read between them.
         {{registers(14, 2), registers(12, 2)}, registers(10, 2), 125, 3, registers(10, 6)},
         // Nothing is read that no client asked for.
         {{registers(13, 2), other_table, a_write}, registers(10, 2), 125, 1, registers(10, 2)},
@@ -78,16 +77,6 @@ TEST_F(SharingTest, P6ContainedReadsComeAlongAndTouchingOnesUpToWhatTheProfileVo
     }
 }
 
-TEST_F(SharingTest, P6AReadAsLongAsOneThatTheStationHasAnsweredIsMade) {
-    Station station = station_that_takes(0);
-    const Bytes reply = Writer().u8(3).u8(8).raw(Bytes(8)).take();
-    const TimePoint now{1h};
-    station.on_reply(
-        book_, now, test::answered(now, now, test::group_of(1, registers(50, 4)), reply), 5ms, 5ms);
-    wait(registers(12, 2));
-    EXPECT_EQ(gather(registers(10, 2), station).jobs.size(), 2u);
-}
-
 TEST_F(SharingTest, P6AJoinThatDidNotComeAboutIsRememberedAndItsPartsGoAlone) {
     wait(registers(12, 2));
     wait(registers(14, 2));
@@ -106,18 +95,6 @@ TEST_F(SharingTest, P6AJoinThatDidNotComeAboutIsRememberedAndItsPartsGoAlone) {
     EXPECT_LT(gather(registers(10, 2)).jobs.size(), 3u) << "the whole was refused";
 }
 
-TEST_F(SharingTest, AClientThatAskedForTheWholeStaysWithItWhenTheOthersAreSplitOff) {
-    wait(registers(10, 2));
-    wait(registers(12, 1));
-    Group group = gather(registers(10, 4));
-    const Jobs parts = sharing_.split(group);
-    EXPECT_EQ(parts.size(), 2u);
-    ASSERT_EQ(group.jobs.size(), 1u);
-    EXPECT_EQ(group.jobs[0].request.pdu(), registers(10, 4));
-    wait(registers(14, 2));
-    EXPECT_TRUE(gather(registers(10, 4)).joined()) << "no join was refused";
-}
-
 TEST_F(SharingTest, P2ForAClientThatHasLeftNothingIsSentWhenAJoinIsSplit) {
     wait(registers(12, 2));
     wait(registers(14, 2));
@@ -128,12 +105,6 @@ TEST_F(SharingTest, P2ForAClientThatHasLeftNothingIsSentWhenAJoinIsSplit) {
     EXPECT_EQ(sharing_.split(group).size(), 2u);
     ASSERT_EQ(group.jobs.size(), 1u);
     EXPECT_EQ(group.jobs.front().ticket, gone);
-}
-
-TEST_F(SharingTest, OnALineThatDoesNotShareEachGoesAlone) {
-    sharing_ = Sharing(false);
-    wait(registers(10, 2));
-    EXPECT_EQ(gather(registers(10, 2)).jobs.size(), 1u);
 }
 
 TEST_F(SharingTest, P6EachGetsItsPartAndAllGetTheException) {

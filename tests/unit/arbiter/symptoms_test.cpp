@@ -5,7 +5,6 @@
 #include <cstdint>
 
 #include "arbiter_fixture.hpp"
-#include "panelgate/arbiter/book/timing.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
@@ -16,7 +15,6 @@ namespace {
 using modbus::encode_adu;
 
 const Bytes kLongRead = "03 00 00 00 20"_hex;  // 69 bytes of reply
-const Bytes kToAll = "10 00 64 00 01 02 12 34"_hex;
 
 Settings settings_with(EchoMode echo) {
     Settings settings = settings_38400();
@@ -96,42 +94,6 @@ TEST_F(SymptomsTest, ThePauseBeforeAnAttemptIsReportedWithItsOutcome) {
     EXPECT_EQ(of(18).answered_after[Symptoms::kPauses - 1], 1u);
 }
 
-TEST_F(SymptomsTest, AReplyThatComesTwiceIsADuplicateGluedOrApartAndWithOtherValues) {
-    const Bytes reply = encode_adu(17, kReply);
-    ask(17, kRead, Writer().raw(reply).raw(reply).take());
-    EXPECT_EQ(of(17).doubled, 1u);
-    bus.submit(17, kRead);
-    answer(bus, 17, kReply, 3ms);
-    bus.run_for(20ms);
-    hear(encode_adu(17, "03 06 00 00 00 00 00 07"_hex));
-    EXPECT_EQ(of(17).doubled, 2u);
-    EXPECT_EQ(of(17).unasked, 0u);
-    EXPECT_EQ(of(17).late, 0u);
-}
-
-TEST_F(SymptomsTest, ALateReplyIsNoDuplicate) {
-    bus.submit(17, kRead);
-    answer(bus, 17, kReply, 130ms);
-    bus.run_for(100ms);
-    EXPECT_EQ(of(17).late, 1u);
-    EXPECT_EQ(of(17).doubled, 0u);
-    EXPECT_EQ(of(17).mute_in_a_row, 0u);
-    EXPECT_GE(of(17).worst_lateness, Duration(29ms));
-    EXPECT_LE(of(17).worst_lateness, 31ms + bus.settings().end_of_frame) << "silence judges it";
-}
-
-TEST_F(SymptomsTest, AnotherMastersRequestIsDistinguishedFromNoiseAlsoWhenItsReplyIsGluedToIt) {
-    ask(17, kRead, encode_adu(17, kReply));
-    hear(encode_adu(3, "03 00 00 00 01"_hex));
-    const Bytes request = encode_adu(4, "03 00 00 00 01"_hex);
-    hear(Writer().raw(request).raw(encode_adu(4, "03 02 00 07"_hex)).take());
-    EXPECT_EQ(of(17).requests, 2u);
-    EXPECT_EQ(of(17).unasked, 0u);
-    EXPECT_EQ(of(17).strays, 0u);
-    hear("FF 00 12 34 55"_hex);
-    EXPECT_EQ(of(17).strays, 1u);
-}
-
 TEST_F(SymptomsTest, WhatMayHaveBeenTheReplyIsNoEchoForCertain) {
     Settings settings = bus.settings();
     settings.echo = EchoMode::on;  // there is none
@@ -140,18 +102,6 @@ TEST_F(SymptomsTest, WhatMayHaveBeenTheReplyIsNoEchoForCertain) {
     answer(script, 17, kWrite, 3ms);
     script.run_for(3s);
     EXPECT_EQ(script.arbiter().station_counters().at(17).symptoms.echoes, 0u);
-}
-
-TEST_F(SymptomsTest, TheEchoIsCountedAndIsNoTrouble) {
-    for (int i = 0; i < 3; ++i) {
-        bus.submit(17, kRead);
-        bus.hear(bus.sent.back().adu);
-        answer(bus, 17, kReply, 3ms);
-        bus.run_for(100ms);
-    }
-    EXPECT_EQ(of(17).echoes, 3u);
-    EXPECT_EQ(of(17).answered, 3u);
-    EXPECT_EQ(of(17).strays + of(17).unasked + of(17).doubled, 0u);
 }
 
 TEST_F(SymptomsTest, ACollisionIsOne) {
@@ -166,106 +116,13 @@ TEST_F(SymptomsTest, ACollisionIsOne) {
     EXPECT_EQ(s.attempts(), 1u);
 }
 
-TEST_F(SymptomsTest, AnExceptionWithAnotherFunctionsNumberIsCountedBesides) {
-    ask(17, kRead, encode_adu(17, "84 02"_hex));
-    ask(17, kRead, encode_adu(17, "90 01"_hex));
-    ask(17, kRead, encode_adu(17, "04 02 00 07"_hex));  // no exception
-    EXPECT_EQ(of(17).wrong, 3u);
-    EXPECT_EQ(of(17).wrong_exceptions, 2u);
-}
-
-/// A write was given up, and its refusal ends the read behind it.
-TEST_F(SymptomsTest, ARefusalThatComesLateHasTheNumberOfItsOwnFunction) {
-    ask(17, kWrite, {});
-    ask(17, kRead, encode_adu(17, "86 02"_hex));
-    EXPECT_EQ(of(17).wrong, 0u);
-    EXPECT_EQ(of(17).wrong_exceptions, 0u);
-    EXPECT_EQ(of(17).disturbed, 1u);
-    EXPECT_EQ(of(17).attempts(), 2u);
-}
-
-TEST_F(SymptomsTest, APanelThatAnswersABroadcastIsNotUnsolicited) {
-    ask(18, kRead, encode_adu(18, kReply));
-    ask(0, kToAll, encode_adu(18, "10 00 64 00 01"_hex));
-    ask(0, kToAll, encode_adu(18, "90 02"_hex));
-    EXPECT_EQ(of(18).broadcast_replies, 2u);
-    EXPECT_EQ(of(18).unasked, 0u);
-    ask(0, kToAll, {});
-    hear(encode_adu(18, "10 00 64 00 02"_hex));  // of another quantity
-    EXPECT_EQ(of(18).unasked, 1u);
-}
-
-TEST_F(SymptomsTest, AnAnswerToABroadcastIsNotWhatTheNextRequestIsAnswered) {
-    bus.submit(0, kToAll);
-    bus.run_for(200ms);
-    const Ticket ticket = bus.submit(18, kRead);
-    answer(bus, 18, "90 02"_hex);
-    bus.run_for(10ms);
-    bus.hear(encode_adu(18, kReply));
-    EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
-    EXPECT_EQ(of(18).broadcast_replies, 1u);
-    EXPECT_EQ(of(18).wrong, 0u);
-}
-
-TEST_F(SymptomsTest, WhatComesLongAfterABroadcastDoesNotAnswerIt) {
-    ask(0, kWrite, {});
-    for (int i = 0; i < 5; ++i) ask(17, kRead, encode_adu(17, kReply));
-    bus.run_for(timing::kLatestBroadcastAnswer);
-    hear(encode_adu(18, kWrite));
-    EXPECT_EQ(of(18).broadcast_replies, 0u);
-}
-
-TEST_F(SymptomsTest, AGoodFrameThatDoesNotAnswerIsWrongInWhateverPiecesItComes) {
-    const Bytes longer = encode_adu(17, "03 08 00 01 00 02 00 03 12 34"_hex);
-    for (const std::size_t cut : {3u, 6u, 11u}) {
-        bus.submit(17, kRead);
-        bus.run_to_end_of_request();
-        bus.run_for(3ms);
-        bus.hear(ByteView(longer).first(cut));
-        bus.run_for(2ms);
-        bus.hear(ByteView(longer).subspan(cut));
-        bus.run_for(400ms);
-    }
-    EXPECT_EQ(of(17).wrong, 3u);
-    EXPECT_EQ(of(17).damaged(), 0u);
-}
-
-TEST_F(SymptomsTest, AFrameThatOurRequestCutsInTwoIsNoNoise) {
-    ask(17, kRead, encode_adu(17, kReply));
-    const Bytes unasked = encode_adu(18, "03 02 00 07"_hex);
-    bus.hear(ByteView(unasked).first(4));
-    bus.run_for(60ms);
-    bus.submit(17, kRead);
-    bus.run_to_end_of_request();
-    bus.hear(ByteView(unasked).subspan(4));
-    bus.run_for(5ms);
-    bus.hear(encode_adu(17, kReply));
-    bus.run_for(400ms);
-    EXPECT_EQ(of(17).strays, of(17).torn);
-    EXPECT_EQ(of(17).damaged(), 0u);
-    EXPECT_EQ(of(17).answered, 2u);
-}
-
 TEST_F(SymptomsTest, TheAnswerWithAnotherAddressIsCountedForTheAskedStation) {
     ask(18, kRead, encode_adu(18, kReply));
+    bus.run_for(timing::kSecondPanel);
     ask(17, kRead, encode_adu(18, reply_number(7)));
     ask(17, kRead, encode_adu(18, "03 02 00 07"_hex));  // another length answers nothing
     EXPECT_EQ(of(17).misaddressed, 1u);
     EXPECT_EQ(of(18).misaddressed, 0u);
-}
-
-TEST_F(SymptomsTest, AnEarlierReplyOnceMoreIsNoDuplicateOfTheLast) {
-    for (unsigned i = 1; i <= 3; ++i) ask(17, read_at(i), encode_adu(17, reply_number(i)));
-    hear(encode_adu(17, reply_number(1)));
-    EXPECT_EQ(of(17).old_replies, 1u);
-    EXPECT_EQ(of(17).doubled, 0u);
-}
-
-TEST_F(SymptomsTest, AReplyWithoutItsFirstByteIsKnownAsSuch) {
-    const Bytes reply = encode_adu(17, kReply);
-    ask(17, kRead, Bytes(reply.begin() + 1, reply.end()));
-    EXPECT_EQ(of(17).damaged_short, 1u);
-    EXPECT_EQ(of(17).beheaded, 1u);
 }
 
 TEST_F(SymptomsTest, AReadThatIsAnsweredWhenAskedAgainWasMissed) {
@@ -276,15 +133,6 @@ TEST_F(SymptomsTest, AReadThatIsAnsweredWhenAskedAgainWasMissed) {
     ask(17, read_at(2), encode_adu(17, reply_number(4)));
     EXPECT_EQ(of(17).silences, 2u);
     EXPECT_EQ(of(17).repeated, 1u) << "the third may be a place that it lacks";
-}
-
-TEST_F(SymptomsTest, AFrameOfNobodyIsCountedForTheStationThatItNames) {
-    ask(17, kRead, encode_adu(17, kReply));
-    hear(encode_adu(18, "03 02 00 07"_hex));
-    hear(encode_adu(99, "03 02 00 07"_hex));
-    EXPECT_EQ(of(17).unasked, 0u);
-    EXPECT_EQ(of(18).unasked, 1u);
-    EXPECT_EQ(of(0).unasked, 1u);
 }
 
 }  // namespace

@@ -43,14 +43,13 @@ TEST(Explain, TellsWhatIsDecided) {
          read + "refused: 3 of 256 wait on this line, at most 32 of one client"},
         {Decision::Kind::shed,
          read + "given up: the queue is full, and its host has the most waiting"},
-        {Decision::Kind::doubted,
-         read + "asked once more: its answer repeats an earlier one and may be a duplicate of it"},
         {Decision::Kind::expired,
          read + "given up after 500.0 ms: it could not end before its deadline"},
         {Decision::Kind::unanswered,
          read + "given up after 500.0 ms: no answer before its deadline"},
         {Decision::Kind::condition,
-         "station 17 is failing now: no retries, and a fifth of the line's time at most"},
+         "station 17 is failing now: no retries, and with other suspects a fifth of the line's "
+         "time at most"},
         {Decision::Kind::line_rests,
          "only this request is sent for 500.0 ms: station 17 did not answer and may do so late"},
     };

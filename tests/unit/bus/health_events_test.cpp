@@ -79,7 +79,7 @@ TEST_F(HealthEventsTest, P10OneThatWasOfflineIsToldSoAgainWhenItsProbeIsSilent) 
 
 /// It is heard, so it is not silent (P4); no request gets a value, so it is no success.
 TEST_F(HealthEventsTest, P10APanelThatIsAlwaysLateIsSuspectWhereverOneLooks) {
-    line->think = 8ms;
+    line->think = 9500us;
     std::string lates;
     for (int i = 0; i < settings.arbiter.offline.after + 3; ++i) {
         line->reply.back() = static_cast<std::uint8_t>(i);
