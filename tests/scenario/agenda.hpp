@@ -38,7 +38,7 @@ class Agenda {
     void keep_history() { keeps_history_ = true; }
     void tell(std::string_view what, ByteView bytes = {}) {
         if (!keeps_history_) return;
-        constexpr std::size_t kKept = 2000;
+        constexpr std::size_t kKept = 20000;
         history_.push_back(std::to_string((now_ - started_) / 1us) + " us  " + std::string(what) +
                            "  " + to_hex(bytes));
         if (history_.size() > kKept) history_.pop_front();

@@ -16,8 +16,6 @@ Checker::Checker(const Plan& plan)
     : plan_(plan),
       settings_(plan_.settings),
       calm_(plan.is_calm()),
-      adaptive_(
-          std::ranges::any_of(settings_.stations, &arbiter::StationSettings::adaptive_timeout)),
       echoes_(plan.line.echo || plan.line.echo_writes || plan.line.partial_echo > 0 ||
               std::ranges::any_of(plan.panels,
                                   [](const PanelPlan& p) { return p.repeats_request > 0; })),
@@ -26,13 +24,17 @@ Checker::Checker(const Plan& plan)
     for (const arbiter::StationSettings& station : settings_.stations) {
         if (station.retry_writes) repeat_writes_.insert(station.id);
     }
-    for (const PanelPlan& panel : plan_.panels) {
-        if (panel.overtakes) orders_.try_emplace(panel.id);
-    }
 }
 
 void Checker::fail(std::string what) {
     if (violation_.empty()) violation_ = std::move(what);
+}
+
+/// No client may get this: in the world of a limit it is counted.
+void Checker::fail_value(std::string what) {
+    if (plan_.limit == Limit::none) return fail(std::move(what));
+    ++wrong_values_;
+    if (wrong_value_.empty()) wrong_value_ = std::move(what);
 }
 
 Duration Checker::gap() const { return silent_interval(settings_.serial); }
@@ -40,7 +42,7 @@ Duration Checker::gap() const { return silent_interval(settings_.serial); }
 void Checker::on_accepted(TimePoint now, arbiter::Ticket ticket, const arbiter::Job& job) {
     if (ticket <= last_ticket_) fail("P3: a ticket was given twice");
     last_ticket_ = ticket;
-    waiting_before_ = open_.size() >= settings_.queue.limit ? waiting() : 0;
+    came_ = true;
     const bool joins = joins_attempt(now, job);
     const Open open{.job = job,
                     .submitted = now,
@@ -57,31 +59,12 @@ void Checker::on_accepted(TimePoint now, arbiter::Ticket ticket, const arbiter::
     if (open.write) open_writes_[key_of(job.station, job.request.pdu())] = ticket;
 }
 
-/// The answer to what it was asked last equals that: if nobody waits for it any more, it may be our
-/// own frame, which comes back late (P8).
-bool Checker::may_be_echo(std::uint8_t station) const {
-    const auto asked = asked_.find(station);
-    return asked != asked_.end() && !modbus::is_pure_read(asked->second) &&
-           modbus::normal_write_reply(asked->second) == asked->second;
-}
-
-/// The last answer that was heard of it before `since` equalled its request.
-bool Checker::was_like_echo(std::uint8_t station, TimePoint since) const {
-    const auto unlike = unlike_echo_.find(station);
-    return said_.contains(station) && (unlike == unlike_echo_.end() || unlike->second > since);
-}
-
 void Checker::on_refused(TimePoint now, const arbiter::Job& job, Fault fault) {
     const Client& client = clients_[job.client];
     // A late reply is told from what may follow it by a silence.
     constexpr Duration kSilence = 50ms;
-    // What a probe was answered may repeat another answer, and is held for as long as its station
-    // needs (P1): see check_idling().
-    const TimePoint held = heard_until_ + watch_.own_slowest(job.station) + 20ms;
-    const bool may_be_held = attempt_.answered && attempt_.station == job.station && now <= held;
-    if (fault == Fault::offline && !may_be_held && watch_.is_good(job.station, now - kSilence) &&
-        !was_like_echo(job.station, now - kSilence) &&
-        !is_only_overdue(job.station, now - kSilence))
+    const bool told = noisy_since_ > replied_[job.station] || now > heard_until_ + kSilence;
+    if (fault == Fault::offline && told && watch_.is_good(job.station, now - kSilence))
         fail("P4: a good station was refused as offline: " + std::to_string(job.station));
     if (fault != Fault::busy) return;
     if (client.polite) fail("P9: a polite client was refused");
@@ -123,15 +106,13 @@ void Checker::on_finish(TimePoint now, const arbiter::Finish& finish) {
     open_.erase(found);
     if (const auto client = clients_.find(open.job.client); client != clients_.end()) {
         --client->second.open;
-        if (!finish.pdu &&
-            (watch_.is_silent(open.job.station) || now < rests_for(finish.ticket, open)))
+        if (!finish.pdu && (watch_.is_silent(open.job.station) || now < rests_for(open)))
             client->second.held_until = now;
     }
     check_in_time(now, open, finish);
     // Who was sent before, in a joined read, is told so when it has to go. Not all that look as if
     // they went along with a frame were: what was split before goes alone.
     const auto is = [&](Fault fault) { return !finish.pdu && finish.pdu.error() == fault; };
-    if (is(Fault::timeout)) watch_.on_timeout(now);
     displaced_ = displaced_ || is(Fault::busy) || (open.sent && is(Fault::timeout));
     if (open.write) {
         const std::string key = key_of(open.job.station, open.job.request.pdu());
@@ -142,7 +123,6 @@ void Checker::on_finish(TimePoint now, const arbiter::Finish& finish) {
     }
     if (!open.gone && open.job.station != plan_.odd) waits_.push_back(now - open.submitted);
     if (finish.pdu) {
-        told_ = now;
         if (!finish.age) mark_answered(open.job.station);
         check_reply(now, open, finish);
     } else {
@@ -158,30 +138,12 @@ void Checker::check_in_time(TimePoint now, const Open& open, const arbiter::Fini
     if (!slept || (finish.pdu && !open.gone)) fail("P3: answered after its deadline");
 }
 
-/// It is slower than ever, and that nobody waits for, or believes: where it or another has just
-/// been silent all of them may have died, whose whole timeouts together P4 forbids; and where an
-/// earlier reply of its form is owed this one may be that of a panel that does not serve in order
-/// (P1).
-bool Checker::is_overdue(TimePoint now, std::uint8_t station) const {
-    const auto replied = replied_.find(station);
-    const TimePoint came = attempt_.answered && replied != replied_.end() ? replied->second : now;
-    return attempt_.station == station && (!attempt_.trusted || attempt_.owed) &&
-           came > attempt_.sent + attempt_.needed;
-}
-
-/// It was, each time that it did not answer, and was not heard before `since`.
-bool Checker::is_only_overdue(std::uint8_t station, TimePoint since) const {
-    const auto found = missed_.find(station);
-    return found != missed_.end() && found->second.only_overdue && since <= found->second.heard;
-}
-
 /// A sound panel's requests do not fail, unless something hit them.
 void Checker::check_fault(TimePoint now, const Open& open, Fault fault) {
     const std::uint8_t station = open.job.station;
     if (open.gone || station == kBroadcast || !watch_.is_good(station, open.submitted)) return;
-    // What came back could be the echo, not the reply: also where bytes that nobody says keep
-    // reads from showing whether there is one.
-    if (open.write && (echoes_ || (plan_.line.floating > 0 && may_be_echo(station)))) return;
+    // What came back could be the echo, not the reply.
+    if (open.write && echoes_) return;
     const bool at_deadline = now >= open.submitted + settings_.queue.deadline - 500ms;
     const bool polite = clients_[open.job.client].polite;
     if (calm_ && last_transmit_ < open.submitted && fault != Fault::busy)
@@ -193,18 +155,9 @@ void Checker::check_fault(TimePoint now, const Open& open, Fault fault) {
     const bool refused = (truth_.refused(station, open.job.request.pdu(), open.submitted) ||
                           truth_.refused(station, asked_[station], open.submitted)) &&
                          watch_.rests_until(station) > open.submitted;
-    // What would confirm it may be the answer to a broadcast, and its place cannot be read (P8).
-    constexpr Duration kLatestAnswer = 5s;
-    const auto spread = open.write
-                            ? spread_.find(modbus::normal_write_reply(open.job.request.pdu()))
-                            : spread_.end();
-    if (fault == Fault::timeout && spread != spread_.end() &&
-        open.submitted < spread->second + kLatestAnswer &&
-        truth_.refused(station, asked_[station], open.submitted))
-        return;
     const bool failed =
         was_heard(fault) || fault == Fault::offline || (fault == Fault::timeout && !at_deadline);
-    if (failed && !refused && !is_overdue(now, station))
+    if (failed && !refused)
         fail("P4: a sound panel's request failed: " + std::string(label(fault)));
 }
 
@@ -213,11 +166,10 @@ void Checker::check_reply(TimePoint now, const Open& open, const arbiter::Finish
     if (modbus::exception_of(reply)) {
         const Bytes& asked = open.job.request.pdu();
         constexpr std::uint8_t kBusy = 6;
-        if (reply[1] == kBusy)
-            announced_[{open.job.station, form_of(asked_[open.job.station])}] = owed_until();
+        if (reply[1] == kBusy) announced_[{open.job.station, asked[0]}] = owed_until();
         const bool said = truth_.refused(open.job.station, asked, open.submitted);
         if (!said && !is_luck(heard_for(open, reply)))
-            fail("P1: an exception that the station did not send to this request");
+            fail_value("P1: an exception that the station did not send to this request");
         return;
     }
     ++good_;
@@ -231,7 +183,10 @@ void Checker::check_write(TimePoint now, const Open& open, const Bytes& reply) {
     const auto done = truth_.executed(open.job.station, open.job.request.pdu());
     // The start of our own frame comes back, and its last byte is what somebody makes of a reply.
     if ((!done || *done > now) && is_luck(heard_for(open, reply))) return;
-    if ((!done || *done > now) && !is_behind_first_copy(now, open.job.station))
+    const bool is_late = !done || *done > now;
+    if (is_late && plan_.limit != Limit::none)
+        return too_soon_.push_back(key_of(open.job.station, open.job.request.pdu()));
+    if (is_late && !is_behind_first_copy(now, open.job.station))
         return fail("P8: a write was confirmed that no station executed");
     if (!done) return;
     clients_[open.job.client].own_write[open.job.station] = *done;
@@ -243,7 +198,7 @@ void Checker::check_values(TimePoint now, const Open& open, const arbiter::Finis
     const std::uint16_t first = word(pdu, 1);
     const std::uint16_t count = word(pdu, 3);
     if (reply.size() != 2 + std::size_t{2} * count || reply[0] != pdu[0])
-        return fail("P1: a reply of another length or function");
+        return fail_value("P1: a reply of another length or function");
     const auto client = clients_.find(open.job.client);
     TimePoint since = finish.age ? TimePoint{} : open.submitted;
     if (client != clients_.end()) {
@@ -256,9 +211,8 @@ void Checker::check_values(TimePoint now, const Open& open, const arbiter::Finis
         const char* fault = truth_.fault_of(read, static_cast<std::uint16_t>(first + i), value);
         if (fault == nullptr) continue;
         if (is_behind_first_copy(now, open.job.station)) return;
-        if (attempt_.imitated && attempt_.station == open.job.station) return void(++excused_);
-        if (is_luck(heard_for(open, reply)) || is_padded(open, reply)) return;
-        return fail(fault);
+        if (is_luck(heard_for(open, reply))) return;
+        return fail_value(fault);
     }
 }
 
@@ -266,11 +220,6 @@ void Checker::check_values(TimePoint now, const Open& open, const arbiter::Finis
 bool Checker::is_behind_first_copy(TimePoint now, std::uint8_t station) const {
     const auto excused = excused_from_.find(station);
     return excused != excused_from_.end() && now < excused->second + 1s;
-}
-
-/// The late reply to a shorter read, whose panel has put a register of zeros behind its values.
-bool Checker::is_padded(const Open& open, const Bytes& reply) const {
-    return looks_late(open.job.station) && word(reply, reply.size() - 2) == 0;
 }
 
 /// What stood on the wire for this answer: of a part of a joined read only its values are known.
@@ -297,6 +246,8 @@ void Checker::at_end(TimePoint now) {
              std::to_string(first.job.client) + " to station " + std::to_string(first.job.station) +
              " was never answered");
     }
+    for (const std::string& write : too_soon_)
+        if (!truth_.executed(write)) fail_value("P8: a write was confirmed that nobody executed");
     const std::string dear = costs_.at_end(now - started_);
     if (!dear.empty()) fail(dear);
     for (const auto& [id, client] : clients_) {

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "costs.hpp"
-#include "order.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "plan.hpp"
@@ -24,33 +23,12 @@ namespace panelgate::scenario {
 /// Holds what an arbiter does against what it promises. Knows the truth (what the panels did and
 /// when) from the world and the claims (answers, frames) from the arbiter; shares no code with it.
 ///
-/// What has nothing on the wire to be told by no arbiter can mend. It is known by what the world
-/// knows, and nothing else passes:
+/// In a world of threats nothing passes but what has no sign on the wire:
 ///   - A good CRC by chance: nobody has said these bytes (Truth::is_chance()).
 ///   - A copy of a reply that has the form of the awaited one, before a copy came while its panel
 ///     was not asked: from then on the panel is known (T12). The answer that the copy displaces
 ///     comes one late (on_copy()).
-///   - A reply with more values than were asked for, right count and good CRC: byte for byte the
-///     late one to an earlier request of that length, or the answer to the present one
-///     (is_padded(), looks_late()).
-///   - A frame that nobody asked for, of the form of the awaited reply, while that is thought
-///     about: to this question alone (on_imitation()). What it leaves over to the next
-///     ones comes much sooner than the panel has ever answered, which 24 replies have shown before.
-///   - A reply that a later one has overtaken, where it can only be the awaited one for anybody who
-///     takes stations to serve in order, and nothing has come that this does not explain: the same
-///     bytes in the same order are those of a panel that serves in turn (Order,
-///     on_reply()). So is the one that it has displaced, and that comes one late.
-///   - A reply that begins later than any of its panel, where another or it has just been silent,
-///     or an earlier one of its form is owed: to wait for it is to wait for all who may have died
-///     with that one, to believe it is to believe the one that is owed (is_overdue()).
-///   - An answer that equals its request and comes when nobody waits for it any more, or between
-///     bytes that nobody says: it may be our own frame (may_be_echo()).
-///   - A confirmation that may be the answer to a broadcast of the last seconds, of a place that
-///     cannot be read (check_fault()).
-///   - A panel that is offline because it was overdue each time, until it has been heard; or whose
-///     last answer equals its request; or whose answer to a probe repeats another one, and is held
-///     (on_refused()).
-///   - A copy of a reply that nobody has heard whole: it is that reply (on_copy()).
+/// In the world of a limit wrong values are counted (wrong_values()); all other promises hold.
 class Checker : public Witness {
   public:
     explicit Checker(const Plan& plan);
@@ -80,11 +58,7 @@ class Checker : public Witness {
         truth_.on_exception(now, station, pdu);
     }
     void on_copy(TimePoint now, ByteView adu) override;
-    void on_imitation(std::uint8_t station) override {
-        attempt_.imitated =
-            attempt_.imitated || (!attempt_.answered && attempt_.station == station);
-    }
-    void on_reply(TimePoint now, ByteView adu, bool overtaken) override;
+    void on_reply(TimePoint now, ByteView adu) override;
     void on_said(TimePoint now, ByteView bytes) override { truth_.on_said(now, bytes); }
     void on_garbled(TimePoint now) override { garbled_ = now; }
     void on_collision(TimePoint now, std::uint8_t station) override;
@@ -101,6 +75,9 @@ class Checker : public Witness {
     bool failed() const { return !violation_.empty(); }
     /// The first one, "P1: …".
     const std::string& violation() const { return violation_; }
+    /// In the world of a limit: answers whose value or confirmation is none, and the first one.
+    std::uint64_t wrong_values() const { return wrong_values_; }
+    const std::string& wrong_value() const { return wrong_value_; }
     std::uint64_t good_answers() const { return good_; }
     std::uint64_t frames() const { return frames_; }
     std::uint64_t collisions() const { return collisions_; }
@@ -145,21 +122,18 @@ class Checker : public Witness {
     };
 
     void fail(std::string what);
+    void fail_value(std::string what);
     void close_attempt(TimePoint now);
     // What may be sent when (checker_wire.cpp)
     void check_moment(TimePoint now);
     void check_idling(TimePoint now);
-    bool may_have_echo() const;
     bool looks_late(std::uint8_t station) const;
     void check_write_sent(std::uint8_t station, ByteView pdu);
     void check_again(std::uint8_t station, ByteView pdu, FrameKind what);
     void check_crc(const Bytes& adu);
     TimePoint behind_broadcasts(const Open& open) const;
-    TimePoint behind_announced(arbiter::Ticket ticket, const Open& open) const;
-    TimePoint behind_copies(std::uint8_t station) const;
     std::optional<TimePoint> good_work_since(TimePoint since) const;
-    TimePoint rests_for(arbiter::Ticket ticket, const Open& open) const;
-    TimePoint behind_own(TimePoint since, arbiter::Ticket ticket, const Open& open) const;
+    TimePoint rests_for(const Open& open) const;
     bool is_noisy(TimePoint now) const;
     Duration least_wait() const;
     const arbiter::StationSettings& settings_of(std::uint8_t station) const;
@@ -169,79 +143,62 @@ class Checker : public Witness {
     void mark_sent(std::uint8_t station, ByteView pdu, FrameKind what);
     void mark_answered(std::uint8_t station);
     bool joins_attempt(TimePoint now, const arbiter::Job& job) const;
-    std::size_t waiting() const;
-    bool rests_behind_damage(std::uint8_t station, TimePoint since) const;
+    std::size_t waiting(arbiter::Ticket but_for = 0) const;
+    bool rides(const Open& newcomer) const;
     void check_turn(TimePoint now, bool write);
     // What may be answered (checker.cpp)
     void check_reply(TimePoint now, const Open& open, const arbiter::Finish& finish);
     void check_values(TimePoint now, const Open& open, const arbiter::Finish& finish);
     Bytes heard_for(const Open& open, const Bytes& reply) const;
-    bool is_padded(const Open& open, const Bytes& reply) const;
     bool is_behind_first_copy(TimePoint now, std::uint8_t station) const;
     bool is_luck(ByteView heard);
     void check_write(TimePoint now, const Open& open, const Bytes& reply);
     void check_fault(TimePoint now, const Open& open, Fault fault);
-    bool may_be_echo(std::uint8_t station) const;
-    bool was_like_echo(std::uint8_t station, TimePoint since) const;
-    bool is_overdue(TimePoint now, std::uint8_t station) const;
-    bool is_only_overdue(std::uint8_t station, TimePoint since) const;
     void check_in_time(TimePoint now, const Open& open, const arbiter::Finish& finish);
     Duration gap() const;
 
     Plan plan_;
     const arbiter::Settings& settings_;
     bool calm_ = false;
-    bool adaptive_ = false;
     bool echoes_ = false;  ///< or one panel repeats requests, as an adapter does that hears itself
     std::string violation_;
+    std::string wrong_value_;
+    std::uint64_t wrong_values_ = 0;
+    std::vector<std::string> too_soon_;  ///< writes that were confirmed and not yet executed
     Truth truth_;
     Watch watch_;
     Costs costs_;
     std::map<arbiter::Ticket, Open> open_;
     arbiter::Ticket last_ticket_ = 0;
-    static constexpr std::size_t kNobodyCame = SIZE_MAX;
-    std::uint64_t frames_settled_ = 0;          ///< frames_ when everything had settled last
-    std::size_t waiting_before_ = kNobodyCame;  ///< the newcomer that was taken last
-    bool displaced_ = false;                    ///< somebody had to go for it
+    std::uint64_t frames_settled_ = 0;  ///< frames_ when everything had settled last
+    bool came_ = false;                 ///< a newcomer that was taken
+    bool displaced_ = false;            ///< somebody had to go for it
     std::map<arbiter::Client, Client> clients_;
     std::map<std::string, int> written_;             ///< times that each write was on the wire
     std::unordered_set<std::string> closed_writes_;  ///< answered, or of nobody any more
     std::map<std::string, arbiter::Ticket> open_writes_;
     std::unordered_set<std::uint8_t> repeat_writes_;   ///< stations that allow it
-    std::unordered_set<std::uint8_t> doublers_;        ///< that have said a reply twice
-    std::unordered_set<std::uint8_t> known_doublers_;  ///< ... and were heard to, both times
+    std::unordered_set<std::uint8_t> known_doublers_;  ///< were heard to say a reply twice
     std::map<std::uint8_t, TimePoint> replied_;        ///< each station, the last time
     std::map<std::uint8_t, Bytes> said_;               ///< its last answer that was heard whole
-    std::map<std::uint8_t, TimePoint> unlike_echo_;    ///< the first that no request equals, since
-    std::map<std::uint8_t, Duration> begun_after_;     ///< a request: the latest begin of a reply
-    std::map<std::uint8_t, Order> orders_;             ///< of those who do not serve in turn
-    std::unordered_set<std::uint8_t> overtakers_;      ///< of them, who have shown so
     std::unordered_set<std::uint8_t> retried_;         ///< whose last request was a retry
-    struct Missed {
-        bool only_overdue = true;            ///< each time
-        TimePoint heard = TimePoint::max();  ///< the first answer since then
-    };
-    /// Until when an answer may be said again that came behind as many other bytes: perhaps it was
-    /// one of them, damaged.
-    std::map<std::uint8_t, TimePoint> behind_damage_;
-    std::map<std::uint8_t, Missed> missed_;  ///< stations that have failed, and not answered since
-    std::map<std::uint8_t, Bytes> asked_;    ///< what each station was asked last
+    std::map<std::uint8_t, Bytes> asked_;              ///< what each station was asked last
     std::map<Bytes, TimePoint> spread_;  ///< when broadcasts had left, by what would answer them
     std::map<std::uint8_t, TimePoint> excused_from_;  ///< see on_copy()
     /// Until when the reply may come that a refusal for being busy has announced, by the station
-    /// and its read's form.
-    std::map<std::pair<std::uint8_t, Bytes>, TimePoint> announced_;
+    /// and the function.
+    std::map<std::pair<std::uint8_t, std::uint8_t>, TimePoint> announced_;
     std::uint64_t first_copies_ = 0;
     std::uint64_t excused_ = 0;
     TimePoint garbled_{};
     std::uint64_t lucky_ = 0;  ///< see is_luck()
     Attempt attempt_;
-    std::map<std::uint8_t, bool> silent_before_;  ///< each station's transaction began
+    std::map<std::uint8_t, bool> silent_before_;               ///< each station's transaction began
+    std::unordered_set<std::uint8_t> silent_to_reads_before_;  ///< likewise
     TimePoint sent_until_{};
     TimePoint heard_until_{};
     TimePoint noisy_since_{};  ///< no silence since then
     TimePoint last_transmit_{};
-    TimePoint told_{};  ///< a reply was handed on
     TimePoint paused_from_{};
     TimePoint resumed_{};
     std::uint64_t last_read_turn_ = 0;

@@ -68,12 +68,12 @@ std::uint64_t rank_of(const arbiter::ReadSpan& span) {
 /// Of reads that one transaction answers in any case only one counts: one that another contains
 /// rides. Those that only touch are joined as far as a panel is known to take the length, which is
 /// not known here: they count.
-std::size_t Checker::waiting() const {
+std::size_t Checker::waiting(arbiter::Ticket but_for) const {
     std::size_t waiting = 0;
     std::vector<std::uint64_t> reads;
     reads.reserve(open_.size());
     for (const auto& [ticket, open] : open_) {
-        if ((open.sent && !open.again) || open.gone) continue;
+        if ((open.sent && !open.again) || open.gone || ticket == but_for) continue;
         if (!open.span || !settings_.share_reads) {
             ++waiting;
         } else {
@@ -92,31 +92,36 @@ std::size_t Checker::waiting() const {
     return waiting;
 }
 
+/// One that waits contains it: it does not count.
+bool Checker::rides(const Open& newcomer) const {
+    if (!newcomer.span || !settings_.share_reads) return false;
+    return std::ranges::any_of(open_, [&](const auto& entry) {
+        const Open& o = entry.second;
+        return &o != &newcomer && (!o.sent || o.again) && !o.gone && o.span &&
+               o.span->contains(*newcomer.span);
+    });
+}
+
 /// A newcomer may not raise what waits beyond the limit. More than it may wait all the same: what
 /// was taken for a joined read and refused by the panel waits again, and what rode along with a
 /// read that has gone counts again, when it was behind something older of its own client. A
 /// newcomer takes somebody's place then. Where a frame has left in the same moment nobody can tell
 /// which it was.
 void Checker::on_settled() {
-    const std::size_t before = std::exchange(waiting_before_, kNobodyCame);
+    const bool came = std::exchange(came_, false);
     const bool gone = std::exchange(frames_settled_, frames_) != frames_;
-    if (before == kNobodyCame || gone || displaced_ || open_.size() <= settings_.queue.limit)
-        return;
+    if (!came || gone || displaced_ || open_.size() <= settings_.queue.limit) return;
+    const auto newcomer = open_.find(last_ticket_);
+    if (newcomer == open_.end() || rides(newcomer->second)) return;
     const std::size_t after = waiting();
-    if (after > settings_.queue.limit && after > before)
+    if (after > settings_.queue.limit && after > waiting(last_ticket_))
         fail("P9: more requests wait than the limit allows: " + std::to_string(after) + " of " +
              std::to_string(settings_.queue.limit));
 }
 
-bool Checker::rests_behind_damage(std::uint8_t station, TimePoint since) const {
-    const auto found = behind_damage_.find(station);
-    return found != behind_damage_.end() && found->second > since;
-}
-
-/// P9: a waiting reader gets every fifth turn at least, unless its station rests for what it owes,
-/// or may say again (P1), or has not answered when it was asked last: then it has a share of its
-/// own (P4); or it says its replies twice, and is let finish. A write that is repeated takes no
-/// other turn.
+/// P9: a waiting reader gets every fifth turn at least, unless its station rests, for what it owes
+/// (P1) or as its settings say, or has not answered when it was asked last: then it has a share of
+/// its own (P4). A write that is repeated takes no other turn.
 void Checker::check_turn(TimePoint now, bool write) {
     constexpr std::uint64_t kWritesInARow = 4;
     constexpr std::size_t kRemembered = 8;
@@ -135,9 +140,7 @@ void Checker::check_turn(TimePoint now, bool write) {
         return !o.sent && !o.gone && o.job.priority == PriorityClass::read &&
                o.turn + kWritesInARow < turns_ && client != clients_.end() &&
                client->second.single && watch_.is_good(o.job.station, o.submitted) &&
-               !watch_.is_failing(o.job.station) && !doublers_.contains(o.job.station) &&
-               watch_.rests_until(o.job.station) <= first &&
-               !rests_behind_damage(o.job.station, first);
+               !watch_.is_failing(o.job.station) && rests_for(o) <= first;
     });
     if (starves != open_.end())
         fail("P9: five writes in a row while a reader waits: " + std::to_string(starves->first));

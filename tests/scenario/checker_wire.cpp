@@ -14,16 +14,6 @@ namespace {
 
 constexpr std::size_t kLongestAdu = 256;
 
-/// True for two writes to one place: of their values the confirmation says nothing.
-bool are_confirmed_alike(ByteView before, ByteView pdu) {
-    const auto is_longer_write = [](ByteView request) {
-        return !request.empty() && (request[0] == modbus::kWriteMultipleCoils ||
-                                    request[0] == modbus::kWriteMultipleRegisters);
-    };
-    return is_longer_write(before) && is_longer_write(pdu) &&
-           modbus::normal_write_reply(before) == modbus::normal_write_reply(pdu);
-}
-
 }  // namespace
 
 void Checker::on_line_up(TimePoint now) {
@@ -33,7 +23,7 @@ void Checker::on_line_up(TimePoint now) {
 }
 
 void Checker::on_line_down(TimePoint now) {
-    if (!attempt_.answered) watch_.on_unanswered(now, attempt_.station, !attempt_.heard);
+    if (!attempt_.answered) watch_.on_unanswered(attempt_.station, !attempt_.heard, attempt_.read);
     watch_.on_upset(now);
     attempt_.answered = true;
 }
@@ -54,77 +44,46 @@ void Checker::on_heard(TimePoint now, std::size_t bytes) {
     if (first > std::max(heard_until_, sent_until_) + gap()) noisy_since_ = first;
     heard_until_ = now;
     attempt_.heard = true;
-    attempt_.bytes += bytes;
 }
 
 void Checker::on_answered(TimePoint now, std::uint8_t station) {
     on_heard(now, 1);
-    const auto missed = missed_.find(station);
-    if (missed != missed_.end()) missed->second.heard = std::min(missed->second.heard, now);
     const auto said = said_.find(station);
     const bool is_its =
         said == said_.end() || modbus::answers(asked_[station], modbus::pdu_of(said->second));
     if (attempt_.answered || attempt_.station != station || !is_its) return;
     attempt_.answered = true;
-    if (said != said_.end() && attempt_.bytes > said->second.size())
-        behind_damage_[station] = now + 150ms;
-    missed_.erase(station);
+    // The request has left sooner than anybody computes (T7).
+    if (!settings_.paced) sent_until_ = std::min(sent_until_, now);
     silent_before_[station] = false;
+    silent_to_reads_before_.erase(station);
     replied_[station] = now;
-    const auto size = modbus::reply_length_from_request(asked_[station]).value_or(0);
-    // What equals its request, and comes when nobody waits for it, shows nothing: see
-    // may_be_echo().
-    const bool shows =
-        !may_be_echo(station) || open_writes_.contains(key_of(station, asked_[station]));
-    Duration& latest = begun_after_[station];
-    if (shows) latest = std::max(latest, now - attempt_.sent - frame_time(settings_.serial, size));
-    attempt_.first = !watch_.has_answered(attempt_.station);
-    const bool is_first = shows && watch_.on_answered(now, attempt_.station, now - attempt_.sent);
-    // What the way held back may have reached the station only now.
-    if (is_first && settings_.may_stall) watch_.on_owed(attempt_.station, owed_until());
-    // Of two attempts nobody knows which one the reply was for.
-    if (attempt_.owed) watch_.on_owed(attempt_.station, owed_until());
-    if (watch_.is_good(attempt_.station, now)) costs_.on_answered(now, attempt_);
+    const bool is_first = watch_.on_answered(now, station);
+    // What the way held back may have reached the station only now, and of two attempts nobody
+    // knows which one the reply was for.
+    if ((is_first && settings_.may_stall) || attempt_.owed) watch_.on_owed(station, owed_until());
+    if (watch_.is_good(station, now)) costs_.on_answered(now, attempt_);
 }
 
-/// A copy tells that this station says its replies twice: but not one of a reply that nobody has
-/// heard whole, which is the reply, nor one behind a retry, which may be the reply to that. The
-/// first one that comes in place of the answer to another request is found by asking once more.
-/// Where the very same is asked again it is that answer for any gateway, and what it has displaced
-/// comes one late: see Checker.
+/// A copy that comes while nothing is asked tells that this station says its replies twice (T12):
+/// but not one behind a retry, which may be the reply to that. What comes before in place of the
+/// answer to another request is that answer for any gateway, and what it has displaced comes one
+/// late.
 void Checker::on_copy(TimePoint now, ByteView adu) {
     const std::uint8_t station = adu[0];
     const bool awaited = !attempt_.answered && attempt_.station == station;
     if (!awaited && retried_.contains(station)) return;
-    doublers_.insert(station);
     const auto said = said_.find(station);
     if (said == said_.end() || !std::ranges::equal(said->second, adu)) return;
     if (!awaited) known_doublers_.insert(station);
     if (!awaited || known_doublers_.contains(station)) return;
     ++first_copies_;
+    if (plan_.limit == Limit::copies_first) return;
     ++excused_;
     excused_from_[station] = now;
 }
 
-/// One that another has overtaken is the answer to the request on the wire for anybody, where order
-/// explains all that has come, and leaves no other request that it could be to. So is the one that
-/// it has displaced, and that comes one late.
-void Checker::on_reply(TimePoint now, ByteView adu, bool overtaken) {
-    const std::uint8_t station = adu[0];
-    said_[station].assign(adu.begin(), adu.end());
-    if (adu[1] == modbus::kWriteSingleCoil || adu[1] == modbus::kWriteSingleRegister) {
-        unlike_echo_.erase(station);
-    } else {
-        unlike_echo_.try_emplace(station, now);
-    }
-    const auto order = orders_.find(station);
-    if (order == orders_.end()) return;
-    const bool is_last =
-        order->second.on_reply(now, adu.subspan(1, adu.size() - 3), latest_reply(station));
-    if (overtaken) overtakers_.insert(station);
-    if (overtakers_.contains(station) && is_last && attempt_.station == station)
-        attempt_.imitated = true;
-}
+void Checker::on_reply(TimePoint, ByteView adu) { said_[adu[0]].assign(adu.begin(), adu.end()); }
 
 /// Bytes without a pause for longer than any frame: nobody's answer, and no reason to wait
 /// (LAT-02).
@@ -143,15 +102,17 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     check_again(station, pdu, what);
     // A retry belongs to the silence that it follows, whoever was asked between.
     bool& was_silent = silent_before_[station];
-    if (what != FrameKind::retry) was_silent = watch_.is_silent(station);
+    if (what != FrameKind::retry) {
+        was_silent = watch_.is_silent(station);
+        silent_to_reads_before_.erase(station);
+        if (watch_.is_silent_to_reads(station)) silent_to_reads_before_.insert(station);
+    }
     if (what == FrameKind::retry) {
         retried_.insert(station);
-        watch_.on_again(now, station);
     } else {
         retried_.erase(station);
     }
     attempt_.was_silent = was_silent;
-    attempt_.trusted = what == FrameKind::request && watch_.is_trusted(now, station);
     const auto [asked, first] = last_asked_.try_emplace(station, now);
     if (!first) {
         longest_unasked_[station] = std::max(longest_unasked_[station], now - asked->second);
@@ -162,20 +123,14 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     attempt_.sent = sent_until_ = now + frame_time(settings_.serial, adu.size());
     attempt_.dead = dead;
     attempt_.answered = station == kBroadcast;
-    attempt_.first = false;
     attempt_.heard = false;
-    attempt_.bytes = 0;
-    attempt_.imitated = false;
+    attempt_.read = modbus::is_pure_read(pdu);
+    attempt_.like_echo =
+        !modbus::is_pure_read(pdu) && std::ranges::equal(modbus::normal_write_reply(pdu), pdu);
     attempt_.span = test::read_span(station, pdu);
     attempt_.again = what == FrameKind::retry;
-    const Bytes before = std::exchange(asked_[station], Bytes(pdu.begin(), pdu.end()));
-    attempt_.same = std::ranges::equal(before, pdu) || are_confirmed_alike(before, pdu);
-    const auto order = orders_.find(station);
-    if (order != orders_.end()) order->second.on_asked(attempt_.sent, pdu);
-    // Where an answer was not believed its own may still come, and the retry's fits both (P1).
-    attempt_.owed = now < watch_.rests_until(station) ||
-                    (what == FrameKind::retry && !watch_.is_failing(station));
-    attempt_.needed = begun_after_[station];
+    asked_[station].assign(pdu.begin(), pdu.end());
+    attempt_.owed = now < watch_.rests_until(station);
     last_transmit_ = now;
     const bool write = !modbus::is_pure_read(pdu);
     if (what != FrameKind::retry || !write) check_turn(now, write);
@@ -208,18 +163,14 @@ void Checker::check_moment(TimePoint now) {
         fail("P1: transmitted while the last request was outstanding");
 }
 
-/// Who has been silent, or is nobody's panel, is waited for as long as it has ever needed.
+/// T1: each silence is waited for as long as the user has said.
 Duration Checker::least_wait() const {
-    const std::uint8_t station = attempt_.station;
-    if (!attempt_.trusted || adaptive_)
-        return std::min<Duration>(watch_.own_slowest(station), 20ms);
-    return settings_.unlisted.response_timeout;
+    const arbiter::StationSettings& s = settings_of(attempt_.station);
+    return s.adaptive_timeout ? std::min(s.timeout_floor, s.response_timeout) : s.response_timeout;
 }
 
 void Checker::close_attempt(TimePoint now) {
     if (attempt_.answered) return;
-    Missed& missed = missed_[attempt_.station];
-    missed.only_overdue = missed.only_overdue && is_overdue(now, attempt_.station);
     const Duration cost = now - attempt_.started;
     const bool wanted = good_work_since(attempt_.started) == attempt_.started;
     const bool plain = calm_ && watch_.only_dies(attempt_.station) && !attempt_.heard;
@@ -227,7 +178,7 @@ void Checker::close_attempt(TimePoint now) {
         fail("P4: an attempt at a silent station cost " + std::to_string(cost / 1ms) + " ms");
     const std::string broken = costs_.on_unanswered(now, attempt_, wanted);
     if (!broken.empty()) fail(broken);
-    watch_.on_unanswered(now, attempt_.station, !attempt_.heard);
+    watch_.on_unanswered(attempt_.station, !attempt_.heard, attempt_.read);
     watch_.on_owed(attempt_.station, owed_until());
 }
 
@@ -258,23 +209,16 @@ void Checker::check_idling(TimePoint now) {
     // behind its reply at most, and is waited for a quarter longer than it has taken.
     constexpr std::size_t kReply = 45;
     const Duration slack = 25ms + (60ms + frame_time(settings_.serial, kReply)) * 5 / 4;
-    // An answer that repeats another one may be held back for as long as its station needs: it
-    // could be a copy of that, with its own still to come (P1). Values are not handed on then, but
-    // asked for once more. So may one that equals its request, for a timeout, where it could be
-    // the echo (P8).
-    const bool is_echo = may_have_echo() && may_be_echo(attempt_.station) && told_ < heard_until_;
-    const Duration needs = is_echo ? settings_of(attempt_.station).response_timeout
-                                   : watch_.own_slowest(attempt_.station);
-    const TimePoint held = heard_until_ + needs + 20ms;
-    const bool in_doubt = attempt_.answered && told_ <= attempt_.sent;
-    const TimePoint over =
-        std::max({sent_until_, heard_until_, is_echo || in_doubt ? held : std::min(told_, held)});
+    const TimePoint over = std::max(sent_until_, heard_until_);
+    if (now <= over + slack) return;
     const auto waited = good_work_since(over);
     if (!waited || now <= *waited + slack) return;
     const Duration idle = now - *waited;
     longest_idle_ = std::max(longest_idle_, idle);
     Duration most = slack;
-    if (!attempt_.answered) most += settings_.unlisted.response_timeout;
+    // P8: what equals its request may be the echo, where there are echoes.
+    const bool in_doubt = echoes_ && attempt_.like_echo;
+    if (!attempt_.answered || in_doubt) most += settings_.unlisted.response_timeout;
     if (attempt_.station == kBroadcast) most += settings_.broadcast_turnaround;
     // A reply of another length is, byte for byte, the late one to an earlier request of that
     // length that had no answer: nobody on the wire can tell. Behind a station that is late the
@@ -286,17 +230,6 @@ void Checker::check_idling(TimePoint now) {
              " ms while a request waited");
 }
 
-/// For all that anybody can know, what was sent last may come back: it does, at times, or in part;
-/// or its station has not answered before; or says its address and function in front of its
-/// replies, like an adapter that hears the beginning of what it sends, until as many answers have
-/// come as show that there is none.
-bool Checker::may_have_echo() const {
-    constexpr std::uint64_t kEnough = 16;
-    const auto panel = std::ranges::find(plan_.panels, attempt_.station, &PanelPlan::id);
-    const bool begins_twice = panel != plan_.panels.end() && panel->fragment > 0;
-    return attempt_.first || echoes_ || (begins_twice && good_ < kEnough);
-}
-
 /// It says replies of other lengths than were asked for.
 bool Checker::looks_late(std::uint8_t station) const {
     const auto panel = std::ranges::find(plan_.panels, station, &PanelPlan::id);
@@ -304,83 +237,57 @@ bool Checker::looks_late(std::uint8_t station) const {
 }
 
 /// Since when, but not before `since`, a request has waited that nothing keeps from going: it has
-/// not been sent, its station answers everything, and owes nothing (P1).
+/// not been sent, its station answers everything, and neither owes anything (P1) nor rests, and no
+/// older request of its client to that station has to wait. A client's broadcast goes behind its
+/// requests to stations that are silent, or rest, and before its later ones.
 std::optional<TimePoint> Checker::good_work_since(TimePoint since) const {
+    struct Ahead {
+        TimePoint any{};                              ///< until when an older request has to wait
+        TimePoint broadcast{};                        ///< the same of an older broadcast
+        std::map<std::uint8_t, TimePoint> station{};  ///< ... and of requests to this station
+    };
+    std::unordered_map<arbiter::Client, Ahead> ahead;
     std::optional<TimePoint> first;
     for (const auto& [ticket, o] : open_) {
+        if (o.gone) continue;
         const std::uint8_t station = o.job.station;
-        const bool good = !o.sent && !o.gone && station != kBroadcast &&
-                          !watch_.is_silent(station) && watch_.is_good(station, since) &&
-                          !(o.write && echoes_);
-        const TimePoint before = good ? behind_own(since, ticket, o) : TimePoint::max();
-        if (before == TimePoint::max()) continue;
-        const TimePoint from = std::max({since, o.submitted, before, rests_for(ticket, o)});
+        const auto [entry, is_new] = ahead.try_emplace(o.job.client);
+        Ahead& own = entry->second;
+        const auto client = clients_.find(o.job.client);
+        if (is_new && client != clients_.end() && client->second.held_until > since)
+            own.any = TimePoint::max();
+        if (!o.sent && station == kBroadcast) own.broadcast = own.any;
+        const bool silent = watch_.is_failing(station);  // a suspect has a share of its own (P4)
+        TimePoint& before = own.station[station];
+        const TimePoint rest = rests_for(o);
+        own.any = silent ? TimePoint::max() : std::max(own.any, rest);
+        if (o.sent) continue;
+        before = std::max(before, rest);
+        if (station == kBroadcast || silent || !watch_.is_good(station, since) ||
+            (o.write && echoes_) || own.broadcast == TimePoint::max())
+            continue;
+        const TimePoint from = std::max({since, o.submitted, own.broadcast, before});
         if (!first || from < *first) first = from;
     }
     return first;
 }
 
-/// P8: until when a panel that answers broadcasts may say what would confirm this write: for as
-/// long as it has ever needed, or, where it does so, as it may be late with anything.
+/// T11: until when a panel may answer a broadcast with what would confirm this write.
 TimePoint Checker::behind_broadcasts(const Open& open) const {
     const auto found = open.write ? spread_.find(modbus::normal_write_reply(open.job.request.pdu()))
                                   : spread_.end();
-    if (found == spread_.end()) return {};
-    const auto panel = std::ranges::find(plan_.panels, open.job.station, &PanelPlan::id);
-    const bool answers = panel != plan_.panels.end() && panel->answers_broadcasts;
-    const Duration timeout = settings_.unlisted.response_timeout;
-    return found->second + (answers ? timeout + settings_.unlisted.late_window.value_or(8 * timeout)
-                                    : 2 * watch_.own_slowest(open.job.station) + 50ms);
-}
-
-/// P1: until when the copy of its last reply may come. A copy may have been that of any equal reply
-/// of the last half second, and may then be half as late again.
-TimePoint Checker::behind_copies(std::uint8_t station) const {
-    constexpr Duration kLatest = 500ms;
-    const auto found = replied_.find(station);
-    return found == replied_.end() || !doublers_.contains(station)
-               ? TimePoint{}
-               : found->second + kLatest * 3 / 2;
-}
-
-/// P1: until when the reply that was announced could be taken for that to this request, or to one
-/// of its client that goes before it.
-TimePoint Checker::behind_announced(arbiter::Ticket ticket, const Open& open) const {
-    TimePoint over{};
-    for (const auto& [older, o] : open_) {
-        if (older > ticket) break;
-        if (o.sent || o.gone || o.job.client != open.job.client ||
-            o.job.station != open.job.station)
-            continue;
-        const auto found = announced_.find({o.job.station, form_of(o.job.request.pdu())});
-        if (found != announced_.end()) over = std::max(over, found->second);
-    }
-    return over;
+    return found == spread_.end() ? TimePoint{} : found->second + latest_reply(open.job.station);
 }
 
 /// Until when its station is not asked for it, because of what that has said or may yet say.
-TimePoint Checker::rests_for(arbiter::Ticket ticket, const Open& open) const {
-    const auto damaged = behind_damage_.find(open.job.station);
-    return std::max({watch_.rests_until(open.job.station), behind_broadcasts(open),
-                     behind_announced(ticket, open), behind_copies(open.job.station),
-                     damaged == behind_damage_.end() ? TimePoint{} : damaged->second});
-}
-
-/// Its client's broadcast goes before it, and behind a request to a station that is silent, or
-/// rests: until when; max(): nobody knows.
-TimePoint Checker::behind_own(TimePoint since, arbiter::Ticket ticket, const Open& open) const {
-    const auto client = clients_.find(open.job.client);
-    const bool held = client != clients_.end() && client->second.held_until > since;
-    TimePoint rest = held ? TimePoint::max() : TimePoint{};
-    TimePoint behind{};
-    for (const auto& [older, o] : open_) {
-        if (older >= ticket) break;
-        if (o.gone || o.job.client != open.job.client) continue;
-        if (!o.sent && o.job.station == kBroadcast) behind = rest;
-        rest = watch_.is_silent(o.job.station) ? TimePoint::max()
-                                               : std::max(rest, rests_for(older, o));
-    }
-    return behind;
+TimePoint Checker::rests_for(const Open& open) const {
+    const std::uint8_t station = open.job.station;
+    const auto announced = announced_.find({station, open.job.request.function()});
+    const auto replied = replied_.find(station);
+    const Duration pause = settings_of(station).station_gap;
+    return std::max({watch_.rests_until(station), behind_broadcasts(open),
+                     announced == announced_.end() ? TimePoint{} : announced->second,
+                     replied == replied_.end() ? TimePoint{} : replied->second + pause});
 }
 
 void Checker::check_write_sent(std::uint8_t station, ByteView pdu) {
@@ -395,9 +302,7 @@ void Checker::check_write_sent(std::uint8_t station, ByteView pdu) {
 /// Retries are for those who are there, and not for the silent.
 void Checker::check_again(std::uint8_t station, ByteView pdu, FrameKind what) {
     if (what != FrameKind::retry) return;
-    const auto before = silent_before_.find(station);
-    const bool was_silent = before != silent_before_.end() && before->second;
-    if (was_silent && watch_.only_dies(station) && calm_)
+    if (silent_to_reads_before_.contains(station) && watch_.only_dies(station) && calm_)
         fail("P4: a silent station was asked again at once");
     const auto span = test::read_span(station, pdu);
     const bool wanted = std::ranges::any_of(open_, [&](const auto& entry) {

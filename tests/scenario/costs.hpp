@@ -17,16 +17,12 @@ struct Attempt {
     TimePoint sent;           ///< its computed end
     bool dead = false;        ///< its panel could not answer
     bool was_silent = false;  ///< the station was silent before
-    bool trusted = false;     ///< it answered the last time
     bool answered = true;
-    bool first = false;     ///< by the first answer of its station
-    bool heard = false;     ///< anything
-    std::size_t bytes = 0;  ///< that were heard in it, before the last ones of its answer
-    bool again = false;     ///< it was on the wire before
-    bool same = false;      ///< its station was asked the very same before
-    bool owed = false;      ///< an earlier one may still be answered
-    Duration needed{};      ///< by its station so far to begin its reply, at most
-    bool imitated = false;  ///< what had the form of its answer, and was none, came before that
+    bool read = false;
+    bool heard = false;      ///< anything
+    bool like_echo = false;  ///< a write whose confirmation equals the request
+    bool again = false;      ///< it was on the wire before
+    bool owed = false;       ///< an earlier one may still be answered
     std::optional<arbiter::ReadSpan> span;
 };
 

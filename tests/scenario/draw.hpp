@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include "plan.hpp"
 #include "random.hpp"
 
@@ -35,5 +37,13 @@ void draw_clients(Random& random, Plan& plan, unsigned most);
 void draw_healthy_load(Plan& plan);
 void draw_flood(Random& random, Plan& plan);
 void draw_writers(Random& random, Plan& plan);
+
+/// What makes a line odd: all of it but the odd panel, and that.
+struct Oddness {
+    Oddity oddity;
+    void (*make)(Plan& all, PanelPlan& panel);
+};
+std::span<const Oddness> odd_threats();
+std::span<const Oddness> odd_limits();
 
 }  // namespace panelgate::scenario

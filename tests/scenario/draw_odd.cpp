@@ -1,106 +1,89 @@
 #include <algorithm>
+#include <cstdlib>
 
 #include "draw.hpp"
+#include "panelgate/base/serial_format.hpp"
 
 namespace panelgate::scenario {
 namespace {
 
-struct Row {
-    Oddity oddity;
-    std::string_view name;
-    void (*make)(Plan& all, PanelPlan& panel);
-};
-
-/// Its client asks the very same without a pause, so that what is left over of a request meets the
-/// next one.
-void imitate(Plan& all, PanelPlan& panel, bool last) {
-    panel.imitates = 2s;
-    panel.imitates_last = last;
-    panel.overtakes = true;
-    panel.think = 100ms;
-    all.clients.back().same_read = last;
-    all.clients.back().writes = 0;
-    all.clients.back().pause = {};
+/// Its answer is there before the computed end of the request: both say their characters in half of
+/// the time.
+void make_quick(Plan& all, PanelPlan& panel) {
+    all.settings.paced = false;
+    all.line.own_rate = 0.5;
+    panel.own_rate = 0.5;
+    panel.think = {};
+    panel.eager = true;
 }
 
-constexpr Row kRows[] = {
-    {Oddity::none, "none",
-     [](Plan&, PanelPlan&) {
+/// In every other seed its station has the key that it needs, and then no request may fail.
+void make_pausing(Plan& all, PanelPlan& panel) {
+    const auto pause = static_cast<int>(30 + all.seed * 7 % 71);
+    panel.deaf_after = std::chrono::milliseconds(pause);
+    if (all.seed % 2 == 0) return;
+    all.settings.stations.back().station_gap = panel.deaf_after + 2ms;
+    all.clients.back().polite = true;
+}
 
-     }},
-    {Oddity::wrong_function, "wrong_function", [](Plan&, PanelPlan& p) { p.wrong_function = 1; }},
-    {Oddity::padded_inside, "padded_inside", [](Plan&, PanelPlan& p) { p.padded_inside = 1; }},
-    {Oddity::padded_behind, "padded_behind", [](Plan&, PanelPlan& p) { p.padded_behind = 1; }},
-    {Oddity::doubled, "doubled",
+constexpr Oddness kThreats[] = {
+    {Oddity::wrong_function, [](Plan&, PanelPlan& p) { p.wrong_function = 1; }},
+    {Oddity::padded_inside, [](Plan&, PanelPlan& p) { p.padded_inside = 1; }},
+    {Oddity::padded_behind, [](Plan&, PanelPlan& p) { p.padded_behind = 1; }},
+    {Oddity::doubled,
      [](Plan&, PanelPlan& p) {
          p.duplicate = 1;
          p.duplicate_delay = 30ms;
      }},
-    {Oddity::tails, "tails", [](Plan&, PanelPlan& p) { p.tail = 1; }},
-    {Oddity::fragments, "fragments", [](Plan&, PanelPlan& p) { p.fragment = 1; }},
-    {Oddity::glitches, "glitches",
-     [](Plan&, PanelPlan& p) { p.glitch_before = p.glitch_behind = 1; }},
-    {Oddity::damaged_first, "damaged_first", [](Plan&, PanelPlan& p) { p.damaged_first = 0.5; }},
-    {Oddity::holes, "holes",
+    {Oddity::tails, [](Plan&, PanelPlan& p) { p.tail = 1; }},
+    {Oddity::fragments, [](Plan&, PanelPlan& p) { p.fragment = 1; }},
+    {Oddity::glitches, [](Plan&, PanelPlan& p) { p.glitch_before = p.glitch_behind = 1; }},
+    {Oddity::holes,
      [](Plan&, PanelPlan& p) {
          p.hole = 0.3;
          p.hole_limit = 40ms;
      }},
-    {Oddity::naps, "naps", [](Plan&, PanelPlan& p) { p.nap = 0.02; }},
-    {Oddity::mute, "mute", [](Plan&, PanelPlan& p) { p.mute = 0.2; }},
-    {Oddity::drops, "drops", [](Plan&, PanelPlan& p) { p.drop = 0.2; }},
-    {Oddity::flips, "flips", [](Plan&, PanelPlan& p) { p.flip = 0.3; }},
-    {Oddity::reboots, "reboots", [](Plan&, PanelPlan& p) { p.reboots = 10s; }},
-    {Oddity::babbles, "babbles",
-     [](Plan& all, PanelPlan&) {
-         all.line.babble = all.seed % 2 == 0 ? Duration(100ms) : Duration(5s);
+    {Oddity::naps,
+     [](Plan& all, PanelPlan& p) {
+         p.nap = 0.02;
+         for (arbiter::StationSettings& station : all.settings.stations)
+             station.late_window = std::max<Duration>(*station.late_window, 2300ms);
      }},
-    {Oddity::answers_broadcasts, "answers_broadcasts",
+    {Oddity::mute, [](Plan&, PanelPlan& p) { p.mute = 0.2; }},
+    {Oddity::drops, [](Plan&, PanelPlan& p) { p.drop = 0.2; }},
+    {Oddity::flips, [](Plan&, PanelPlan& p) { p.flip = 0.3; }},
+    {Oddity::reboots, [](Plan&, PanelPlan& p) { p.reboots = 10s; }},
+    {Oddity::babbles,
+     [](Plan& all, PanelPlan&) {
+         // What hits a request costs its timeout (T1): more often, and the line is of no use.
+         constexpr std::size_t kFrame = 13;
+         const Duration often = 60 * frame_time(all.settings.serial, kFrame);
+         all.line.babble = all.seed % 2 == 0 ? std::max<Duration>(1s, often) : Duration(5s);
+     }},
+    {Oddity::answers_broadcasts,
      [](Plan& all, PanelPlan& p) {
          p.answers_broadcasts = true;
          for (ClientPlan& client : all.clients) client.broadcasts = 0.02;
      }},
-    {Oddity::dies, "dies", [](Plan&, PanelPlan& p) { p.flapping = 10s; }},
-    {Oddity::refuses_long, "refuses_long",
-     [](Plan& all, PanelPlan& p) {
-         p.max_registers = 20;
-         p.refusal = 1 + static_cast<unsigned>(all.seed % 4);
-     }},
-    {Oddity::ignores_long, "ignores_long",
-     [](Plan&, PanelPlan& p) {
-         p.max_registers = 20;
-         p.refusal = 0;
-     }},
-    {Oddity::unasked, "unasked", [](Plan& all, PanelPlan& p) { imitate(all, p, false); }},
-    {Oddity::repeats_last, "repeats_last", [](Plan& all, PanelPlan& p) { imitate(all, p, true); }},
-    {Oddity::writes_echoed, "writes_echoed",
-     [](Plan& all, PanelPlan& p) {
-         all.line.echo_writes = true;
-         all.settings.echo = EchoMode::automatic;
-         p.deaf_to_writes = 0.3;
-     }},
-    {Oddity::echoed_twice, "echoed_twice",
-     [](Plan& all, PanelPlan& p) {
-         all.line.echo = all.line.echo_twice = true;
-         all.settings.echo = EchoMode::automatic;
-         p.deaf_to_writes = 0.3;
-     }},
-    {Oddity::broadcasts_late, "broadcasts_late",
+    {Oddity::broadcasts_late,
      [](Plan& all, PanelPlan& p) {
          p.answers_broadcasts = true;
          p.broadcast_think = 150ms;
          p.deaf_to_writes = 0.3;
          for (ClientPlan& client : all.clients) client.broadcasts = 0.02;
      }},
-    {Oddity::repeats_requests, "repeats_requests",
-     [](Plan&, PanelPlan& p) { p.repeats_request = 0.3; }},
-    {Oddity::overtakes, "overtakes",
-     [](Plan&, PanelPlan& p) {
-         p.overtakes = true;
-         p.late = 0.3;
-         p.late_limit = 1.8;
+    {Oddity::dies, [](Plan&, PanelPlan& p) { p.flapping = 10s; }},
+    {Oddity::refuses_long,
+     [](Plan& all, PanelPlan& p) {
+         p.max_registers = 20;
+         p.refusal = 1 + static_cast<unsigned>(all.seed % 4);
      }},
-    {Oddity::outlives_connection, "outlives_connection",
+    {Oddity::ignores_long,
+     [](Plan&, PanelPlan& p) {
+         p.max_registers = 20;
+         p.refusal = 0;
+     }},
+    {Oddity::outlives_connection,
      [](Plan& all, PanelPlan& p) {
          all.settings.may_stall = true;
          all.settings.paced = false;
@@ -109,20 +92,36 @@ constexpr Row kRows[] = {
          p.late = 0.2;
          p.late_limit = 1.8;
      }},
+    {Oddity::pauses, make_pausing},
+    {Oddity::quick, make_quick},
+    {Oddity::neighbours,
+     [](Plan& all, PanelPlan& p) {
+         p.flapping = 10s;
+         for (PanelPlan& panel : all.panels)
+             panel.expects_replies = all.settings.unlisted.response_timeout;
+     }},
 };
 
-const Row& row_of(Oddity oddity) { return *std::ranges::find(kRows, oddity, &Row::oddity); }
+void make_odd(Oddity oddity, Plan& plan) {
+    for (const auto& rows : {odd_threats(), odd_limits()}) {
+        const auto row = std::ranges::find(rows, oddity, &Oddness::oddity);
+        if (row != rows.end()) return row->make(plan, plan.panels.back());
+    }
+    std::abort();
+}
 
 }  // namespace
 
-std::string_view label(Oddity oddity) { return row_of(oddity).name; }
+std::span<const Oddness> odd_threats() { return kThreats; }
 
 Plan without_oddity(Plan plan) {
     PanelPlan plain = plain_panel(plan.odd);
     plain.think = plan.panels.back().think;
+    plain.own_rate = plan.line.own_rate;
     plan.panels.back() = plain;
-    plan.line.babble = {};
+    plan.line.babble = plan.line.hands_over = {};
     plan.line.echo = plan.line.echo_writes = plan.line.echo_twice = false;
+    plan.limit = Limit::none;
     return plan;
 }
 
@@ -130,6 +129,7 @@ Plan draw_odd(Oddity oddity, std::uint64_t seed) {
     Random random(seed * 37);
     Plan plan;
     plan.seed = seed;
+    plan.limit = row_of(oddity)->limit;
     draw_line(random, plan);
     arbiter::Settings& s = plan.settings;
     s.queue.limit = 64;
@@ -137,8 +137,6 @@ Plan draw_odd(Oddity oddity, std::uint64_t seed) {
     s.unlisted.response_timeout = random.between(200ms, 500ms);
     s.unlisted.retries = 1;
     s.unlisted.late_window = s.unlisted.response_timeout * 5 / 2 + 300ms;
-    if (oddity == Oddity::naps)
-        s.unlisted.late_window = std::max<Duration>(*s.unlisted.late_window, 2300ms);
     const unsigned count = random.between(4, 6);
     for (unsigned i = 0; i < count; ++i) {
         PanelPlan panel = plain_panel(static_cast<std::uint8_t>(i * 5 + 1));
@@ -156,7 +154,7 @@ Plan draw_odd(Oddity oddity, std::uint64_t seed) {
         plan.clients.push_back(client);
     }
     plan.odd = plan.panels.back().id;
-    row_of(oddity).make(plan, plan.panels.back());
+    make_odd(oddity, plan);
     return plan;
 }
 

@@ -101,9 +101,6 @@ void draw_manners(Random& random, Plan& plan) {
         const auto maybe = [&](double most) {
             return random.chance(0.3) ? random.share() * most : 0;
         };
-        panel.wrong_function = maybe(0.1);
-        panel.damaged_first = maybe(0.2);
-        panel.padded_inside = maybe(0.1);
         panel.fragment = maybe(0.2);
         panel.tail = maybe(0.3);
         panel.glitch_behind = maybe(0.3);

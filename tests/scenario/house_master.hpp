@@ -59,8 +59,7 @@ class HouseMaster {
         void on_executed(TimePoint, std::uint8_t, ByteView) override {}
         void on_exception(TimePoint, std::uint8_t, ByteView) override {}
         void on_copy(TimePoint, ByteView) override {}
-        void on_imitation(std::uint8_t) override {}
-        void on_reply(TimePoint, ByteView, bool) override {}
+        void on_reply(TimePoint, ByteView) override {}
         void on_said(TimePoint, ByteView) override {}
         void on_garbled(TimePoint) override {}
         void on_collision(TimePoint, std::uint8_t) override {}

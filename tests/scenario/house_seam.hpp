@@ -26,8 +26,7 @@ class HouseJudge final : public Witness {
         truth_.on_exception(now, station, pdu);
     }
     void on_copy(TimePoint, ByteView) override {}
-    void on_imitation(std::uint8_t) override {}
-    void on_reply(TimePoint, ByteView, bool) override {}
+    void on_reply(TimePoint, ByteView) override {}
     void on_said(TimePoint now, ByteView bytes) override { truth_.on_said(now, bytes); }
     void on_garbled(TimePoint) override { ++garbled_; }
     void on_collision(TimePoint, std::uint8_t) override {}

@@ -41,6 +41,21 @@ void Panel::reboot() {
     agenda_.at(agenda_.now() + kSilence + plan_.reboots, [this] { reboot(); });
 }
 
+bool Panel::takes(ByteView adu) {
+    const TimePoint start = wire_.asked_since();
+    const bool concerns = adu[0] == 0 || adu[0] == plan_.id;
+    if (plan_.expects_replies > Duration::zero()) {
+        const bool taken_for_reply = start < std::exchange(expects_until_, TimePoint{});
+        if (taken_for_reply) return false;
+        if (!concerns) expects_until_ = agenda_.now() + plan_.expects_replies;
+    }
+    return concerns && start >= replied_ + plan_.deaf_after;
+}
+
+void Panel::overhear() {
+    if (agenda_.now() < expects_until_) expects_until_ = {};
+}
+
 void Panel::hear(ByteView adu, std::uint64_t connection) {
     constexpr std::size_t kRing = 4;
     const ByteView pdu = adu.subspan(1, adu.size() - 3);
@@ -129,7 +144,6 @@ void Panel::imitate(const Request& request, Duration thinking) {
     said.bytes = spoken(line_.serial, plan_.id, reply, plan_.crc_order);
     said.rate = plan_.own_rate;
     said.station = plan_.id;
-    said.imitation = true;
     said.connection = request.connection;
     agenda_.at(agenda_.now() + thinking * 2 / 5, [this, said] { wire_.say(said); });
 }
@@ -141,8 +155,7 @@ void Panel::answer(const Request& request, const Bytes& reply) {
     const Duration spare = timeout - since - silent_interval(line_.serial);
     last_reply_ = reply;
     std::vector<Utterance> all = voice_.speak(reply, spare);
-    for (Utterance& one : all) one.said.overtaken = request.arrived < answered_;
-    answered_ = std::max(answered_, request.arrived);
+    if (plan_.refuses_first > 0 && random_.chance(plan_.refuses_first)) refuse_first(request, all);
     if (plan_.repeats_request > 0 && random_.chance(plan_.repeats_request)) {
         Said said;
         said.bytes = spoken(line_.serial, plan_.id, request.pdu, plan_.crc_order);
@@ -152,6 +165,19 @@ void Panel::answer(const Request& request, const Bytes& reply) {
         all.insert(all.begin(), {Duration{}, std::move(said)});
     }
     say_all(std::move(all), 0, plan_.any_connection ? wire_.connection() : request.connection);
+}
+
+/// An exception that is none of 05 and 06, and that the reply follows all the same.
+void Panel::refuse_first(const Request& request, std::vector<Utterance>& all) {
+    constexpr unsigned kDeviceFailure = 4;
+    Said said;
+    said.bytes =
+        spoken(line_.serial, plan_.id, refuse(request.pdu, kDeviceFailure), plan_.crc_order);
+    said.rate = plan_.own_rate;
+    said.station = plan_.id;
+    said.answer_to = said.bytes.size();
+    all.front().pause = 20ms;
+    all.insert(all.begin(), {Duration{}, std::move(said)});
 }
 
 /// One piece after another; the last one is the gap.
@@ -171,7 +197,7 @@ void Panel::say_all(std::vector<Utterance> all, std::size_t next, std::uint64_t 
         piece.said.connection = connection;
         const bool is_answer = piece.said.answer_to > 0;
         const TimePoint end = wire_.say(std::move(piece.said));
-        if (is_answer) answer_ends_ = end;
+        if (is_answer) answer_ends_ = replied_ = end;
         if (next == all.size())
             return agenda_.at(end + silent_interval(line_.serial), [this] { serve_next(); });
         agenda_.at(end, [this, all = std::move(all), next, connection] {
@@ -191,14 +217,20 @@ Bytes Panel::serve(ByteView pdu) {
     if (random_.chance(plan_.wrong_function))
         return {static_cast<std::uint8_t>(0x84 ^ (pdu[0] & 4)), 2};
     if (random_.chance(plan_.exception)) return refuse(pdu, 6);
-    if (pdu[0] > 4) {
-        write(pdu);
-        return {pdu.begin(), pdu.begin() + 5};
-    }
+    if (pdu[0] > 4) return confirm(pdu);
     if (word(pdu, 3) > plan_.max_registers) return refuse(pdu, plan_.refusal);
     witness_.on_served(agenda_.now(), plan_.id);
     ++served_;
     return read(pdu);
+}
+
+Bytes Panel::confirm(ByteView pdu) {
+    Bytes& last = confirmed_[pdu[0]];
+    if (plan_.confirms_last > 0 && !last.empty() && random_.chance(plan_.confirms_last))
+        return last;
+    write(pdu);
+    last.assign(pdu.begin(), pdu.begin() + 5);
+    return last;
 }
 
 Bytes Panel::read(ByteView pdu) const {

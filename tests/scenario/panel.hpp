@@ -2,6 +2,7 @@
 
 #include <array>
 #include <deque>
+#include <map>
 #include <set>
 #include <vector>
 
@@ -26,7 +27,12 @@ class Panel {
 
     /// What it does unasked.
     void start();
-    /// A frame for this panel (or a broadcast) has ended now, undamaged.
+    /// A request has ended now, undamaged. True if this panel takes it for one of its own, or a
+    /// broadcast.
+    bool takes(ByteView adu);
+    /// Somebody else than the gateway begins to speak.
+    void overhear();
+    /// It has taken this.
     void hear(ByteView adu, std::uint64_t connection);
     bool is_dead() const;
     std::uint8_t id() const { return plan_.id; }
@@ -46,6 +52,8 @@ class Panel {
     void imitate(const Request& request, Duration thinking);
     Bytes serve(ByteView pdu);
     Bytes refuse(ByteView pdu, unsigned code);
+    Bytes confirm(ByteView pdu);
+    void refuse_first(const Request& request, std::vector<Utterance>& all);
     Bytes read(ByteView pdu) const;
     void write(ByteView pdu);
     /// From now until it begins to speak.
@@ -68,7 +76,9 @@ class Panel {
     TimePoint dark_until_{};
     TimePoint imitated_{};
     TimePoint answer_ends_ = TimePoint::max();  ///< of what it is saying
-    TimePoint answered_{};  ///< when the latest request had arrived that it has answered
+    TimePoint replied_{};                       ///< its last answer ended
+    TimePoint expects_until_{};  ///< another station's reply: PanelPlan::expects_replies
+    std::map<std::uint8_t, Bytes> confirmed_;  ///< the last write of each function
     Bytes last_reply_;
 };
 

@@ -1,7 +1,6 @@
 #include "plan.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 
 #include "draw.hpp"
 #include "random.hpp"
@@ -12,10 +11,12 @@ bool PanelPlan::is_sound(Duration timeout, Duration reply_hole) const {
     constexpr unsigned kLongestRead = 20;  // that a client asks for
     const bool ever_silent = drop > 0 || deaf_to_writes > 0 || mute > 0 || nap > 0 || late > 0 ||
                              dead || flapping > Duration::zero() || reboots > Duration::zero() ||
-                             only_registers > 0 || (refusal == 0 && max_registers < kLongestRead);
+                             only_registers > 0 || confirms_last > 0 ||
+                             deaf_after > Duration::zero() ||
+                             (refusal == 0 && max_registers < kLongestRead);
     const bool ever_wrong = flip > 0 || truncate > 0 || noise > 0 || wrong_id > 0 || foreign > 0 ||
-                            wrong_function > 0 || damaged_first > 0 || padded_inside > 0 ||
-                            imitates > Duration::zero() || repeats_request > 0;
+                            wrong_function > 0 || refuses_first > 0 || damaged_first > 0 ||
+                            padded_inside > 0 || imitates > Duration::zero() || repeats_request > 0;
     const Duration slowest = std::max(think, slow_think) + (fragment > 0 ? 40ms : 10ms);
     return !ever_silent && !ever_wrong && slowest < timeout &&
            (hole == 0 || hole_limit + 16ms < reply_hole);
@@ -32,51 +33,17 @@ bool Plan::is_sound(const PanelPlan& panel) const {
 }
 
 bool Plan::is_calm() const {
+    // What comes later than a copy does is a late reply, for all that anybody knows.
+    static constexpr Duration kLatestCopy = 60ms;
     const auto in_time = [](const PanelPlan& p) {
-        return p.late == 0 && p.nap == 0 && p.damaged_first == 0 &&
-               p.slow_think == Duration::zero();
+        return (p.duplicate == 0 || p.duplicate_delay <= kLatestCopy) && p.late == 0 &&
+               p.nap == 0 && p.damaged_first == 0 && p.slow_think == Duration::zero();
     };
     const bool nothing_held = !settings.may_stall && line.pauses == 0 && line.losses == 0;
     const bool alone =
         line.idle_noise == 0 && !line.other_master && line.cut_echo == 0 && line.damaged_echo == 0;
     return std::ranges::all_of(panels, in_time) && nothing_held && alone &&
            settings.quarantine != arbiter::Quarantine::line;
-}
-
-std::string_view label(Kind kind) {
-    switch (kind) {
-        case Kind::faults:
-            return "faults";
-        case Kind::station:
-            return "station";
-        case Kind::echo:
-            return "echo";
-        case Kind::dead:
-            return "dead";
-        case Kind::crowd:
-            return "crowd";
-        case Kind::adaptive:
-            return "adaptive";
-        case Kind::voices:
-            return "voices";
-        case Kind::receiver:
-            return "receiver";
-        case Kind::company:
-            return "company";
-        case Kind::loss:
-            return "loss";
-        case Kind::stall:
-            return "stall";
-        case Kind::flood:
-            return "flood";
-        case Kind::mass:
-            return "mass";
-        case Kind::writers:
-            return "writers";
-        case Kind::wild:
-            return "wild";
-    }
-    std::abort();
 }
 
 namespace {
@@ -89,6 +56,15 @@ void each_station(Plan& plan, const auto& change) {
 void trust_automatic_window(Plan& plan) {
     each_station(plan, [](auto& station) { station.late_window.reset(); });
     for (PanelPlan& panel : plan.panels) panel.late_limit = 1.8;
+}
+
+/// Of panels of which many are that late, some replies outlast the automatic window.
+void draw_beyond(Plan& plan) {
+    each_station(plan, [](auto& station) { station.late_window.reset(); });
+    for (PanelPlan& panel : plan.panels) {
+        panel.late = 0.02;
+        panel.late_limit = 3;
+    }
 }
 
 void draw_echo(Random& random, Plan& plan) {
@@ -183,6 +159,7 @@ void draw_faulty(Random& random, Plan& plan, Kind kind) {
     }
     if (kind == Kind::stall) draw_stalls(random, plan);
     if (kind == Kind::wild) draw_everything(random, plan);
+    if (kind == Kind::beyond) draw_beyond(plan);
 }
 
 bool is_of_sound_panels(Kind kind) {
@@ -207,6 +184,7 @@ Plan draw(Kind kind, std::uint64_t seed, SerialMode mode) {
     Random random(seed * 31 + static_cast<std::uint64_t>(kind));
     Plan plan;
     plan.seed = seed;
+    plan.limit = row_of(kind)->limit;
     plan.settings.serial.mode = mode;
     if (mode == SerialMode::ascii) plan.settings.serial.data_bits = 7;
     draw_line(random, plan);

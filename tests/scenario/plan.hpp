@@ -7,6 +7,7 @@
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "worlds.hpp"
 
 namespace panelgate::scenario {
 
@@ -24,7 +25,7 @@ struct PanelPlan {
     bool ring = true;    ///< takes requests while it thinks and serves them in turn; else deaf then
     double late = 0;     ///< answers after 0.5 to `late_limit` response timeouts
     /// In response timeouts: what would be answered later than this is forgotten. Beyond the late
-    /// window no gateway can tell an old reply from the new one, so no plan goes there.
+    /// window no gateway can tell an old reply from the new one: Kind::beyond alone goes there.
     double late_limit = 3;
     double nap = 0;       ///< thinks for 2 s
     double own_rate = 1;  ///< its characters take this much longer than the line's
@@ -36,6 +37,12 @@ struct PanelPlan {
     unsigned refusal = 3;         ///< the exception for more than those; 0 = silence
     unsigned only_registers = 0;  ///< silent to reads of any other number; 0 = to none
     double wrong_function = 0;    ///< answers with an exception of another function
+    double refuses_first = 0;     ///< says an exception, and the reply 20 ms behind that
+    double confirms_last = 0;     ///< says the function's last confirmation; the write is not done
+    Duration deaf_after{};        ///< ignores what begins this soon behind its own reply
+    /// Takes what begins this soon behind another station's request for that one's reply, and
+    /// ignores it, as libmodbus's server does (libmodbus#83 #799).
+    Duration expects_replies{};
     bool answers_broadcasts = false;
     Duration broadcast_think{};  ///< before it does; 0 = up to 8 ms
     bool dead = false;
@@ -55,8 +62,9 @@ struct PanelPlan {
     double tail = 0;       ///< 1 to 3 bytes 0.5 to 5 ms behind the reply
     double duplicate = 0;  ///< the reply comes twice, the second up to this much later:
     Duration duplicate_delay{};
-    double damaged_first = 0;  ///< a damaged reply, and the good one 60 ms later
-    double padded_inside = 0;  ///< two bytes too many under the CRC
+    bool duplicate_differs = false;  ///< it has other values: a second panel's
+    double damaged_first = 0;        ///< a damaged reply, and the good one 60 ms later
+    double padded_inside = 0;        ///< two bytes too many under the CRC
     double padded_behind = 0;
     // Habits
     bool overtakes = false;       ///< thinks about each request by itself, whatever waits
@@ -110,91 +118,11 @@ struct LinePlan {
                                ///< the while, and the newest is told what is said later
     double pauses = 0;         ///< by second: nobody calls the arbiter for 0.1 to 5 s
     Duration babble{};         ///< a good frame that nobody asked for, each such time
+    /// In each such time the adapter hands over the last reply of the odd panel once more, while a
+    /// request of that form leaves.
+    Duration hands_over{};
     bool other_master = false;  ///< a polite one, with a panel of its own
 };
-
-enum class Kind : std::uint8_t {
-    faults,
-    station,
-    echo,
-    dead,
-    crowd,
-    adaptive,
-    voices,    ///< sound panels, oddly spoken
-    receiver,  ///< echoes of every sort
-    company,   ///< others on the wire
-    loss,      ///< line, process and clients come and go
-    stall,     ///< RTU over TCP that holds frames back
-    flood,     ///< one host against many
-    mass,      ///< several panels die in one instant
-    writers,   ///< endless writes
-    wild       ///< all of it
-};
-inline constexpr Kind kKinds[] = {Kind::faults,  Kind::station,  Kind::echo,   Kind::dead,
-                                  Kind::crowd,   Kind::adaptive, Kind::voices, Kind::receiver,
-                                  Kind::company, Kind::loss,     Kind::stall,  Kind::flood,
-                                  Kind::mass,    Kind::writers,  Kind::wild};
-std::string_view label(Kind kind);
-
-/// What exactly one panel of a line does.
-enum class Oddity : std::uint8_t {
-    none,
-    wrong_function,
-    padded_inside,
-    padded_behind,
-    doubled,
-    tails,
-    fragments,
-    glitches,
-    damaged_first,
-    holes,
-    naps,
-    mute,
-    drops,
-    flips,
-    reboots,
-    babbles,
-    answers_broadcasts,
-    dies,
-    refuses_long,
-    ignores_long,
-    unasked,        ///< a frame too many, and its answers may be one behind
-    repeats_last,   ///< the same with a reply once more
-    writes_echoed,  ///< and it is deaf to some
-    echoed_twice,   ///< the same of an echo of all requests
-    broadcasts_late,
-    repeats_requests,
-    overtakes,
-    outlives_connection,
-};
-inline constexpr Oddity kOddities[] = {Oddity::wrong_function,
-                                       Oddity::padded_inside,
-                                       Oddity::padded_behind,
-                                       Oddity::doubled,
-                                       Oddity::tails,
-                                       Oddity::fragments,
-                                       Oddity::glitches,
-                                       Oddity::damaged_first,
-                                       Oddity::holes,
-                                       Oddity::naps,
-                                       Oddity::mute,
-                                       Oddity::drops,
-                                       Oddity::flips,
-                                       Oddity::reboots,
-                                       Oddity::babbles,
-                                       Oddity::answers_broadcasts,
-                                       Oddity::dies,
-                                       Oddity::refuses_long,
-                                       Oddity::ignores_long,
-                                       Oddity::unasked,
-                                       Oddity::repeats_last,
-                                       Oddity::writes_echoed,
-                                       Oddity::echoed_twice,
-                                       Oddity::broadcasts_late,
-                                       Oddity::repeats_requests,
-                                       Oddity::overtakes,
-                                       Oddity::outlives_connection};
-std::string_view label(Oddity oddity);
 
 /// One run: a line, its panels, its clients. The same seed gives the same run.
 struct Plan {
@@ -205,6 +133,7 @@ struct Plan {
     LinePlan line;
     std::size_t transactions = 1000;  ///< frames that the gateway sends before the run ends
     std::uint8_t odd = 0;             ///< the one panel that is
+    Limit limit = Limit::none;        ///< that this run reaches: wrong values are counted
 
     bool is_sound(const PanelPlan& panel) const;
     /// Nothing but silence of panels keeps a line idle: replies are never late, nothing is held.

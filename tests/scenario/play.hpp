@@ -14,6 +14,8 @@ namespace panelgate::scenario {
 struct Outcome {
     std::string violation;
     std::string history;
+    std::uint64_t wrong_values = 0;  ///< in the world of a limit: see Checker::wrong_values()
+    std::string wrong_value;         ///< the first of them
     std::uint64_t frames = 0;
     std::uint64_t good = 0;
     std::uint64_t collisions = 0;
@@ -30,6 +32,9 @@ struct Outcome {
     Duration longest_idle{};
 };
 Outcome play(const Plan& plan, bool with_history = false);
+/// One run with the oddity, and one without; what was broken, or nothing. P9: of one odd panel the
+/// others do not wait much longer.
+std::string compare(Oddity oddity, std::uint64_t seed, Outcome& with, bool history = false);
 
 /// Of ten, the ninth.
 Duration p90(std::vector<Duration> waits);

@@ -65,8 +65,8 @@ std::uint64_t Truth::served(std::uint8_t station) const {
     return found == stations_.end() ? 0 : found->second.served;
 }
 
-std::optional<TimePoint> Truth::executed(std::uint8_t station, ByteView pdu) const {
-    const auto found = executed_.find(key_of(station, pdu));
+std::optional<TimePoint> Truth::executed(const std::string& write) const {
+    const auto found = executed_.find(write);
     return found == executed_.end() ? std::nullopt : std::optional(found->second);
 }
 

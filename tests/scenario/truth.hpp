@@ -20,12 +20,6 @@ inline std::uint16_t word(ByteView bytes, std::size_t at) {
     return static_cast<std::uint16_t>(bytes[at] * 256 + bytes[at + 1]);
 }
 
-/// What replies to reads of one function and length have in common; of a write all of it.
-inline Bytes form_of(ByteView pdu) {
-    if (pdu[0] > 4) return {pdu.begin(), pdu.end()};
-    return {pdu[0], pdu[3], pdu[4]};
-}
-
 /// Registers from here on are memory that clients write; below, each holds how many requests its
 /// station has served, plus something of its own: a value tells when it was read.
 inline constexpr std::uint16_t kMemory = 1000;
@@ -52,7 +46,11 @@ class Truth {
     bool is_chance(ByteView bytes) const;
 
     std::uint64_t served(std::uint8_t station) const;
-    std::optional<TimePoint> executed(std::uint8_t station, ByteView pdu) const;
+    /// `write`: its key_of().
+    std::optional<TimePoint> executed(const std::string& write) const;
+    std::optional<TimePoint> executed(std::uint8_t station, ByteView pdu) const {
+        return executed(key_of(station, pdu));
+    }
     /// It refused this very request at `since` or later.
     bool refused(std::uint8_t station, ByteView pdu, TimePoint since) const;
 

@@ -32,7 +32,7 @@ std::vector<Utterance> Voice::speak(const Bytes& reply_pdu, Duration spare) {
     // Behind a piece that could be this reply, the reply is a frame of its own.
     const bool first = all.empty() || all.back().said.answer_to == 0;
     all.push_back({first ? Duration{} : silent_interval(line_.serial), main_part(reply_pdu, good)});
-    add_epilogue(all, good);
+    add_epilogue(all, reply_pdu, good);
     return all;
 }
 
@@ -101,10 +101,17 @@ Said Voice::main_part(const Bytes& reply, const Bytes& good) {
     return s;
 }
 
-void Voice::add_epilogue(std::vector<Utterance>& all, const Bytes& good) {
+/// What a second panel with this address says: other values.
+Bytes Voice::of_another(Bytes reply) const {
+    constexpr std::uint8_t kReads = 4;
+    for (std::size_t i = 2; reply[0] <= kReads && i < reply.size(); ++i) reply[i] ^= 0x5A;
+    return spoken(line_.serial, plan_.id, reply, plan_.crc_order);
+}
+
+void Voice::add_epilogue(std::vector<Utterance>& all, const Bytes& reply, const Bytes& good) {
     if (random_.chance(plan_.duplicate)) {
-        Said copy = said(good);
-        copy.copy = true;
+        Said copy = said(plan_.duplicate_differs ? of_another(reply) : good);
+        copy.copy = !plan_.duplicate_differs;
         // Always about as much later: what has been seen once can be waited for.
         all.push_back({plan_.duplicate_delay * random_.between(85, 100) / 100, std::move(copy)});
     }

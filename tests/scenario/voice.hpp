@@ -32,7 +32,8 @@ class Voice {
     Bytes random_bytes(unsigned least, unsigned most);
     std::uint8_t glitch();
     void add_preface(std::vector<Utterance>& all, const Bytes& reply, Duration spare);
-    void add_epilogue(std::vector<Utterance>& all, const Bytes& good);
+    void add_epilogue(std::vector<Utterance>& all, const Bytes& reply, const Bytes& good);
+    Bytes of_another(Bytes reply) const;
     Said main_part(const Bytes& reply, const Bytes& good);
     Bytes damage(Bytes adu);
     Duration time_of(std::size_t bytes) const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "speech.hpp"
 
@@ -36,6 +37,7 @@ Wire::FramePtr Wire::put(Said said) {
 }
 
 TimePoint Wire::say(Said said) {
+    begin_();
     const FramePtr frame = put(std::move(said));
     if (frame->damaged) {
         witness_.on_garbled(agenda_.now());
@@ -83,8 +85,24 @@ void Wire::leave(Bytes adu, std::uint64_t connection) {
     said.connection = connection;
     const FramePtr frame = put(std::move(said));
     echo(frame);
+    hand_over(*frame);
     agenda_.at(frame->end, [this, frame] {
+        asked_since_ = frame->start;
         if (!frame->garbled_from) ask_(frame->bytes, frame->connection);
+    });
+}
+
+/// An adapter that still holds a frame hands it over behind the begin of a request (LinePlan).
+void Wire::hand_over(const Frame& request) {
+    const Duration each = plan_.line.hands_over;
+    if (each == Duration{} || request.station != plan_.odd || last_reply_.empty()) return;
+    const bool answers =
+        modbus::answers(modbus::pdu_of(request.bytes), modbus::pdu_of(last_reply_));
+    if (!answers || agenda_.now() < handed_over_ + each) return;
+    handed_over_ = agenda_.now();
+    agenda_.at(request.start + (request.end - request.start) / 2, [this, held = last_reply_] {
+        agenda_.tell("next is what the adapter has held");
+        arrive({.bytes = held, .answer_of = plan_.odd, .connection = connection_, .reply = held});
     });
 }
 
@@ -160,9 +178,7 @@ void Wire::deliver(const FramePtr& frame, std::size_t from, std::size_t to) {
             answered ? frame->station : std::uint8_t{0},
             frame->connection,
             ends && frame->copy ? understood(plan_.settings.serial, frame->bytes) : Bytes{},
-            ends && frame->imitation ? frame->station : std::uint8_t{0},
-            answered ? understood(plan_.settings.serial, said(*frame)) : Bytes{},
-            frame->overtaken});
+            answered ? understood(plan_.settings.serial, said(*frame)) : Bytes{}});
 }
 
 /// Something else than what was said; never a good frame by chance: that is the CRC's affair.
@@ -192,9 +208,8 @@ void Wire::arrive(Held held) {
     }
     if (!held.copy.empty()) agenda_.tell("next ends the copy of what was said before");
     if (!held.copy.empty()) witness_.on_copy(agenda_.now(), held.copy);
-    if (!held.reply.empty()) witness_.on_reply(agenda_.now(), held.reply, held.overtaken);
-    if (held.imitation_of != 0) agenda_.tell("next ends what is no answer");
-    if (held.imitation_of != 0) witness_.on_imitation(held.imitation_of);
+    if (!held.reply.empty()) witness_.on_reply(agenda_.now(), held.reply);
+    if (!held.reply.empty() && held.answer_of == plan_.odd) last_reply_ = held.reply;
     hear_(held.bytes, held.answer_of);
 }
 

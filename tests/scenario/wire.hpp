@@ -22,8 +22,6 @@ struct Said {
     std::size_t answer_from = 0;
     std::size_t answer_to = 0;
     bool copy = false;            ///< it was said before
-    bool imitation = false;       ///< it has the form of the answer, and is none
-    bool overtaken = false;       ///< a later request was answered before
     bool damaged = false;         ///< not what its speaker meant
     std::size_t hole_before = 0;  ///< this byte comes later by
     Duration hole{};
@@ -39,12 +37,15 @@ class Wire {
     using Hear = std::function<void(ByteView bytes, std::uint8_t answer_of)>;
     /// A request has left undamaged, on this connection.
     using Ask = std::function<void(ByteView adu, std::uint64_t connection)>;
+    /// Somebody else than the gateway begins to speak.
+    using Begin = std::function<void()>;
 
     Wire(const Plan& plan, Agenda& agenda, Random& random, Witness& witness)
         : plan_(plan), agenda_(agenda), random_(random), witness_(witness) {}
-    void connect(Hear hear, Ask ask) {
+    void connect(Hear hear, Ask ask, Begin begin = [] {}) {
         hear_ = std::move(hear);
         ask_ = std::move(ask);
+        begin_ = std::move(begin);
     }
 
     /// The gateway sends.
@@ -56,6 +57,8 @@ class Wire {
     Duration time_of(std::size_t characters, double rate) const;
 
     bool is_up() const { return up_; }
+    /// When the request began that has ended now.
+    TimePoint asked_since() const { return asked_since_; }
     std::uint64_t connection() const { return connection_; }
     void go_down() { up_ = false; }
     /// Nothing that was said before, or is said in answer to something sent before, is heard.
@@ -79,16 +82,15 @@ class Wire {
         Bytes bytes;
         std::uint8_t answer_of = 0;
         std::uint64_t connection = 0;
-        Bytes copy{};                   ///< the answer that is said again, and ends here
-        std::uint8_t imitation_of = 0;  ///< the station whose answer it imitates
-        Bytes reply{};                  ///< the answer that ends here
-        bool overtaken = false;         ///< ... and was said after that to a later request
+        Bytes copy{};   ///< the answer that is said again, and ends here
+        Bytes reply{};  ///< the answer that ends here
     };
 
     FramePtr put(Said said);
     void leave(Bytes adu, std::uint64_t connection);
     void leave_in_turn(Held held);
     void echo(const FramePtr& frame);
+    void hand_over(const Frame& request);
     void deliver_in_chunks(const FramePtr& frame);
     void deliver(const FramePtr& frame, std::size_t from, std::size_t to);
     void empty_buffer();
@@ -102,10 +104,14 @@ class Wire {
     Witness& witness_;
     Hear hear_;
     Ask ask_;
+    Begin begin_;
     std::list<FramePtr> air_;
     TimePoint spoken_until_{};
     TimePoint stalled_until_{};
     TimePoint says_held_until_{};  ///< what a stall has held back, and what came since
+    TimePoint asked_since_{};
+    Bytes last_reply_;  ///< of the odd panel
+    TimePoint handed_over_{};
     FramePtr buffered_;  ///< a part of our own frame that an adapter has not handed over yet
     std::vector<Held> held_in_;
     std::vector<Held> held_out_;

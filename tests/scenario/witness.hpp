@@ -17,10 +17,8 @@ class Witness {
     virtual void on_exception(TimePoint now, std::uint8_t station, ByteView pdu) = 0;
     /// A second copy of an answer was delivered to its last byte.
     virtual void on_copy(TimePoint now, ByteView adu) = 0;
-    /// What has the form of the answer, and is none, was delivered to its last byte.
-    virtual void on_imitation(std::uint8_t station) = 0;
-    /// A good answer was delivered to its last byte; `overtaken`: after that to a later request.
-    virtual void on_reply(TimePoint now, ByteView adu, bool overtaken) = 0;
+    /// A good answer was delivered to its last byte.
+    virtual void on_reply(TimePoint now, ByteView adu) = 0;
     /// Somebody else than the gateway says this.
     virtual void on_said(TimePoint now, ByteView bytes) = 0;
     /// Bytes were delivered that nobody said.

@@ -21,7 +21,10 @@ World::World(const Plan& plan, Subject& subject, Checker& checker)
     for (const PanelPlan& panel : plan_.panels)
         panels_.emplace_back(panel, plan_, agenda_, wire_, random_, checker_);
     wire_.connect([this](ByteView bytes, std::uint8_t answer_of) { hear(bytes, answer_of); },
-                  [this](ByteView adu, std::uint64_t connection) { ask_panels(adu, connection); });
+                  [this](ByteView adu, std::uint64_t connection) { ask_panels(adu, connection); },
+                  [this] {
+                      for (Panel& panel : panels_) panel.overhear();
+                  });
 }
 
 void World::run() {
@@ -109,6 +112,17 @@ void World::act(const arbiter::Note& note) {
     }
 }
 
+void World::act(const arbiter::Decision& decision) {
+    if (decision.kind != arbiter::Decision::Kind::line_rests) return;
+    agenda_.tell("the line rests for " + std::to_string(decision.time / 1us) +
+                 " us because of station " + std::to_string(decision.station));
+}
+
+void World::act(const arbiter::StationEvent& event) {
+    agenda_.tell("station " + std::to_string(event.station) + " is " +
+                 std::string(label(event.kind)) + ", " + std::to_string(event.by / 1us) + " us");
+}
+
 void World::act(const arbiter::Transmit& transmit) {
     agenda_.tell("sent, " + std::string(label(what_next_)), transmit.adu);
     const Bytes adu = understood(plan_.settings.serial, transmit.adu);
@@ -155,7 +169,7 @@ void World::hear(ByteView bytes, std::uint8_t answer_of) {
 void World::ask_panels(ByteView wire, std::uint64_t connection) {
     const Bytes adu = understood(plan_.settings.serial, wire);
     for (Panel& panel : panels_) {
-        if (adu[0] == 0 || panel.id() == adu[0]) panel.hear(adu, connection);
+        if (panel.takes(adu)) panel.hear(adu, connection);
     }
 }
 

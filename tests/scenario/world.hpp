@@ -41,11 +41,11 @@ class World {
     void act(const arbiter::Transmit& transmit);
     void act(const arbiter::Finish& finish);
     void act(const arbiter::Note& note);
-    void act(const arbiter::Decision&) {}
+    void act(const arbiter::Decision& decision);
     void act(const arbiter::Reset&);
     void act(const arbiter::Exchange&) {}
     void act(const arbiter::Written&) {}
-    void act(const arbiter::StationEvent&) {}
+    void act(const arbiter::StationEvent& event);
 
     void hear(ByteView bytes, std::uint8_t answer_of);
     void ask_panels(ByteView wire, std::uint64_t connection);
