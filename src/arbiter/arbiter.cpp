@@ -207,7 +207,7 @@ void Arbiter::on_line_up(TimePoint now) {
 /// (T8). Requests that wait stay where the line itself asked for a new connection, and had been
 /// heard.
 void Arbiter::on_line_down(TimePoint now) {
-    const bool keeps = resetting_ && mute_.ever_heard;
+    const bool keeps = resetting_;
     forget_line();
     suspended_ = keeps;
     if (active_) {
@@ -293,6 +293,7 @@ void Arbiter::step(TimePoint now) {
 void Arbiter::check_active(TimePoint now) {
     if (!active_ || now < active_->deadline()) return;
     if (active_->is_broadcast()) return end_broadcast(now);
+    expire_active(now);  // the answer may be too late for some
     active_->on_silence(now);
     conclude(now);
     if (ascii_ && ascii_->has_given()) ascii_->cut();
@@ -365,7 +366,10 @@ void Arbiter::start(TimePoint now, Group group) {
             group.was_online = station.answers_now(group.request.is_read());
         }
         station.on_asked(now, group);
-        timing.patience = station.response_timeout() + timing::kListensAgain + latency_;
+        if (station.health().offline()) stations_.on_probe(now, group.station);
+        const Duration wait =
+            group.silent ? station.settings().response_timeout : station.response_timeout();
+        timing.patience = wait + timing::kListensAgain + latency_;
         if (const Duration hole = station.reply_hole(); hole > timing.hole) {
             timing.longest_reply += hole - timing.hole;
             timing.hole = hole;
@@ -376,7 +380,7 @@ void Arbiter::start(TimePoint now, Group group) {
     const Reason why = reason_of(now, group, schedule_.backlog().queue());
     quiet_.on_sent(timing.sent, group.station);
     last_frame_ = adu;
-    replied_ = 0;
+    replied_before_ = std::exchange(replied_, std::uint8_t{0});
     EchoFilter echo(adu, echo_memory_.expect());
     active_.emplace(std::move(group), timing, std::move(echo), orders_);
     outbox_.transmit(now, *active_, std::move(adu), std::move(wire), why);

@@ -63,7 +63,11 @@ void Attempt::on_rx(TimePoint now, ByteView bytes) {
     pace_.on_read(now, bytes.size());
     const bool was_complete = echo_.complete();
     const ByteView rest = echo_.feed(bytes);
-    if (echo_.complete() && !was_complete) pace_.restart(now, rest.size());
+    if (echo_.complete() && !was_complete) {
+        pace_.restart(now, rest.size());
+        // The echo may lack its last byte, and the reply have given its first one (T6).
+        if (echo_.frame().back() == group_.station) feed(echo_.frame().last(1));
+    }
     if (rest.size() < bytes.size()) last_byte_ = std::max(last_byte_, now);
     if (rest.empty()) return;
     if (has_heard_) {

@@ -123,6 +123,7 @@ Duration Arbiter::carry_out(TimePoint now, const Unused& part, Done done) {
             break;
         case Done::copy:
             station->on_followed(now, true);
+            quiet_.trail_has_come();
             break;
         case Done::late:
             return take_late(now, part);
@@ -151,7 +152,7 @@ Duration Arbiter::take_late(TimePoint now, const Unused& part) {
         outbox_.event(StationEvent::Kind::online, id);
     }
     outbox_.event(StationEvent::Kind::late, id, lateness);
-    quiet_.await_until(station.trail().until());
+    quiet_.trail_until(station.trail().until());
     if (!stations_.outstanding().any(now, id)) quiet_.lift(now, id);
     return lateness;
 }

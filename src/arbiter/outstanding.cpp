@@ -166,7 +166,7 @@ void Outstanding::add(std::uint8_t station, Asked asked) {
 /// Takes out what left over this connection at `sent` or before.
 void Outstanding::close(Page& page, unsigned epoch, TimePoint sent) {
     std::erase_if(page.asked, [&](const Asked& asked) {
-        return asked.by != By::other_master && asked.epoch == epoch && asked.sent <= sent;
+        return asked.by == By::us && asked.epoch == epoch && asked.sent <= sent;
     });
 }
 
@@ -238,13 +238,8 @@ void KnownReads::on_answered(const modbus::Request& read) {
     if (!longest_ || span.count > longest_->span()->count) longest_ = read;
 }
 
-void KnownReads::on_unanswered(const modbus::Request& read) {
-    const auto& span = read.span();
-    if (any() && span && span->count > longest(span->table)) answers_longer_ = false;
-}
-
 std::optional<modbus::Request> KnownReads::longer() const {
-    if (!longest_ || !answers_longer_) return std::nullopt;
+    if (!longest_ || only_known_) return std::nullopt;
     modbus::Span span = *longest_->span();
     constexpr std::uint32_t kMost = 100;  // a reply that is not too long for any panel
     if (++span.count > kMost || span.end() > modbus::kTableItems) return std::nullopt;

@@ -235,7 +235,8 @@ bool Schedule::others_go_first(const Line& line) const {
     if (backlog_.retries().empty()) return false;
     const Group& retry = backlog_.retries().front();
     const Duration most = line.stations.response_timeout(retry.station) / 2;
-    if (!retry.silent || loses_frames_ || line.now >= retry.retry_since + most) return false;
+    const bool is_lost = line.stations.of(retry.station).loses_frames();
+    if (!retry.silent || is_lost || line.now >= retry.retry_since + most) return false;
     return backlog_.queue().any_first([&](const Job& job) {
         return job.arrived <= retry.retry_since && may_run(line, job) &&
                line.stations.may_spend(line.now, job);

@@ -138,14 +138,16 @@ bool Stations::affords_retry(TimePoint now, const Station& station) const {
     return now >= station.affordable_at() && (silent < kSeveral || suspects_.allows(now, credit()));
 }
 
+void Stations::on_probe(TimePoint now, std::uint8_t id) {
+    const Duration cost = settings(id).response_timeout + 2 * gap(id) + frame_;
+    offline_.spend(now + cost, cost);
+    alone_.spend(now + cost, cost);
+}
+
 void Stations::on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration cost) {
     constexpr int kMemory = 3;  // whole timeouts, or failures of this cost
     const Station& station = of(id);
-    if (station.health().offline()) {
-        offline_.spend(now, cost);
-        alone_.spend(now, cost);
-        return;
-    }
+    if (station.health().offline()) return;  // paid for in advance
     const Duration most = kMemory * suspects_.time_for(std::max(unlisted_.response_timeout, cost));
     (!is_read && station.answers_reads() ? ignored_writes_ : suspects_).spend(now, cost, most);
 }
@@ -198,8 +200,11 @@ std::optional<modbus::Request> Stations::proof_for(TimePoint now, const Station&
     if (!station.reads().longest()) return std::nullopt;
     const modbus::Request shortest = station.reads().probe();
     if (outstanding_.is_proof(now, station.id(), shortest)) return shortest;
-    modbus::Span span = *station.reads().longest()->span();
-    for (; span.count > 0; --span.count) {
+    const modbus::Request& longest = *station.reads().longest();
+    if (outstanding_.is_proof(now, station.id(), longest)) return longest;
+    if (station.reads().only_known()) return std::nullopt;
+    modbus::Span span = *longest.span();
+    while (--span.count > 0) {
         modbus::Request part = modbus::Request::read(span);
         if (outstanding_.is_proof(now, station.id(), part)) return part;
     }

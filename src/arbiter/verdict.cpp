@@ -82,13 +82,12 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
     const bool is_own = close_request(now, attempt, reply);
     outstanding.on_delivered(now, answered, station.latest_reply());
     stations_.on_reply(now);
-    if (group.silent) schedule_.on_retried(true);
     if (replied.back) stations_.on_recovery();
     explain_condition(now, group.station, before);
     // The reply to a retry may be that to the attempt before: the retry may still be leaving.
     if (!settings_.paced && is_own && now < sent) quiet_.on_answered_early(now);
     replied_ = group.station;
-    quiet_.await_until(station.trail().until());
+    quiet_.trail_until(station.trail().until());
     outbox_.on_answered(now, attempt, reply, replied);
     if (attempt.is_clean() && teaches_echo(group.request)) echo_memory_.on_no_echo();
     outbox_.report(attempt, refused ? TransactionEnd::exception : TransactionEnd::ok);
@@ -135,7 +134,6 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
                         .station = group.station,
                         .time = *until - now});
     }
-    if (group.silent) schedule_.on_retried(verdict != Verdict::silent);
     group.silent = verdict == Verdict::silent;
     finish_barred(group);
     const std::uint8_t id = group.station;
@@ -214,6 +212,8 @@ Attempt Arbiter::take_active(TimePoint now) {
         echo_memory_.on_echo())
         outbox_.event(StationEvent::Kind::echo, attempt.group().station);
     if (attempt.heard()) mute_ = {.ever_heard = true};
+    if (Station* const before = attempt.heard_early() ? stations_.find(replied_before_) : nullptr)
+        before->on_followed(attempt.first_byte(), false);
     const Bytes pending = attempt.release_pending();
     idle_.insert(idle_.end(), pending.begin(), pending.end());
     return attempt;

@@ -176,6 +176,7 @@ class Arbiter {
     Bytes idle_;                ///< heard without a request, until a silence ends it (MST-04)
     Bytes last_frame_;          ///< sent last: its echo may come when nobody waits for it
     std::uint8_t replied_ = 0;  ///< the station that answered the last frame; 0: none, or not yet
+    std::uint8_t replied_before_ = 0;  ///< ... the frame before the last one
     Ticket last_ticket_ = 0;
     Transaction transactions_ = 0;
     TimePoint now_{};   ///< of the last call

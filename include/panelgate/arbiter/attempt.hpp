@@ -131,6 +131,8 @@ class Attempt {
     }
     /// True if any byte was heard that is not the echo.
     bool heard() const { return has_heard_; }
+    /// True if bytes came before the request had left a real UART: the trail of the reply before.
+    bool heard_early() const { return timing_.paced && has_heard_ && first_byte_ < timing_.sent; }
     /// True if frames or bytes were heard that are no part of a reply.
     bool disturbed() const { return disturbed_; }
     TimePoint first_byte() const { return first_byte_; }

@@ -133,9 +133,12 @@ class KnownReads {
     void on_wanted(const modbus::Request& request) {
         if (request.span()) wanted_ = request;
     }
-    /// A read that is longer by one item than any known was not answered: the panel has its own
-    /// bounds (T14).
-    void on_unanswered(const modbus::Request& read);
+    /// A proof was not answered: if it was no known read, the panel has its own bounds (T14).
+    void on_unanswered(const modbus::Request& read) {
+        if (any() && read != *shortest_ && read != *longest_) only_known_ = true;
+    }
+    /// True if the panel may answer none but the reads that it has answered.
+    bool only_known() const { return only_known_; }
     bool any() const { return shortest_.has_value(); }
     /// The shortest read that the station has answered, else the one that was wanted last, else one
     /// holding register at 0.
@@ -155,7 +158,7 @@ class KnownReads {
     std::optional<modbus::Request> longest_;
     std::optional<modbus::Request> wanted_;
     std::array<std::uint32_t, modbus::kTables.size()> items_{};
-    bool answers_longer_ = true;
+    bool only_known_ = false;
 };
 
 }  // namespace panelgate::arbiter

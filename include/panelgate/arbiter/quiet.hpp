@@ -26,7 +26,7 @@ class Quiet {
     void on_sent(TimePoint end, std::uint8_t station) {
         since_ = end;
         station_ = station;
-        until_ = awaited_until_ = {};
+        until_ = awaited_until_ = trail_until_ = {};
         noise_ = {};
         begun_until_ = {};
     }
@@ -46,18 +46,19 @@ class Quiet {
         since_ = std::max(since_, now);
     }
     void rest_until(TimePoint until) { until_ = std::max(until_, until); }
-    /// What is not for us is expected: another master's answer, or the trail of ours. Until then
-    /// ...
+    /// Another master's answer is expected until then, or until the answer has come (T9).
     void await_until(TimePoint until) { awaited_until_ = std::max(awaited_until_, until); }
-    /// ... or it has come.
     void has_come() { awaited_until_ = {}; }
+    /// The trail of our own answer is expected until then, or until the trail has come (T12).
+    void trail_until(TimePoint until) { trail_until_ = until; }
+    void trail_has_come() { trail_until_ = {}; }
 
     /// Earliest time for a frame that needs `gap` of silence before it.
     TimePoint free_at(Duration gap) const {
         const TimePoint silent = since_ + gap;
         const bool floats = noise_ != TimePoint{} && since_ - noise_ >= longest_;
-        return std::max(
-            {floats ? noise_ + longest_ : silent, until_, awaited_until_, begun_until_});
+        return std::max({floats ? noise_ + longest_ : silent, until_, awaited_until_, trail_until_,
+                         begun_until_});
     }
     TimePoint since() const { return since_; }
     /// The station asked last, whose gap follows the last bit.
@@ -88,6 +89,7 @@ class Quiet {
     TimePoint since_{};
     TimePoint until_{};
     TimePoint awaited_until_{};
+    TimePoint trail_until_{};
     TimePoint begun_until_{};
     TimePoint noise_{};  ///< first of the bytes that came without a pause
     TimePoint quarantined_until_{};

@@ -110,8 +110,6 @@ class Schedule {
 
     Backlog& backlog() { return backlog_; }
     const Backlog& backlog() const { return backlog_; }
-    /// The retry behind a silence was `answered`: a frame was lost, and the station is there (T1).
-    void on_retried(bool answered) { loses_frames_ = answered; }
     /// Queues a retry. Behind a silence the jobs that wait by now go first, for half of the
     /// station's timeout, unless the line loses frames.
     void retry(TimePoint now, Group group);
@@ -141,7 +139,6 @@ class Schedule {
 
     Quarantine quarantine_;
     bool echo_known_ = false;
-    bool loses_frames_ = false;  ///< the last retry behind a silence was answered
     Backlog backlog_;
     Sharing sharing_;
     Ticket learned_for_ = 0;  ///< a read was sent for it to show the echo (P8)

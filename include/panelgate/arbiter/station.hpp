@@ -49,6 +49,9 @@ class Station {
     TimePoint affordable_at() const {
         return silences_.next() - 2 * silences_.time_for(settings_.response_timeout);
     }
+    /// True if its last retry behind a silence was answered: the line loses frames, and the station
+    /// is there (T1).
+    bool loses_frames() const { return loses_frames_; }
     /// True if its last attempt was silent.
     bool was_silent() const { return (lately_ & 1) != 0; }
     /// True if nothing shows that its next request may be unanswered: only then reads are retried.
@@ -133,6 +136,7 @@ class Station {
     int failed_reads_ = 0;     ///< transactions in a row
     int failed_writes_ = 0;    ///< likewise
     bool wants_check_ = false;
+    bool loses_frames_ = false;
     TimePoint rests_until_{};
     TimePoint asked_{};
     TimePoint failed_{};

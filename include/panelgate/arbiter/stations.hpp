@@ -47,6 +47,8 @@ class Stations {
     /// True if a retry is within what silence may cost the others: the share of the station and,
     /// where several others are silent as well, that of all suspects.
     bool affords_retry(TimePoint now, const Station& station) const;
+    /// An offline station is asked: the silence is paid for in advance.
+    void on_probe(TimePoint now, std::uint8_t id);
     /// An attempt that occupied the line for `cost` failed.
     void on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration cost);
     /// A station answered.
@@ -102,7 +104,7 @@ class Stations {
     }
 
     ProbeBudget suspects_{ProbeBudget::kSuspect};
-    ProbeBudget ignored_writes_{ProbeBudget::kSuspect};  ///< reads do not pay for them (T14)
+    ProbeBudget ignored_writes_{ProbeBudget::kIgnored};  ///< reads do not pay for them (T14)
     ProbeBudget offline_{ProbeBudget::kOffline};
     ProbeBudget alone_{ProbeBudget::kAlone};
     TimePoint lively_{};  ///< the last reply of any station, or when the line was opened
