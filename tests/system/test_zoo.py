@@ -49,9 +49,9 @@ class Neighbours(unittest.TestCase):
     HABITS = {"excfn-84": 0, "padin2": 0,                   # T13
               "pad2": 0, "tail": 0.010,                     # T3
               "dup-5ms": 0.015,                             # T12
-              "think-2000ms": 0}                            # T1, T2
+              "think-900ms": 0}                             # T1, T2
 
-    LEARNING = 1.5  # s: whose frames were hit before the habit is known rests for its late window
+    LEARNING = 3  # s: until the habit is known, each frame that it hits costs a timeout
 
     def measure(self, line, seconds):
         since = time.monotonic() + self.LEARNING
