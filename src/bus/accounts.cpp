@@ -41,7 +41,7 @@ void log_event(const Settings& settings, const arbiter::StationEvent& event) {
         case arbiter::StationEvent::Kind::unknown:
             return;
         case arbiter::StationEvent::Kind::late:
-            // After a shortened wait the settings are not at fault.
+            // Behind an adaptive timeout the settings are not at fault.
             if (event.by <= Duration::zero()) return say(rt::LogLevel::info, "late reply", "");
             return say(rt::LogLevel::warn, "late reply",
                        "raise its response_timeout by at least " + ms + "ms");

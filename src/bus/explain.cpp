@@ -42,7 +42,7 @@ std::string turn(const Reason& reason, const ClientName& client) {
            instead;
 }
 
-/// What follows from it (README of the arbiter: Health and budgets).
+/// What goes with it; the word itself decides nothing.
 std::string means(Condition condition) {
     switch (condition) {
         case Condition::well:

@@ -368,7 +368,7 @@ void TraceBook::judge(const RecordedTransaction& transaction, TimePoint at) {
                         store_);
 }
 
-/// An unlisted station's timeouts, and its replies after the short wait, are expected.
+/// An unlisted station's timeouts, and its late replies, are expected.
 bool TraceBook::is_unlisted(std::uint8_t station) const {
     return station != 0 && !settings_.stations.contains(station);
 }

@@ -121,7 +121,7 @@ struct WireCounter {
 };
 constexpr std::array kWireCounters = {
     WireCounter{"panelgate_retries_total",
-                "Reads sent once more after silence, damage, or a possible duplicate.",
+                "Requests sent once more after silence or damage.",
                 &arbiter::StationCounters::retries},
     WireCounter{"panelgate_late_frames_total",
                 "Good frames that answer a request already given up; thrown away.",

@@ -13,6 +13,11 @@ BAUD = 38400
 DYING = 3
 UNITS = range(1, 6)
 TIMEOUT = 0.5  # s: the default response_timeout
+# It is offline after three silent transactions, the first of which has two retries: each silence is
+# waited for, and costs each of the others one slow answer (T1).
+SILENCES = 5
+# Offline stations have 3 % of the time: one alone is probed this often.
+PROBES = TIMEOUT / 0.03
 
 
 async def die_and_return(line, death, back):
@@ -64,7 +69,7 @@ class OneOfFive(unittest.TestCase):
     def test_P4_a_panel_that_dies_and_returns_is_hardly_noticed_by_the_others(self):
         def run(shares):
             with odd_line(BAUD, UNITS) as line:
-                return asyncio.run(scada(line, shares, 2, 8, 14))
+                return asyncio.run(scada(line, shares, 2, 8, 8 + PROBES + 3))
         cases = {"five connections": [[unit] for unit in UNITS], "one connection": [list(UNITS)]}
         for what, seen in zip(cases, in_parallel(run, list(cases.values()))):
             with self.subTest(what):
@@ -84,8 +89,8 @@ class OneOfFive(unittest.TestCase):
               f"{len(writes)} writes lost, refused {summary.refused}, back after {back:.2f} s", end="")
         self.assertEqual((summary.wrong, summary.refused, lost), (0, {}, 0))
         self.assertLess(longest, 0.7)
-        self.assertLessEqual(max(slow.values()), 1)
-        self.assertLess(back, 5.5)
+        self.assertLessEqual(max(slow.values()), SILENCES)
+        self.assertLess(back, 1.1 * PROBES)
 
 
 @unittest.skipIf(harness.SANITIZED, "a sanitizer takes the time that is measured here")

@@ -23,7 +23,7 @@ ONLY_OF_UARTS = re.compile("panelgate_(framing_errors|parity_errors|overruns|bre
 MANY = 60  # requests at once: the gateway takes 80 of a client before it answers
 DEMO_FAULTS = {"filler": {"dead": True},       # StationOffline, RelayFails
                "mixer": {"duplicate": 0.5}}    # AddressDoubled
-BOX_FAULTS = {"shaken": {"truncate": 0.5},     # Errors
+BOX_FAULTS = {"shaken": {"damage": 0.5},       # Errors; a reply that breaks off would cost a timeout
               "sluggish": {"slow_ms": 700}}    # LineOverloaded, LatencyBurnsFast and -Slowly
 # Given up after 100 ms and here before the next poll: LateRepliesRise, when all has been well for
 # half an hour (half a minute here).

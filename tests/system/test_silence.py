@@ -108,7 +108,6 @@ class SilentStation(unittest.TestCase):
             self.assertEqual(client.ask(2, read_registers(3)), holding(3))
             self.assertEqual(len(bus.frames(2)), 2)
 
-
     def test_P4_a_station_that_stays_silent_is_answered_at_once_and_comes_back(self):
         alive = threading.Event()
 
@@ -142,6 +141,7 @@ class Noise(unittest.TestCase):
                     self.assertEqual(client.ask(2, read_registers(3)), fault(3, NO_REPLY))
 
     def test_garbage_around_a_reply_and_between_requests_is_stepped_over(self):
+        """T3, FRM-07: bytes behind a good frame are dropped, and the frame counts."""
         def surrounded(frame):
             return Raw(b"\xff\x00\x55" + harness.rtu(frame[0], echo_address(frame)) + b"\xaa\xaa")
         with gateway_and_bus({1: echo_address, 2: surrounded}) as (program, bus), \

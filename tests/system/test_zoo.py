@@ -1,4 +1,4 @@
-"""Odd panels on a paced line: no wrong value, and the healthy ones go on."""
+"""Odd panels of T1 to T14 on a paced line: no wrong value, and the healthy ones go on."""
 import asyncio
 import itertools
 import time
@@ -46,10 +46,12 @@ class Neighbours(unittest.TestCase):
     after the other, so that all meet the same machine."""
     ODD = 3
     # And the seconds that it rightly takes of a round.
-    HABITS = {"excfn-84": 0, "padin2": 0, "pad2": 0, "dup-5ms": 0.015, "tail": 0.010,
-              "think-2000ms": 0, "babble-5000": 0}
+    HABITS = {"excfn-84": 0, "padin2": 0,                   # T13
+              "pad2": 0, "tail": 0.010,                     # T3
+              "dup-5ms": 0.015,                             # T12
+              "think-900ms": 0}                             # T1, T2
 
-    LEARNING = 1.5  # s: whose frames were hit before the habit is known rests for its late window
+    LEARNING = 3  # s: until the habit is known, each frame that it hits costs a timeout
 
     def measure(self, line, seconds):
         since = time.monotonic() + self.LEARNING
