@@ -204,8 +204,7 @@ void Arbiter::on_line_up(TimePoint now) {
 }
 
 /// A sent request stays outstanding: a device server may hand its reply to the next connection
-/// (T8). Requests that wait stay where the line itself asked for a new connection, and had been
-/// heard.
+/// (T8). Requests that wait stay where the arbiter itself asked for a new connection.
 void Arbiter::on_line_down(TimePoint now) {
     const bool keeps = resetting_;
     forget_line();
@@ -366,9 +365,12 @@ void Arbiter::start(TimePoint now, Group group) {
             group.was_online = station.answers_now(group.request.is_read());
         }
         station.on_asked(now, group);
-        if (station.health().offline()) stations_.on_probe(now, group.station);
+        if (station.health().offline() && (group.probe || station.speculative()))
+            stations_.on_probe(now, group.station);
+        // What is not repeated waits for the whole timeout.
+        const bool adapts = group.request.is_read() && !group.silent && !group.probe;
         const Duration wait =
-            group.silent ? station.settings().response_timeout : station.response_timeout();
+            adapts ? station.response_timeout() : station.settings().response_timeout;
         timing.patience = wait + timing::kListensAgain + latency_;
         if (const Duration hole = station.reply_hole(); hole > timing.hole) {
             timing.longest_reply += hole - timing.hole;

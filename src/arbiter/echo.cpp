@@ -81,12 +81,11 @@ EchoFilter::Expect EchoMemory::expect() const {
 
 bool EchoMemory::on_echo() {
     missed_ = 0;
-    if (mode_ == EchoMode::off) return false;
     return std::exchange(state_, EchoState::present) != EchoState::present;
 }
 
 void EchoMemory::on_no_echo() {
-    if (mode_ != EchoMode::automatic || state_ == EchoState::absent) return;
+    if (mode_ == EchoMode::on || state_ == EchoState::absent) return;
     if (state_ == EchoState::unknown || ++missed_ >= kNoMore) state_ = EchoState::absent;
 }
 

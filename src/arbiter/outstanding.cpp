@@ -166,7 +166,7 @@ void Outstanding::add(std::uint8_t station, Asked asked) {
 /// Takes out what left over this connection at `sent` or before.
 void Outstanding::close(Page& page, unsigned epoch, TimePoint sent) {
     std::erase_if(page.asked, [&](const Asked& asked) {
-        return asked.by == By::us && asked.epoch == epoch && asked.sent <= sent;
+        return asked.by != By::other_master && asked.epoch == epoch && asked.sent <= sent;
     });
 }
 

@@ -229,8 +229,8 @@ std::optional<Group> Schedule::next_retry(const Line& line) {
     });
 }
 
-/// Behind a silence those who wait go first, for the retry may cost them as much again (P4). Not on
-/// a line that loses frames: there the last retry was answered, and this one's client waits, too.
+/// Behind a silence those who wait go first, for the retry may cost them as much again (P4). Not
+/// where frames of this station get lost: its last retry was answered, and its client waits, too.
 bool Schedule::others_go_first(const Line& line) const {
     if (backlog_.retries().empty()) return false;
     const Group& retry = backlog_.retries().front();

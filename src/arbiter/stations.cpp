@@ -90,10 +90,12 @@ bool Stations::refuses(TimePoint now, const Job& job) {
     if (job.station == kBroadcast) return false;
     forget_unheard(now);
     Station& station = of(job.station);
-    station.on_wanted(now, job.request);
+    station.on_wanted(now, job.client, job.request);
     if (!station.health().offline() || (station.speculative() && job.search)) return false;
     const bool may_wake = station.speculative() || !job.request.is_read();
-    return !may_wake || !probes(now).allows(now) || !station.take_half_open(now);
+    if (!may_wake || !probes(now).allows(now) || !station.take_half_open(now)) return true;
+    on_probe(now, job.station);
+    return false;
 }
 
 bool Stations::may_spend(TimePoint now, const Job& job) const {
@@ -113,16 +115,20 @@ TimePoint Stations::held_until(const Job& job) const {
     if (is_read || !station->answers_reads()) held = station->affordable_at();
     if (station->is_doubtful(is_read))
         held = std::max(held, budget_for(*station, is_read).next() - credit());
-    return held == TimePoint{} ? held : std::min(held, others_active_until(job.station));
+    if (held == TimePoint{}) return held;
+    // Who looks for stations waits for others, not for what the search itself has asked.
+    const Client self = station->speculative() ? job.client : 0;
+    return std::min(held, others_active_until(job.station, self));
 }
 
-TimePoint Stations::others_active_until(std::uint8_t id) const {
+TimePoint Stations::others_active_until(std::uint8_t id, Client self) const {
     const Station* const station = find(id);
     const TimePoint failed = station == nullptr ? TimePoint{} : station->failed();
     TimePoint until{};
     for (const auto& [other_id, other] : stations_) {
         const auto heard = other.health().last_heard();
-        if (other_id != id && heard && *heard > failed)
+        const bool is_own = self != 0 && other.wanted_by() == self;
+        if (other_id != id && !is_own && heard && *heard > failed)
             until = std::max(until, *heard + timing::kOthersActive);
     }
     return until;

@@ -126,7 +126,9 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     stations_.outstanding().add(group.station, asked_of(attempt, settings_.may_stall));
     station.on_failed(now, attempt, verdict, cost, settings_.learns_holes);
     stations_.on_failed(now, group.station, group.request.is_read(), cost);
-    const bool affordable = stations_.affords_retry(now, station);
+    // Damage costs the station's own share alone.
+    const bool affordable = verdict == Verdict::damaged ? now >= station.affordable_at()
+                                                        : stations_.affords_retry(now, station);
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
         quiet_.quarantine(now, group.station, *until);
         outbox_.decide({.at = now,
@@ -135,6 +137,9 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
                         .time = *until - now});
     }
     group.silent = verdict == Verdict::silent;
+    if (Station* const earlier = stations_.find(replied_before_);
+        earlier != nullptr && attempt.heard() && verdict != Verdict::wrong)
+        earlier->on_disturbed(attempt.timing().started);
     finish_barred(group);
     const std::uint8_t id = group.station;
     if (in_time(now, group) && affordable && station.may_retry(group)) {
@@ -212,8 +217,6 @@ Attempt Arbiter::take_active(TimePoint now) {
         echo_memory_.on_echo())
         outbox_.event(StationEvent::Kind::echo, attempt.group().station);
     if (attempt.heard()) mute_ = {.ever_heard = true};
-    if (Station* const before = attempt.heard_early() ? stations_.find(replied_before_) : nullptr)
-        before->on_followed(attempt.first_byte(), false);
     const Bytes pending = attempt.release_pending();
     idle_.insert(idle_.end(), pending.begin(), pending.end());
     return attempt;

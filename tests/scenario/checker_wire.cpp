@@ -179,6 +179,7 @@ void Checker::close_attempt(TimePoint now) {
     const std::string broken = costs_.on_unanswered(now, attempt_, wanted);
     if (!broken.empty()) fail(broken);
     watch_.on_unanswered(attempt_.station, !attempt_.heard, attempt_.read);
+    watch_.on_cost(now, attempt_.station, cost);
     watch_.on_owed(attempt_.station, owed_until());
 }
 
@@ -266,7 +267,9 @@ std::optional<TimePoint> Checker::good_work_since(TimePoint since) const {
         if (station == kBroadcast || silent || !watch_.is_good(station, since) ||
             (o.write && echoes_) || own.broadcast == TimePoint::max())
             continue;
-        const TimePoint from = std::max({since, o.submitted, own.broadcast, before});
+        // Two whole timeouts are in advance (P4).
+        const TimePoint share = watch_.paid(station) - 8 * settings_of(station).response_timeout;
+        const TimePoint from = std::max({since, o.submitted, own.broadcast, before, share});
         if (!first || from < *first) first = from;
     }
     return first;

@@ -40,7 +40,7 @@ constexpr Bound kBounds[] = {
     {Limit::two_answers, 450, 25},
     {Limit::echo_kinds, 2500, 25},
     {Limit::misnumbered, 20, 7},
-    {Limit::damaged_repeated, 20, 30},
+    {Limit::damaged_repeated, 20, 45},
 };
 
 struct Measured {

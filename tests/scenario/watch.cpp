@@ -41,6 +41,16 @@ void Watch::on_unanswered(std::uint8_t station, bool silent, bool is_read) {
     s.silent_to_reads = s.silent_to_reads || (silent && is_read);
 }
 
+void Watch::on_cost(TimePoint now, std::uint8_t station, Duration cost) {
+    Station& s = stations_[station];
+    s.paid = std::max(s.paid, now) + 4 * cost;
+}
+
+TimePoint Watch::paid(std::uint8_t station) const {
+    const Station* s = find(station);
+    return s == nullptr ? TimePoint{} : s->paid;
+}
+
 void Watch::on_owed(std::uint8_t station, TimePoint until) {
     Station& s = stations_[station];
     s.rests = std::max(s.rests, until);

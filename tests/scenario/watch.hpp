@@ -20,6 +20,10 @@ class Watch {
     /// It answered. True if that is the first time since a disturbance.
     bool on_answered(TimePoint now, std::uint8_t station);
     void on_unanswered(std::uint8_t station, bool silent, bool is_read);
+    /// P4: an unanswered attempt took `cost`, and a station's failures have a fifth of the line.
+    void on_cost(TimePoint now, std::uint8_t station, Duration cost);
+    /// When what its failures have taken is a fifth again.
+    TimePoint paid(std::uint8_t station) const;
     /// A reply of it may come until then that answers an earlier request.
     void on_owed(std::uint8_t station, TimePoint until);
 
@@ -45,6 +49,7 @@ class Watch {
         bool silent_to_reads = false;
         bool failing = false;
         TimePoint rests{};
+        TimePoint paid{};
         TimePoint settled{};  ///< the last disturbance was over
     };
     const Station* find(std::uint8_t station) const;

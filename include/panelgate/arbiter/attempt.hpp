@@ -74,7 +74,7 @@ class Attempt {
     }
     /// A silence ends what has begun, where it has lasted long enough.
     void on_silence(TimePoint now);
-    std::vector<Heard> take_heard() { return std::exchange(heard_, {}); }
+    PoolVector<Heard> take_heard() { return std::exchange(heard_, {}); }
 
     // What was made of the frames
 
@@ -131,8 +131,6 @@ class Attempt {
     }
     /// True if any byte was heard that is not the echo.
     bool heard() const { return has_heard_; }
-    /// True if bytes came before the request had left a real UART: the trail of the reply before.
-    bool heard_early() const { return timing_.paced && has_heard_ && first_byte_ < timing_.sent; }
     /// True if frames or bytes were heard that are no part of a reply.
     bool disturbed() const { return disturbed_; }
     TimePoint first_byte() const { return first_byte_; }
@@ -164,7 +162,7 @@ class Attempt {
     EchoFilter echo_;
     modbus::ReplyFramer framer_;
     InputPace pace_;
-    std::vector<Heard> heard_;
+    PoolVector<Heard> heard_;
     Bytes damaged_bytes_;
     TimePoint computed_end_;
     TimePoint first_byte_;

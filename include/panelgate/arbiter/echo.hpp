@@ -91,7 +91,7 @@ class EchoMemory {
     void on_no_echo();
     /// The echo differed: learned again, unless configured.
     void on_mismatch() {
-        if (mode_ == EchoMode::automatic) forget();
+        if (mode_ != EchoMode::on) forget();
     }
 
   private:

@@ -138,7 +138,16 @@ class Trail {
         if (now >= copied_ + timing::kForgetCopies && std::popcount(followed_) == 0) delay_ = {};
         followed_ = static_cast<std::uint8_t>(followed_ << 1);
         at_ = now;
+        if (listens_ && !seen_) vain_ = now;
         seen_ = false;
+        listens_ = std::exchange(disturbs_, false);
+    }
+    /// What was asked at `started`, right behind its last reply, came to nothing but damage:
+    /// something may have followed that reply, so the line listens once behind the next one, unless
+    /// it has lately done so in vain.
+    void on_disturbed(TimePoint started) {
+        const bool in_vain = vain_ != TimePoint{} && started < vain_ + timing::kForgetCopies;
+        disturbs_ |= started <= at_ + longest_ && !in_vain;
     }
     /// Bytes that belong to no reply ended now, or a copy did.
     void on_followed(TimePoint now, bool is_copy) {
@@ -150,7 +159,11 @@ class Trail {
         seen_ = true;
     }
     /// Time until which the line should rest; in the past if nothing is expected.
-    TimePoint until() const { return seen_ || !is_usual() ? TimePoint{} : at_ + rest(); }
+    TimePoint until() const {
+        if (seen_) return {};
+        if (listens_) return at_ + longest_;
+        return is_usual() ? at_ + rest() : TimePoint{};
+    }
     /// From the end of a reply to the end of what follows it, and a margin; 0: usually nothing.
     Duration rest() const { return is_usual() ? delay_ * 5 / 4 : Duration{}; }
     /// True if its replies come twice.
@@ -174,7 +187,10 @@ class Trail {
     std::uint8_t followed_ = 0;  ///< by reply, the last one lowest
     TimePoint at_{};
     TimePoint copied_{};
+    TimePoint vain_{};
     bool seen_ = false;
+    bool disturbs_ = false;
+    bool listens_ = false;
     bool reported_ = false;
 };
 

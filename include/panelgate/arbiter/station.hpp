@@ -42,8 +42,12 @@ class Station {
     bool is_suspect(bool is_read) const {
         return failed_reads_ > 0 || (failed_writes_ > 0 && !(is_read && answers_reads()));
     }
-    /// True if the budget of suspects holds its requests (P4).
-    bool is_doubtful(bool is_read) const { return is_suspect(is_read) || speculative(); }
+    /// True if the budget of suspects holds its requests (P4). One damaged transaction is not
+    /// enough: it may have met another station's frame (T3).
+    bool is_doubtful(bool is_read) const {
+        return (is_suspect(is_read) && (was_silent() || failed_reads_ + failed_writes_ > 1)) ||
+               speculative();
+    }
     /// Time from which its silences are within its own share of the line, with two whole timeouts
     /// in advance (P4).
     TimePoint affordable_at() const {
@@ -64,8 +68,9 @@ class Station {
     bool wants_check() const { return wants_check_; }
     /// True if it is neither listed nor was ever heard: there may be no such station.
     bool speculative() const { return !listed_ && !health_.last_heard(); }
-    /// When it was last asked, or wanted.
+    /// When it was last asked, or wanted, and the client that wanted it.
     TimePoint asked() const { return asked_; }
+    Client wanted_by() const { return wanted_by_; }
     /// End of its last failed attempt.
     TimePoint failed() const { return failed_; }
 
@@ -87,8 +92,9 @@ class Station {
 
     // What happens
 
-    void on_wanted(TimePoint now, const modbus::Request& request) {
+    void on_wanted(TimePoint now, Client client, const modbus::Request& request) {
         asked_ = now;
+        wanted_by_ = client;
         reads_.on_wanted(request);
     }
     void on_asked(TimePoint now, const Group& group) {
@@ -115,6 +121,8 @@ class Station {
     bool on_late(TimePoint now, Duration lateness);
     /// A copy of its last reply came, or bytes that belong to no reply.
     void on_followed(TimePoint now, bool is_copy) { trail_.on_followed(now, is_copy); }
+    /// The attempt that was sent at `started`, right behind its last reply, was damaged.
+    void on_disturbed(TimePoint started) { trail_.on_disturbed(started); }
     /// An attempt failed that occupied the line for `cost`.
     void on_failed(TimePoint now, const Attempt& attempt, Verdict verdict, Duration cost,
                    bool learns_holes);
@@ -139,6 +147,7 @@ class Station {
     bool loses_frames_ = false;
     TimePoint rests_until_{};
     TimePoint asked_{};
+    Client wanted_by_ = 0;
     TimePoint failed_{};
 };
 

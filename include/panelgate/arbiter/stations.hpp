@@ -47,7 +47,8 @@ class Stations {
     /// True if a retry is within what silence may cost the others: the share of the station and,
     /// where several others are silent as well, that of all suspects.
     bool affords_retry(TimePoint now, const Station& station) const;
-    /// An offline station is asked: the silence is paid for in advance.
+    /// An offline station is asked, or a client's request to it is accepted: the silence is paid
+    /// for in advance.
     void on_probe(TimePoint now, std::uint8_t id);
     /// An attempt that occupied the line for `cost` failed.
     void on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration cost);
@@ -84,7 +85,7 @@ class Stations {
     std::optional<TimePoint> probe_at(TimePoint now, const Station& station) const;
     /// Until when others count as using the line: one has answered since this station's last
     /// failure, and lately.
-    TimePoint others_active_until(std::uint8_t id) const;
+    TimePoint others_active_until(std::uint8_t id, Client self = 0) const;
     bool any_online() const;
     const ProbeBudget& probes(TimePoint now) const;
     /// What suspects may cost in advance: two whole timeouts.

@@ -179,10 +179,12 @@ TEST_F(ArbiterTest, P4ProbesOfASilentStationStayBelowTheirShareAndOneReplyBrings
 }
 
 TEST_F(ArbiterTest, P4AWriteMayBeTheProbeOnceAnInterval) {
+    settings.offline.probe_min = settings.offline.probe_max = 60s;
+    BusScript bus{settings};
     bus.submit(17, kRead);
     answer(bus, 17, kReply, 3ms);
     silence(bus);
-    bus.run_for(20s);
+    bus.run_for(75s);
     EXPECT_EQ(bus.try_submit(17, kRead).error(), Fault::offline);
     const Ticket write = bus.submit(17, kWrite);
     EXPECT_EQ(bus.try_submit(17, kWrite).error(), Fault::offline);

@@ -43,6 +43,7 @@ class StationsTest : public testing::Test {
     void fail(std::uint8_t id, Duration cost = kCost) {
         now += cost;
         const Attempt attempt(group_of(id, kRead), test::timing_of(now - cost, 8), {}, {});
+        if (stations.health(id).offline()) stations.on_probe(now - cost, id);
         stations.of(id).on_failed(now, attempt, Verdict::silent, cost, true);
         stations.on_failed(now, id, true, cost);
         stations.of(id).on_given_up(now, Fault::timeout, true);

@@ -1,4 +1,4 @@
-// Tests that fail: defects of the arbiter, not committed.
+// What echoes, broadcasts and answers with another address must not do.
 #include <gtest/gtest.h>
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter::defects_test {
+namespace panelgate::arbiter::echoes_and_broadcasts_test {
 namespace {
 
 using modbus::encode_adu;
@@ -16,9 +16,9 @@ const Bytes kToAll = "10 00 64 00 02 04 00 0A 01 02"_hex;
 const Bytes kToOne = "10 00 64 00 02 04 00 0B 00 00"_hex;
 const Bytes kConfirmed = "10 00 64 00 02"_hex;
 
-class Defects : public ArbiterTest {
+class EchoesAndBroadcasts : public ArbiterTest {
   protected:
-    Defects() {
+    EchoesAndBroadcasts() {
         for (StationSettings& station : settings.stations) station.retries = 0;
     }
     static void hear_echo(BusScript& line) {
@@ -27,8 +27,8 @@ class Defects : public ArbiterTest {
     }
 };
 
-// D1, P8 T6 T3
-TEST_F(Defects, TwoBytesOf00InFrontOfTheEchoConfirmAWriteOfAPanelThatIsOff) {
+// P8 T6 T3
+TEST_F(EchoesAndBroadcasts, TwoBytesOf00InFrontOfTheEchoConfirmAWriteOfAPanelThatIsOff) {
     for (const EchoMode mode : {EchoMode::automatic, EchoMode::on}) {
         settings.echo = mode;
         BusScript line{settings};
@@ -44,8 +44,8 @@ TEST_F(Defects, TwoBytesOf00InFrontOfTheEchoConfirmAWriteOfAPanelThatIsOff) {
     }
 }
 
-// D2, P8 T6 T9: the line has an echo; it is learned that there is none, then an echo confirms.
-TEST_F(Defects, ADamagedEchoGluedBehindAnotherMastersRequestShowsNoMissingEcho) {
+// P8 T6 T9: the line has an echo; it is learned that there is none, then an echo confirms.
+TEST_F(EchoesAndBroadcasts, ADamagedEchoGluedBehindAnotherMastersRequestShowsNoMissingEcho) {
     settings.echo = EchoMode::automatic;
     BusScript line{settings};
     line.submit(17, kRead);
@@ -63,8 +63,8 @@ TEST_F(Defects, ADamagedEchoGluedBehindAnotherMastersRequestShowsNoMissingEcho) 
     EXPECT_FALSE(line.answer(write).pdu);
 }
 
-// D3, T11: the station was never asked before.
-TEST_F(Defects, TheAnswerToABroadcastConfirmsAWriteToAStationThatWasNeverAsked) {
+// T11: the station was never asked before.
+TEST_F(EchoesAndBroadcasts, TheAnswerToABroadcastConfirmsAWriteToAStationThatWasNeverAsked) {
     BusScript line{settings};
     line.submit(0, kToAll, 1, PriorityClass::write);
     line.run_to_end_of_request();
@@ -75,8 +75,8 @@ TEST_F(Defects, TheAnswerToABroadcastConfirmsAWriteToAStationThatWasNeverAsked) 
     EXPECT_FALSE(line.answered(write) && line.answer(write).pdu);
 }
 
-// D3, T14: likewise.
-TEST_F(Defects, AfterWriteHoldsBehindABroadcastAStationThatWasNeverAsked) {
+// T14: likewise.
+TEST_F(EchoesAndBroadcasts, AfterWriteHoldsBehindABroadcastAStationThatWasNeverAsked) {
     settings.stations[0].after_write = 1s;
     BusScript line{settings};
     line.submit(0, kWrite);
@@ -86,8 +86,8 @@ TEST_F(Defects, AfterWriteHoldsBehindABroadcastAStationThatWasNeverAsked) {
     EXPECT_GE(line.next_sent().value().at, left + 1s);
 }
 
-// D4, T6: counted twice.
-TEST_F(Defects, AnEchoThatTheConfigurationDeniesIsCountedOnce) {
+// T6: once, not twice.
+TEST_F(EchoesAndBroadcasts, AnEchoThatTheConfigurationDeniesIsCountedOnce) {
     settings.echo = EchoMode::off;
     BusScript line{settings};
     line.submit(17, kRead);
@@ -97,8 +97,9 @@ TEST_F(Defects, AnEchoThatTheConfigurationDeniesIsCountedOnce) {
     EXPECT_EQ(line.arbiter().station_counters().at(17).symptoms.echoes, 1u);
 }
 
-// D5, T13: the answer of another address is a "second panel" where that one was read lately.
-TEST_F(Defects, TheAnswerWithAnotherAddressIsMisaddressedAlsoWhereThatAddressWasReadLately) {
+// T13: the answer of another address is a "second panel" where that one was read lately.
+TEST_F(EchoesAndBroadcasts,
+       TheAnswerWithAnotherAddressIsMisaddressedAlsoWhereThatAddressWasReadLately) {
     BusScript line{settings};
     line.submit(18, kRead);
     answer(line, 18, kReply, 3ms);
@@ -110,4 +111,4 @@ TEST_F(Defects, TheAnswerWithAnotherAddressIsMisaddressedAlsoWhereThatAddressWas
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter::defects_test
+}  // namespace panelgate::arbiter::echoes_and_broadcasts_test
