@@ -344,6 +344,34 @@ bool Arbiter::start_next(TimePoint now) {
     return true;
 }
 
+/// The station is asked: what it is known for decides about retries, and its silence is paid for.
+void Arbiter::ask(TimePoint now, Group& group) {
+    Station& station = stations_.of(group.station);
+    if (group.attempts == 1) {
+        group.repeatable = station.settings().retry_writes;
+        group.was_online = station.answers_now(group.request.is_read());
+    }
+    station.on_asked(now, group);
+    if (station.health().offline() && (group.probe || station.speculative()))
+        stations_.on_probe(now, group.station);
+}
+
+Attempt::Timing Arbiter::timing_of(TimePoint now, const Group& group, std::size_t size) const {
+    Attempt::Timing timing = Attempt::timing_of(settings_, now, size, lead_);
+    timing.pause = now - quiet_.since();
+    timing.confirm_end = confirm_ends_;
+    const Station* const station = stations_.find(group.station);
+    if (station == nullptr) return timing;
+    // What is not repeated waits for the whole timeout.
+    const bool adapts = group.request.is_read() && !group.silent && !group.probe;
+    timing.patience = timing::kListensAgain + latency_ +
+                      (adapts ? station->response_timeout() : station->settings().response_timeout);
+    const Duration hole = std::max(station->reply_hole(), timing.hole);
+    timing.longest_reply += hole - timing.hole;
+    timing.hole = hole;
+    return timing;
+}
+
 void Arbiter::start(TimePoint now, Group group) {
     Bytes adu = modbus::encode_adu(group.station, group.request.pdu(), orders_.of(group.station));
     outbox_.on_rested(quiet_.take_rested(now));
@@ -355,28 +383,8 @@ void Arbiter::start(TimePoint now, Group group) {
     }
     Bytes wire = ascii_ ? modbus::to_ascii(adu) : adu;
     if (ascii_) ascii_->cut();
-    Attempt::Timing timing = Attempt::timing_of(settings_, now, adu.size(), lead_);
-    timing.pause = now - quiet_.since();
-    timing.confirm_end = confirm_ends_;
-    if (group.station != kBroadcast) {
-        Station& station = stations_.of(group.station);
-        if (group.attempts == 1) {
-            group.repeatable = station.settings().retry_writes;
-            group.was_online = station.answers_now(group.request.is_read());
-        }
-        station.on_asked(now, group);
-        if (station.health().offline() && (group.probe || station.speculative()))
-            stations_.on_probe(now, group.station);
-        // What is not repeated waits for the whole timeout.
-        const bool adapts = group.request.is_read() && !group.silent && !group.probe;
-        const Duration wait =
-            adapts ? station.response_timeout() : station.settings().response_timeout;
-        timing.patience = wait + timing::kListensAgain + latency_;
-        if (const Duration hole = station.reply_hole(); hole > timing.hole) {
-            timing.longest_reply += hole - timing.hole;
-            timing.hole = hole;
-        }
-    }
+    if (group.station != kBroadcast) ask(now, group);
+    const Attempt::Timing timing = timing_of(now, group, adu.size());
     if (!group.request.is_read()) memory_.on_write(now, group.station, group.request);
     outbox_.written(group, false);
     const Reason why = reason_of(now, group, schedule_.backlog().queue());
@@ -418,21 +426,17 @@ void must(bool holds, const char* what) {
 
 void Arbiter::check_invariants() const {
     const Backlog& backlog = schedule_.backlog();
-    must(up_ || !active_, "a line that is down carries nothing");
+    must(up_ || (!active_ && !resetting_), "a line that is down carries nothing");
     must(up_ || suspended_ || backlog.empty(), "a line that is down has nothing waiting");
-    must(up_ || !resetting_, "a line that is down is not to be reset");
     for (const Group& group : backlog.retries())
-        must(!group.abandoned() && group.attempts > 0,
-             "a sent request of somebody waits for each retry");
+        must(!group.abandoned() && group.attempts > 0, "somebody waits for each retry");
     if (!active_) return;
     const Group& group = active_->group();
-    must(group.attempts > 0, "what is on the wire was sent");
     must(active_->deadline() >= active_->timing().started, "an attempt ends after its start");
     must(!group.probe || group.jobs.empty(), "no request waits for a probe");
     for (const Job& job : group.jobs)
         must(job.attempts > 0 && job.station == group.station, "its jobs are on the wire");
-    must(!next_deadline() || *next_deadline() <= active_->deadline(),
-         "the next deadline is not after the attempt's");
+    must(!next_deadline() || *next_deadline() <= active_->deadline(), "the attempt's end is due");
 }
 
 }  // namespace panelgate::arbiter

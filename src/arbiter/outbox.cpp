@@ -90,25 +90,18 @@ void Outbox::finish(const Job& job, Result<Bytes> pdu, bool shared) {
 }
 
 void Outbox::finish_from_memory(Ticket ticket, Bytes pdu, Duration age) {
-    Finish answer;
-    answer.ticket = ticket;
-    answer.pdu = std::move(pdu);
-    answer.age = age;
-    actions_.push_back(std::move(answer));
+    actions_.push_back(Finish{.ticket = ticket, .pdu = std::move(pdu), .age = age});
 }
 
 void Outbox::report(const Attempt& attempt, TransactionEnd end) {
     if (!explain_) return;
     const Group& group = attempt.group();
     const Attempt::Timing& timing = attempt.timing();
-    Exchange exchange;
-    exchange.transaction = group.transaction;
-    exchange.end = end;
-    exchange.station = group.station;
-    if (!group.jobs.empty()) exchange.arrived = group.jobs.front().arrived;
+    Exchange exchange{{}, group.transaction, end, group.station};
     exchange.granted = timing.started;
     exchange.first_bit_out = timing.sent - timing.leaving;
     exchange.last_bit_out = timing.sent;
+    if (!group.jobs.empty()) exchange.arrived = group.jobs.front().arrived;
     if (attempt.heard()) {
         exchange.first_byte_in = attempt.first_byte();
         exchange.last_byte_in = attempt.last_byte();

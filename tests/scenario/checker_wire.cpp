@@ -37,6 +37,7 @@ void Checker::on_paused(TimePoint from, TimePoint now) {
 void Checker::on_collision(TimePoint now, std::uint8_t station) {
     ++collisions_;
     watch_.on_collision(now, station);
+    watch_.on_cost(now, station, settings_of(station).response_timeout);  // at most
 }
 
 void Checker::on_heard(TimePoint now, std::size_t bytes) {

@@ -130,6 +130,8 @@ class Arbiter {
     void forget_line();
     void step(TimePoint now);
     bool start_next(TimePoint now);
+    void ask(TimePoint now, Group& group);
+    Attempt::Timing timing_of(TimePoint now, const Group& group, std::size_t size) const;
     void start(TimePoint now, Group group);
     void check_active(TimePoint now);
     void expire(TimePoint now);
