@@ -10,6 +10,27 @@
 
 namespace panelgate::arbiter {
 
+bool is_same_wire(const Settings& one, const Settings& other) {
+    const bool ascii = one.serial.mode == SerialMode::ascii;
+    return one.serial == other.serial && one.ascii_digits == other.ascii_digits &&
+           one.echo == other.echo && one.paced == other.paced && one.may_stall == other.may_stall &&
+           crc_orders(one) == crc_orders(other) && (!ascii || one.reply_hole == other.reply_hole);
+}
+
+modbus::CrcOrders crc_orders(const Settings& settings) {
+    using modbus::CrcOrder;
+    modbus::CrcOrders orders;
+    if (settings.serial.mode == SerialMode::ascii) return orders;
+    for (const StationSettings& station : settings.stations)
+        orders.set(station.id, station.crc_order);
+    const bool all_old = !settings.stations.empty() &&
+                         std::ranges::all_of(settings.stations, [](const StationSettings& station) {
+                             return station.crc_order == CrcOrder::high_first;
+                         });
+    orders.set(kBroadcast, all_old ? CrcOrder::high_first : CrcOrder::low_first);
+    return orders;
+}
+
 TimePoint latest_start(const SerialFormat& serial, const Job& job) {
     const std::size_t request = job.request.pdu().size() + modbus::kAduOverhead;
     const std::size_t reply =
@@ -125,9 +146,8 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     return ticket;
 }
 
-/// A recently read value, where the station's max_age allows it. Never for polls, which must read
-/// new values, nor while the client has a request open there: it must not read values older than
-/// its own write.
+/// A recently read value, where `max_age` allows it. Never for polls, which must read new values,
+/// nor while the client has a request open there: its own write must be older.
 std::optional<ReadCache::Hit> Arbiter::from_memory(TimePoint now, const Job& job) const {
     const Duration max_age = stations_.settings(job.station).max_age;
     const auto& span = job.request.span();

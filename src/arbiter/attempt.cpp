@@ -111,8 +111,7 @@ void Attempt::on_silence(TimePoint now) {
     collect(framer_.on_silence());
 }
 
-/// Takes what the framer has found, in the order received. Bytes behind the reply count for nothing
-/// (FRM-07).
+/// Takes what the framer has found, in order. Bytes behind the reply count for nothing (FRM-07).
 void Attempt::collect(std::optional<Bytes> reply) {
     const std::size_t behind = framer_.parts_behind();
     std::vector<Unused> parts = framer_.take_unused();

@@ -24,8 +24,7 @@ bool is_request(ByteView adu) {
     return !fits_reply && modbus::request_adu_length(adu) == adu.size();
 }
 
-/// True for our own frame, also without its last byte: where that is 0 the CRC is good all the
-/// same.
+/// True for our own frame, also without a last byte of 0, for the CRC is good all the same.
 bool is_own(ByteView adu, ByteView own) {
     return std::ranges::equal(adu, own) ||
            (adu.size() + 1 == own.size() && std::ranges::equal(adu, own.first(adu.size())));
@@ -82,8 +81,7 @@ Facts Arbiter::facts_of(TimePoint now, const Unused& part, bool answers) const {
            when(station != nullptr, fact::known);
 }
 
-/// The request of a client is sent only when no exception can be an older request's; a proof goes
-/// sooner.
+/// A client's request waits until no exception can be an older request's; a proof goes sooner.
 Facts Arbiter::facts_of_answer(TimePoint now, ByteView pdu) const {
     const Group& group = active_->group();
     const Asked* const older =
@@ -134,8 +132,7 @@ Duration Arbiter::carry_out(TimePoint now, const Unused& part, Done done) {
     return {};
 }
 
-/// Another station's reply shows that nothing is held back; the same station's, besides, that it
-/// has served what was asked before.
+/// Another station's reply shows that nothing is held back; its own, that it has served the rest.
 Duration Arbiter::take_late(TimePoint now, const Unused& part) {
     const std::uint8_t id = part.bytes[0];
     Station& station = stations_.of(id);

@@ -202,8 +202,7 @@ std::optional<Group> Schedule::next(TimePoint now, Stations& stations, Quiet& qu
         if (alone) return {};
     }
     const auto due = stations.next_probe(now);
-    // Probes have the lowest class, but a busy line must not keep a station offline: its budget
-    // limits them.
+    // A busy line must not keep a station offline: the budget limits probes.
     if (due && now >= *due + timing::kProbeWaits) {
         if (auto group = next_probe(line)) return group;
     }

@@ -1,5 +1,4 @@
-// How attempts end: their jobs are answered, or the request is sent again, and the station is
-// judged.
+// How attempts end: jobs are answered, or the request is sent again, and the station is judged.
 
 #include <algorithm>
 #include <utility>
@@ -50,8 +49,7 @@ void Arbiter::end_broadcast(TimePoint now) {
         outbox_.finish(job, modbus::normal_write_reply(job.request.pdu()));
 }
 
-/// The request of an attempt that has ended. `in_transit`: a transport that may stall holds it
-/// back, for all that is known (T8).
+/// The request of an attempt that has ended. `in_transit`: perhaps still held back (T8).
 Asked Arbiter::asked_of(const Attempt& attempt, bool in_transit) const {
     const Group& group = attempt.group();
     const TimePoint sent = attempt.timing().sent;
@@ -153,9 +151,8 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     reopen_if_mute(now, attempt, verdict);
 }
 
-/// T8: a connection over which nothing is heard may be a stalled one. For silence alone it is never
-/// made anew twice in a row without waiting twice as long: some device servers ignore the first
-/// seconds of a connection.
+/// T8: a connection over which nothing is heard may be stalled. A new one is made after twice the
+/// time each time: some device servers ignore the first seconds of a connection.
 void Arbiter::reopen_if_mute(TimePoint now, const Attempt& attempt, Verdict verdict) {
     constexpr int kMute = 2;  // silent attempts in a row
     const bool mute = verdict == Verdict::silent && !attempt.heard();

@@ -56,8 +56,7 @@ constexpr Causes kSenders = causes(echo, other_master, collision);
 /// found; how much of a count it needs, and what of it they explain, is in its function.
 constexpr Row kRows[] = {
     station(repeats_requests, {&S::echoes}, {}, find_repeated_requests),
-    line(echo, {&S::echoes, &S::collided}, {}, find_echo,
-         causes(repeats_requests)),
+    line(echo, {&S::echoes, &S::collided}, {}, find_echo, causes(repeats_requests)),
     line(telnet, {}, {}, find_telnet),
     line(no_answer_at_all, kUnanswered, {}, find_no_answer),
     line(other_master, {&S::requests, &S::unasked}, {}, find_other_master),

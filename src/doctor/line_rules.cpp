@@ -223,9 +223,7 @@ bool hits_long_replies(const Symptoms& s) {
 }
 
 /// Good frames that came beside the replies: as many may have met others, and come in pieces.
-std::uint64_t surplus_frames(const Case& c) {
-    return c.all.unasked + c.all.doubled;
-}
+std::uint64_t surplus_frames(const Case& c) { return c.all.unasked + c.all.doubled; }
 
 /// They come around the replies of one of several stations only: of that panel, not of the line.
 bool are_of_one_station(const Case& c, const Symptoms& s) {

@@ -120,8 +120,7 @@ struct WireCounter {
     std::uint64_t arbiter::StationCounters::* field;
 };
 constexpr std::array kWireCounters = {
-    WireCounter{"panelgate_retries_total",
-                "Requests sent once more after silence or damage.",
+    WireCounter{"panelgate_retries_total", "Requests sent once more after silence or damage.",
                 &arbiter::StationCounters::retries},
     WireCounter{"panelgate_late_frames_total",
                 "Good frames that answer a request already given up; thrown away.",

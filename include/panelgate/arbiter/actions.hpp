@@ -59,8 +59,7 @@ struct Note {
     Reason why{};                 ///< of a sent frame, with Settings::explain
     Transaction transaction = 0;  ///< begun by this sent frame
 };
-/// With Settings::explain: a transaction is over. Follows the frame that ends it and precedes the
-/// Finish of the jobs that it answers.
+/// With Settings::explain: a transaction is over. Between its last frame and the jobs' Finish.
 struct Exchange : TransactionInstants {
     Transaction transaction = 0;
     TransactionEnd end = TransactionEnd::open;
@@ -111,8 +110,7 @@ inline std::string_view label(StationEvent::Kind kind) {
                                            "late",    "drift",  "collision", "echo",  "trail"};
     return kWords[static_cast<std::size_t>(kind)];
 }
-/// A write is about to be sent, or its attempt is over, answered or not. Emitted for each attempt,
-/// before its Finish.
+/// A write is about to be sent, or its attempt is over, answered or not; before its Finish.
 struct Written {
     std::uint8_t station = 0;           ///< 0: all stations
     std::optional<modbus::Span> items;  ///< empty: the request names no items

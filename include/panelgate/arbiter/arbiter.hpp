@@ -48,8 +48,7 @@ class Arbiter {
     /// Switches to new settings. Outstanding replies, knowledge of stations and queued jobs are
     /// kept. Unless is_same_wire(), only while the line is down or left.
     void apply(Settings settings);
-    /// The line is to be replaced by another one: starts nothing until on_line_up or on_line_down.
-    /// Accepted jobs wait.
+    /// The line is to be replaced: accepted jobs wait until on_line_up() or on_line_down().
     void suspend() { suspended_ = true; }
     bool is_waiting() const { return active_.has_value(); }  ///< for a request on the wire
     /// Time from which no reply is outstanding and nothing rests or is on the wire, for any master.
@@ -66,16 +65,14 @@ class Arbiter {
     /// Finishes matching jobs that wait for their first turn as denied, without sending them:
     /// access rights have changed since they came.
     void deny(TimePoint now, const JobQueue::Test& match);
-    /// The client is gone: its queued jobs are finished as cancelled, without being sent; a request
-    /// on the wire is not repeated for it.
+    /// The client is gone: its queued jobs end as cancelled, and nothing is repeated for it.
     void cancel(TimePoint now, Client client);
     void on_rx(TimePoint now, ByteView bytes);
     void on_deadline(TimePoint now) { step(now); }
     void on_line_up(TimePoint now);
     void on_line_down(TimePoint now);
 
-    /// Sets the network round trip that is added to every answer (RTU over TCP), from the next
-    /// request on.
+    /// Sets the network round trip of every answer (RTU over TCP), from the next request on.
     void set_latency(Duration latency) { latency_ = latency; }
     /// Sets the delay from Transmit to the first bit, from the next request on.
     void set_lead(Duration lead) { lead_ = lead; }

@@ -5,12 +5,11 @@
 #include <cstdint>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/group.hpp"
-#include "panelgate/arbiter/input_pace.hpp"
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
@@ -27,10 +26,52 @@ enum class Verdict : std::uint8_t {
     wrong,    ///< a good frame of the station that does not answer the request (T13)
 };
 
+/// When the bytes of one attempt are worth a look (P5): where bytes come one by one at the line's
+/// rate, none decides before a header, an echo or the whole reply can be there. Pure.
+class InputPace {
+  public:
+    /// `byte`: the time of one byte. `steady`: bytes arrive one by one, at the line's rate.
+    InputPace(Duration byte, bool steady) : byte_(byte), steady_(steady) {}
+
+    /// These bytes were read now.
+    void on_read(TimePoint now, std::size_t bytes) {
+        count_ += bytes;
+        looked_ = now;
+        const TimePoint began = now - count_ * byte_;
+        // Bytes that came together, or after a pause, are no measure of the ones to come.
+        steady_ = steady_ && (!began_ || began >= *began_ - slack());
+        if (!began_ || began > *began_ + slack()) {
+            began_ = now - bytes * byte_;
+            count_ = bytes;
+        }
+    }
+    /// All but the last `rest` bytes were our echo.
+    void restart(TimePoint now, std::size_t rest) {
+        count_ = rest;
+        began_.reset();
+        if (rest > 0) began_ = now - rest * byte_;
+    }
+    /// Bytes before this time decide nothing, if `missing` more are needed; empty: each may decide.
+    /// A reply that was cut short is noticed before twice the time that it has taken.
+    std::optional<TimePoint> busy_until(std::size_t missing) const {
+        if (!steady_ || !began_ || missing == 0) return std::nullopt;
+        const TimePoint whole = *began_ + (count_ + missing) * byte_;
+        return std::min(whole, looked_ + std::max(timing::kLongestLook, looked_ - *began_));
+    }
+
+  private:
+    Duration slack() const { return std::max(2 * byte_, timing::kReadingSlack); }
+
+    Duration byte_;
+    bool steady_;
+    std::optional<TimePoint> began_;  ///< when the bytes that were counted began
+    std::size_t count_ = 0;
+    TimePoint looked_{};
+};
+
 /// One request on the wire: what is heard meanwhile, in frames, and the times. Who a frame is from
 /// and what is done with it is decided elsewhere (judge.hpp). Damage does not end an attempt while
-/// the reply may still come (FRM-04); a silence inside a reply of known length is a hole (T4).
-/// Pure.
+/// the reply may come (FRM-04); a silence inside a reply of known length is a hole (T4). Pure.
 class Attempt {
   public:
     struct Timing {
@@ -63,8 +104,7 @@ class Attempt {
     // Input; what has come is then in take_heard().
 
     void on_rx(TimePoint now, ByteView bytes);
-    /// What was heard since the last end is one frame, if `good`, or none: where the line delimits
-    /// frames (ASCII).
+    /// What was heard since the last end is one frame, if `good`, or none (ASCII).
     void on_frame_end(bool good);
     /// What was heard since the last end breaks off (ASCII).
     void on_frame_cut();
@@ -80,8 +120,7 @@ class Attempt {
 
     /// The frame was our own, which the filter did not find.
     void on_echo() { echo_.on_whole_frame(); }
-    /// The station has said something else than the reply, `refused`: an exception. The attempt
-    /// ends, if `ends`.
+    /// The station has said something else, `refused`: an exception. `ends`: the attempt is over.
     void on_wrong(bool ends, bool refused) {
         refused_other_ = refused_other_ || (refused && !ends);
         instead_ = std::max(instead_, ends ? Instead::reply : Instead::unrelated);
@@ -94,9 +133,8 @@ class Attempt {
     /// A broadcast is over when its last bit has left.
     bool is_broadcast() const { return group_.station == kBroadcast; }
 
-    /// Bytes before this time decide nothing: what may be the reply (or our echo) has begun, and
-    /// the rest of its header, or all of it, takes until then at the line's rate. Empty: each may
-    /// decide.
+    /// Bytes before this time decide nothing: until then, at the line's rate, comes the rest of a
+    /// header, an echo or a reply that has begun. Empty: each byte may decide.
     std::optional<TimePoint> busy_until() const;
 
     bool wants_end(TimePoint now) const { return !end_confirmed_ && now >= timing_.sent; }
@@ -114,8 +152,7 @@ class Attempt {
     const Timing& timing() const { return timing_; }
     TimePoint give_up() const { return timing_.sent + timing_.patience; }
     const EchoFilter& echo() const { return echo_; }
-    /// True if this reply PDU may be the echo of the request: the line may have one, and neither it
-    /// nor a part of it has come.
+    /// True if this reply PDU may be the echo of the request, of which nothing has come yet.
     bool is_own_echo(ByteView reply) const {
         return echo_.possible() && !echo_.complete() && echo_.is_own(reply) && !fragment_;
     }

@@ -46,8 +46,7 @@ struct Symptoms {
     std::uint64_t silences = 0;           ///< runs of unanswered attempts that an answer ended
 
     /// Attempts by the silence before them: below 2 ms, 4 ms, 8 ms … 256 ms, and above.
-    /// silent_after counts only reads that were answered when soon asked again: no offline
-    /// stations, no writes.
+    /// silent_after counts only reads that were answered when soon asked again.
     static constexpr std::size_t kPauses = 9;
     std::array<std::uint64_t, kPauses> answered_after{};
     std::array<std::uint64_t, kPauses> silent_after{};

@@ -25,8 +25,7 @@ class EchoFilter {
     EchoFilter(Bytes frame, Expect expect)
         : frame_(std::move(frame)), expect_(expect), possible_(expect != Expect::nothing) {}
 
-    /// Takes what was heard and returns what is no echo: a part of `bytes`, or a buffer that is
-    /// valid until the next call.
+    /// Returns what is no echo: a part of `bytes`, or a buffer that is valid until the next call.
     ByteView feed(ByteView bytes);
     /// The line is silent: returns the buffered bytes that did not become the echo.
     Bytes release();
@@ -61,8 +60,7 @@ class EchoFilter {
     Bytes released_;
 };
 
-/// True if the reply to this request can never equal the request: the reply shows whether there is
-/// an echo.
+/// True if the reply can never equal this request: the reply shows whether there is an echo.
 bool teaches_echo(const modbus::Request& request);
 
 /// True if the bytes begin with another master's request, and not with our `own` frame.

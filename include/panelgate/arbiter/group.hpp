@@ -10,8 +10,7 @@
 
 namespace panelgate::arbiter {
 
-/// The jobs that one transaction answers, and the request on the wire. jobs[0] leads; a probe has
-/// no jobs.
+/// The jobs that one transaction answers, and its request. jobs[0] leads; a probe has no jobs.
 struct Group {
     Jobs jobs{};
     std::uint8_t station = 0;

@@ -14,8 +14,7 @@
 /// The four numbers that are learned of a station, each from frames alone.
 namespace panelgate::arbiter {
 
-/// How long a station needs until the first sign of its reply (T1): the last kSamples replies.
-/// Pure.
+/// How long a station needs until the first sign of its reply (T1): the last kSamples. Pure.
 class ThinkTimes {
   public:
     static constexpr std::size_t kSamples = 64;
@@ -143,8 +142,7 @@ class Trail {
         listens_ = std::exchange(disturbs_, false);
     }
     /// What was asked at `started`, right behind its last reply, came to nothing but damage:
-    /// something may have followed that reply, so the line listens once behind the next one, unless
-    /// it has lately done so in vain.
+    /// the line listens once behind the next reply, unless it has lately done so in vain.
     void on_disturbed(TimePoint started) {
         const bool in_vain = vain_ != TimePoint{} && started < vain_ + timing::kForgetCopies;
         disturbs_ |= started <= at_ + longest_ && !in_vain;

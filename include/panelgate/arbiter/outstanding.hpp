@@ -40,8 +40,7 @@ class Outstanding {
   public:
     static constexpr std::size_t kMost = 16;       ///< requests of this gateway, a station
     static constexpr std::size_t kMostOthers = 4;  ///< broadcasts, and other masters' requests
-    /// `until` of a request over a transport that may stall (T8): its time begins to run when a
-    /// later request has been answered.
+    /// `until` over a transport that may stall (T8), until a later request has been answered.
     static constexpr TimePoint kInTransit = TimePoint::max();
 
     // May this frame be the reply?
@@ -49,11 +48,9 @@ class Outstanding {
     /// The oldest request of `by` to this station that this reply PDU may answer, or null.
     const Asked* answered_by(TimePoint now, std::uint8_t station, ByteView reply,
                              Asked::By by = Asked::By::us) const;
-    /// True if this reply PDU equals the last reply of the station, which ended at most `within`
-    /// before `now`.
+    /// True if this reply PDU equals the station's last reply, at most `within` before `now`.
     bool is_last_reply(TimePoint now, std::uint8_t station, ByteView reply, Duration within) const;
-    /// True if this reply PDU has function and length of the last reply of the station, which ended
-    /// at most `within` before `now`.
+    /// True if it has function and length of the station's last reply, at most `within` ago.
     bool has_last_form(TimePoint now, std::uint8_t station, ByteView reply, Duration within) const;
 
     // Could a reply be taken for the reply to a new request?
@@ -102,8 +99,7 @@ class Outstanding {
     void set_last_reply(TimePoint now, std::uint8_t station, ByteView reply);
     /// Another master's request has had its reply.
     void on_other_answered(TimePoint now, std::uint8_t station, ByteView reply);
-    /// A request that left at `sent` was answered: what left before is delivered, and its reply
-    /// comes within `window` from now.
+    /// A request that left at `sent` was answered: older ones have `window` from now.
     void on_delivered(TimePoint now, TimePoint sent, Duration window);
     /// Requests of other masters are of no interest any more.
     void forget_other_masters();
@@ -128,8 +124,7 @@ class Outstanding {
 class KnownReads {
   public:
     void on_answered(const modbus::Request& read);
-    /// A client wants this of a station that has never answered: perhaps the only request to
-    /// answer.
+    /// A client wants this of a station that has never answered: perhaps all that it answers.
     void on_wanted(const modbus::Request& request) {
         if (request.span()) wanted_ = request;
     }
@@ -140,13 +135,11 @@ class KnownReads {
     /// True if the panel may answer none but the reads that it has answered.
     bool only_known() const { return only_known_; }
     bool any() const { return shortest_.has_value(); }
-    /// The shortest read that the station has answered, else the one that was wanted last, else one
-    /// holding register at 0.
+    /// The shortest read that was answered, else the last wanted, else holding register 0.
     modbus::Request probe() const;
     /// The longest read that the station has answered; empty: none.
     const std::optional<modbus::Request>& longest() const { return longest_; }
-    /// The longest read, with one item more; empty: none is known, or the panel does not answer
-    /// more.
+    /// The longest read, with one item more; empty: none is known, or nothing more is answered.
     std::optional<modbus::Request> longer() const;
     /// Items of the longest read of this table that the station has answered.
     std::uint32_t longest(modbus::Table table) const {

@@ -11,9 +11,8 @@ namespace panelgate::arbiter {
 /// When the line may be used: the last bit seen, the gap after it, and any further rest. Pure.
 class Quiet {
   public:
-    /// `longest`: duration of the longest frame. Bytes that continue longer than that, without even
-    /// a pause of the standard gap, are no frame but a floating line, and nothing waits for their
-    /// end (LAT-02).
+    /// `longest`: duration of the longest frame. Bytes that continue longer, without a pause of the
+    /// standard gap, are a floating line, and nothing waits for their end (LAT-02).
     Quiet(Duration longest, Duration pause) : longest_(longest), pause_(pause) {}
 
     /// The line was opened: one silent interval before the first frame (MST-01).
@@ -30,8 +29,7 @@ class Quiet {
         noise_ = {};
         begun_until_ = {};
     }
-    /// An ASCII frame has begun, and its next character may come until then; TimePoint{}: it has
-    /// ended.
+    /// An ASCII frame's next character may come until then; TimePoint{}: it has ended.
     void on_begun(TimePoint until) { begun_until_ = until; }
     /// Bytes of a transaction were heard.
     void on_heard(TimePoint now) {

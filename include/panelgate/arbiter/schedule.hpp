@@ -33,8 +33,7 @@ class Sharing {
     Group gather(TimePoint now, Job leader, const Station& station, const Outstanding& outstanding,
                  JobQueue& queue) const;
     /// The joined read failed: its parts are sent alone from now on. Returns the parts in the order
-    /// in which to put them back; jobs that asked for the whole, and jobs of clients that have
-    /// left, stay in the group.
+    /// in which to put them back; jobs for the whole, and of clients that left, stay.
     Jobs split(Group& group);
     /// Returns the part of `reply` that answers this job of the group.
     static Bytes part_for(const Group& group, const Bytes& reply, const Job& job);
@@ -46,8 +45,7 @@ class Sharing {
     PoolDeque<ReadSpan> refused_;
 };
 
-/// All accepted jobs that are not on the wire: requests that wait for their turn, and retries.
-/// Pure.
+/// All accepted jobs that are not on the wire: requests in the queue, and retries. Pure.
 class Backlog {
   public:
     explicit Backlog(const QueueSettings& settings) : queue_(settings) {}
@@ -67,14 +65,12 @@ class Backlog {
     std::optional<Group> take_retry(const InlineFunction<bool(const Group&), 48>& may_go);
     const PoolDeque<Group>& retries() const { return retries_; }
 
-    /// Takes the retries that no client waits for any more, without their jobs: they count as
-    /// failed.
+    /// Takes the retries that no client waits for any more, without jobs: they count as failed.
     std::vector<Group> take_dropped() { return std::exchange(dropped_, {}); }
 
     /// Removes and returns this client's jobs.
     Jobs cancel(Client client);
-    /// Removes and returns the jobs that can no longer be started in time, or, sent before,
-    /// answered in time.
+    /// Takes out the jobs that can no longer be started, or, sent before, answered in time.
     Jobs expire(TimePoint now);
     std::optional<TimePoint> first_expiry() const;
     /// Removes and returns the matching jobs whose request waits to be sent again.
@@ -113,8 +109,7 @@ class Schedule {
     /// Queues a retry. Behind a silence the jobs that wait by now go first, for half of the
     /// station's timeout, unless the line loses frames.
     void retry(TimePoint now, Group group);
-    /// Puts the parts of a joined read back, each alone. Returns the jobs whose client has left:
-    /// they are not sent again.
+    /// Puts the parts of a joined read back, each alone. Returns the jobs of clients that left.
     Jobs give_back(Group& group);
 
   private:

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "panelgate/arbiter/queue/settings.hpp"
+#include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
@@ -22,12 +22,10 @@ struct StationSettings {
     /// Follow the measured turnaround, from timeout_floor up to response_timeout.
     bool adaptive_timeout = false;
     Duration timeout_floor = 20ms;
-    /// Silence before a request to this station and after its reply; empty: the standard's
-    /// (silent_interval()).
+    /// Silence before a request and after its reply; empty: the standard's (silent_interval()).
     std::optional<Duration> frame_gap;
-    /// Least time between a reply of this station and the next request to it. Other stations are
-    /// asked meanwhile. T14: devices that ignore what follows their own reply for 50 to 850 ms
-    /// (NModbus#188, eModbus#223). 0: none.
+    /// Least time between a reply of this station and the next request to it. T14: devices that
+    /// ignore what follows their own reply for 50 to 850 ms (NModbus#188, eModbus#223). 0: none.
     Duration station_gap{};
     /// The same behind a write to this station. T14: devices that store a command for 1 to 3 s
     /// (batpred#1209). 0: as `station_gap`.
@@ -38,16 +36,14 @@ struct StationSettings {
     int retries = 1;  ///< of reads; 0..10
     bool retry_writes = false;
     modbus::CrcOrder crc_order = modbus::CrcOrder::low_first;  ///< as it sends and expects it
-    /// How long after a timeout a reply may still come; empty = auto: the response timeout at
-    /// first, then by the lateness seen.
+    /// How long after a timeout a reply may still come; empty: by the lateness seen (LateWindow).
     std::optional<Duration> late_window;
     /// Maximum age of a stored value that may answer a client; 0 = ask the panel.
     Duration max_age{};
     /// Items of one read, for joining: the profile's or the standard's limit.
     std::uint16_t max_registers = 125;
     std::uint16_t max_bits = 2000;
-    /// The profile guarantees both limits. Otherwise reads are joined only up to a length that the
-    /// station has answered before (P6).
+    /// The profile guarantees both limits; else joined reads have a length answered before (P6).
     bool vouched = false;
     friend bool operator==(const StationSettings&, const StationSettings&) = default;
 };
@@ -69,9 +65,8 @@ struct Settings {
     Duration broadcast_turnaround = 100ms;  ///< serial line V1.02, 2.4.1: 100..200 ms
     /// Silence that ends a reply of unknown length (FRM-11); counted from its last byte.
     Duration end_of_frame = 20ms;
-    /// The longest silence inside a reply of known length; counted from its last byte. The default
-    /// is for a tty: a USB latency timer (16 ms) and a busy machine. In ASCII also the longest
-    /// between two characters of any frame.
+    /// The longest silence inside a reply of known length; in ASCII also between two characters of
+    /// any frame. The default is for a tty: a USB latency timer (16 ms) and a busy machine.
     Duration reply_hole = 60ms;
     /// The line rests so long after each opening. T8: device servers that ignore the first seconds
     /// of a connection (telegraf#11919, ioBroker.modbus#250).
@@ -79,11 +74,9 @@ struct Settings {
     QueueSettings queue;
     OfflineSettings offline;
     Quarantine quarantine = Quarantine::automatic;
-    /// The line is a real UART: no reply byte can come before the request has left. Not so on a
-    /// pty.
+    /// A real UART, no pty: no reply byte can come before the request has left.
     bool paced = false;
-    /// The transport may delay frames and deliver all of them later (RTU over TCP): outstanding
-    /// replies do not lapse by time alone.
+    /// The transport may deliver frames later (RTU over TCP): time alone ends no request (T8).
     bool may_stall = false;
     /// Identical, contained and adjacent reads share one transaction (P6).
     bool share_reads = true;
@@ -91,19 +84,16 @@ struct Settings {
     EchoMode echo = EchoMode::off;
     /// Report why each request is sent now and why one is refused.
     bool explain = false;
-    /// A station that pauses for longer than `reply_hole` inside its replies is waited for: its
-    /// pause is learned.
+    /// The pause of a station inside its replies is learned where longer than `reply_hole` (T4).
     bool learns_holes = true;
     friend bool operator==(const Settings&, const Settings&) = default;
 };
 
-/// True if the settings that affect the wire itself are equal: a running line need not be reopened
-/// for the other settings.
+/// True if the settings that affect the wire itself are equal: the line stays open.
 bool is_same_wire(const Settings& one, const Settings& other);
 
-/// Returns the stations' CRC orders. ASCII has no CRC: its frames are recorded with the standard
-/// order. A broadcast has the standard order unless all listed stations have the other: no frame
-/// can be right for both.
+/// Returns the stations' CRC orders; in ASCII the standard's. A broadcast has the standard order
+/// unless all listed stations have the other: no frame can be right for both.
 modbus::CrcOrders crc_orders(const Settings& settings);
 
 }  // namespace panelgate::arbiter

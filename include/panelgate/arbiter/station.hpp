@@ -48,13 +48,11 @@ class Station {
         return (is_suspect(is_read) && (was_silent() || failed_reads_ + failed_writes_ > 1)) ||
                speculative();
     }
-    /// Time from which its silences are within its own share of the line, with two whole timeouts
-    /// in advance (P4).
+    /// From when its failures are within its own share, with two timeouts in advance (P4).
     TimePoint affordable_at() const {
         return silences_.next() - 2 * silences_.time_for(settings_.response_timeout);
     }
-    /// True if its last retry behind a silence was answered: the line loses frames, and the station
-    /// is there (T1).
+    /// True if its last retry behind a silence was answered: frames get lost, it is there (T1).
     bool loses_frames() const { return loses_frames_; }
     /// True if its last attempt was silent.
     bool was_silent() const { return (lately_ & 1) != 0; }
@@ -113,11 +111,9 @@ class Station {
         std::optional<Duration> drift;  ///< new: its replies come this near the response timeout
         std::optional<Duration> trail;  ///< new: this long something follows its replies
     };
-    /// An attempt was answered at `came`, `needed` after its request by the first sign of the
-    /// reply.
+    /// An attempt was answered at `came`; the reply began `needed` after the request.
     Replied on_reply(TimePoint came, const Attempt& attempt, bool refused, Duration needed);
-    /// A late reply of the station came, so long after the timeout. True if the station was
-    /// offline.
+    /// A late reply came, so long after the timeout. True if the station was offline.
     bool on_late(TimePoint now, Duration lateness);
     /// A copy of its last reply came, or bytes that belong to no reply.
     void on_followed(TimePoint now, bool is_copy) { trail_.on_followed(now, is_copy); }

@@ -17,8 +17,7 @@ struct OfflineSettings {
 };
 
 /// Health of one station: online, suspect, offline. A transaction in which anything of the station
-/// is heard, damaged or an exception, is a sign of life; only silence counts towards offline (P4,
-/// T1). Pure.
+/// is heard is a sign of life; only silence counts towards offline (P4, T1). Pure.
 class StationHealth {
   public:
     explicit StationHealth(OfflineSettings settings = {}) : settings_(settings) {}
@@ -26,8 +25,7 @@ class StationHealth {
     /// Applies from now on; pauses that have begun stay.
     void apply(const OfflineSettings& settings) { settings_ = settings; }
 
-    /// The health shown everywhere. Unknown until the station was asked, and after the loss of its
-    /// line until it was asked again.
+    /// The health shown everywhere. Unknown until the station is asked over the open line.
     Health state() const { return known_ ? state_ : Health::unknown; }
     bool offline() const { return state_ == Health::offline; }
     bool online() const { return state_ == Health::online; }
@@ -85,8 +83,7 @@ class ProbeBudget {
 
     explicit ProbeBudget(double share) : share_(share) {}
 
-    /// True if the budget allows spending now. `credit`: an excess that is paid off within this
-    /// time does not count.
+    /// True if the budget allows spending now, but for an excess paid off within `credit`.
     bool allows(TimePoint now, Duration credit = {}) const { return now + credit >= next_; }
     TimePoint next() const { return next_; }
     /// An unanswered attempt that occupied the line for `cost` ended at `now`. Earlier excess is

@@ -11,8 +11,7 @@
 namespace panelgate::arbiter {
 
 /// All stations of a line: created when first asked; unheard ones are forgotten again. Two budgets
-/// hold what silence may cost the others, by asking seldom (P4, T1): one for suspects together, one
-/// for offline stations together. Pure.
+/// hold what silence may cost the others, by asking seldom (P4, T1): suspects, offline ones. Pure.
 class Stations {
   public:
     explicit Stations(const Settings& settings) { apply(settings); }
@@ -47,8 +46,7 @@ class Stations {
     /// True if a retry is within what silence may cost the others: the share of the station and,
     /// where several others are silent as well, that of all suspects.
     bool affords_retry(TimePoint now, const Station& station) const;
-    /// An offline station is asked, or a client's request to it is accepted: the silence is paid
-    /// for in advance.
+    /// An offline station is asked, or a request to it accepted: paid for in advance.
     void on_probe(TimePoint now, std::uint8_t id);
     /// An attempt that occupied the line for `cost` failed.
     void on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration cost);
@@ -66,8 +64,7 @@ class Stations {
     void on_broadcast(const Asked& broadcast);
     void on_line_down();
 
-    /// The listed station, offline or not answering writes, whose probe is most overdue; empty:
-    /// none is due.
+    /// The listed station whose probe is most overdue; empty: none is due.
     std::optional<std::uint8_t> next_to_probe(TimePoint now) const;
     /// When the next probe is due; empty: never.
     std::optional<TimePoint> next_probe(TimePoint now) const;
@@ -83,8 +80,7 @@ class Stations {
     StationSettings own_settings(std::uint8_t id) const;
     /// When this station is probed; empty: never.
     std::optional<TimePoint> probe_at(TimePoint now, const Station& station) const;
-    /// Until when others count as using the line: one has answered since this station's last
-    /// failure, and lately.
+    /// Until when others use the line: one has answered since this station's last failure.
     TimePoint others_active_until(std::uint8_t id, Client self = 0) const;
     bool any_online() const;
     const ProbeBudget& probes(TimePoint now) const;

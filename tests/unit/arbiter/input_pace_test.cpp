@@ -1,5 +1,5 @@
 // When bytes are worth a look (P5): the request of an attempt leaves, then a reply comes.
-#include "panelgate/arbiter/input_pace.hpp"
+#include "panelgate/arbiter/attempt.hpp"
 
 #include <gtest/gtest.h>
 

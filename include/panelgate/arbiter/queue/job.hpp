@@ -17,11 +17,17 @@
 
 namespace panelgate::arbiter {
 
+struct QueueSettings {
+    std::size_t limit = 256;      ///< requests that wait on this line
+    std::size_t per_client = 32;  ///< of one client
+    Duration deadline = 2s;       ///< of a request, from its arrival to its answer
+    friend bool operator==(const QueueSettings&, const QueueSettings&) = default;
+};
+
 /// A transaction is one request on the wire, numbered per line from 1.
 using Transaction = std::uint64_t;
 
-/// The transactions made for a job, oldest first: one for each attempt. Most jobs have one, which
-/// needs no heap memory.
+/// The transactions made for a job, oldest first. Most jobs have one, without heap memory.
 class TransactionNumbers {
   public:
     void add(Transaction number) {
@@ -59,8 +65,7 @@ struct Job {
     /// The function the client asked for, where the request uses another one instead; 0: the same.
     std::uint8_t asked_function = 0;
     Duration within = Duration::max();  ///< its time limit, if sooner than the queue's
-    /// A scan: unheard stations are asked though they are offline, and their silence says nothing
-    /// about the line.
+    /// A scan: unheard stations are asked though offline; their silence says nothing of the line.
     bool search = false;
     TimePoint arrived{};
     TimePoint deadline{};

@@ -9,7 +9,6 @@
 
 #include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/arbiter/queue/read_cache.hpp"
-#include "panelgate/arbiter/queue/settings.hpp"
 #include "panelgate/base/inline_function.hpp"
 #include "panelgate/base/pool.hpp"
 
@@ -55,8 +54,7 @@ class JobQueue {
     /// A refused job stays as it was; a taken job is moved from.
     PushResult push(Job& job);
     PushResult push(Job&& job) { return push(job); }
-    /// Puts a taken job back, ahead of the client's younger jobs for that station. Never refused;
-    /// drops no job.
+    /// Puts a taken job back, ahead of the client's younger jobs for that station. Never refused.
     void put_back(Job&& job);
 
     class Choice;
@@ -65,21 +63,18 @@ class JobQueue {
     /// Takes the job that was chosen and advances the turns. There must be one.
     Job take(const Choice& choice);
     /// Takes the matching first jobs of all lanes for this station that are reads to be shared,
-    /// repeatedly until none matches; `wanted` may depend on what it accepted. Turns do not
-    /// advance. In order of tickets.
+    /// until none matches; `wanted` may depend on what it accepted. Turns do not advance.
     Jobs take_reads(std::uint8_t station, const Test& wanted);
     /// Removes and returns the matching jobs, in order of tickets.
     Jobs remove_if(const Test& match);
-    /// Visits each lane's first job that order allows to run, until one matches. False if none
-    /// does.
+    /// Visits each lane's first job that order allows, until one matches. False if none does.
     bool any_first(const Test& match) const;
 
     /// True if a job of this client waits for this station; a broadcast is for every station.
     bool has(Client client, std::uint8_t station) const;
     /// True if the job popped last went ahead of a runnable higher class: it was its turn.
     bool last_was_passed_over() const { return last_was_passed_over_; }
-    /// Jobs that count against the limit; above it only after put_back(), or when reads that
-    /// carried others were taken.
+    /// Jobs that count; above the limit after put_back(), or when reads that carried were taken.
     std::size_t size() const { return size_; }
     std::size_t waiting() const { return expiries_.size(); }  ///< all of them
     bool empty() const { return expiries_.empty(); }

@@ -30,12 +30,10 @@ struct ReadSpan {
     friend bool operator==(const ReadSpan&, const ReadSpan&) = default;
 };
 
-/// Returns the part of a reply to `whole` that answers `part`, as a reply PDU. `whole` must contain
-/// `part` and the reply match it.
+/// Returns the part of a reply to `whole` that answers `part`, which `whole` contains, as a PDU.
 Bytes slice_reply(const modbus::Span& whole, ByteView reply, const modbus::Span& part);
 
-/// Values read on one line, for stations that allow clients an older value (max_age). Bounded: the
-/// oldest is dropped first. Pure.
+/// Values read on one line, for stations with `max_age`. The oldest is dropped first. Pure.
 class ReadCache {
   public:
     static constexpr std::size_t kEntries = 256;
@@ -50,8 +48,7 @@ class ReadCache {
     void store(const ReadSpan& span, Bytes reply, TimePoint sampled);
     /// Returns the newest value of all these items that is not older than max_age.
     std::optional<Hit> find(const ReadSpan& span, TimePoint now, Duration max_age) const;
-    /// A write to the station (0: all stations), answered or not: drops the values that
-    /// modbus::may_change() names.
+    /// A write to the station (0: all), answered or not: drops what modbus::may_change() names.
     void on_write(TimePoint now, std::uint8_t station, const modbus::Request& request);
     void clear() { entries_.clear(); }
     std::size_t size() const { return entries_.size(); }
@@ -80,8 +77,7 @@ class WaitingReads {
     void remove(const Job& job, const ReadSpan& span, const Count& count);
     /// True if this waiting read counts.
     bool counts(Ticket ticket, const ReadSpan& span) const;
-    /// True if removing this read lowers the count: it counts, and no carried read would take its
-    /// place.
+    /// True if removing this read lowers the count: no carried read would take its place.
     bool frees(Ticket ticket, const ReadSpan& span) const;
     /// Visits the client of each waiting read of this station.
     template <class Visit>
