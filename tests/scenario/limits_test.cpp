@@ -37,8 +37,8 @@ constexpr Bound kBounds[] = {
     {Limit::one_behind, 7000, 0},
     {Limit::early, 900, 0},
     {Limit::confirmations, 80, 25},
-    {Limit::two_answers, 450, 25},
-    {Limit::echo_kinds, 2500, 25},
+    {Limit::two_answers, 450, 40},
+    {Limit::echo_kinds, 2500, 40},
     {Limit::misnumbered, 20, 7},
     {Limit::damaged_repeated, 20, 45},
 };

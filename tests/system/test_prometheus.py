@@ -27,7 +27,7 @@ BOX_FAULTS = {"shaken": {"damage": 0.5},       # Errors; a reply that breaks off
               "sluggish": {"slow_ms": 700}}    # LineOverloaded, LatencyBurnsFast and -Slowly
 # Given up after 100 ms and here before the next poll: LateRepliesRise, when all has been well for
 # half an hour (half a minute here).
-LATE_FAULTS = {"tardy": {"late": 0.3, "late_by_ms": 200}}
+LATE_FAULTS = {"tardy": {"late": 0.3, "late_by_ms": 180}}
 
 
 def box(adapter):
