@@ -76,10 +76,10 @@ class StationHealth {
 /// allowed for d * (1 / share - 1). Unforeseen costs may exceed it, and are paid off later. Pure.
 class ProbeBudget {
   public:
-    static constexpr double kSuspect = 0.2;    ///< of stations whose last requests failed, together
-    static constexpr double kIgnored = 0.05;   ///< of writes that stations ignore, together
-    static constexpr double kOffline = 0.045;  ///< of offline stations, together
-    static constexpr double kAlone = 0.5;      ///< ... while an outage of all has only just begun
+    static constexpr double kSuspect = 0.2;   ///< of stations whose last requests failed, together
+    static constexpr double kIgnored = 0.05;  ///< of writes that stations ignore, together
+    static constexpr double kOffline = 0.03;  ///< of offline stations, together
+    static constexpr double kAlone = 0.5;     ///< ... while an outage of all has only just begun
 
     explicit ProbeBudget(double share) : share_(share) {}
 

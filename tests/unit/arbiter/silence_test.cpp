@@ -184,7 +184,7 @@ TEST_F(ArbiterTest, P4AWriteMayBeTheProbeOnceAnInterval) {
     bus.submit(17, kRead);
     answer(bus, 17, kReply, 3ms);
     silence(bus);
-    bus.run_for(75s);
+    bus.run_for(90s);
     EXPECT_EQ(bus.try_submit(17, kRead).error(), Fault::offline);
     const Ticket write = bus.submit(17, kWrite);
     EXPECT_EQ(bus.try_submit(17, kWrite).error(), Fault::offline);
