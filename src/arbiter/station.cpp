@@ -109,6 +109,7 @@ Station::Replied Station::on_reply(TimePoint came, const Attempt& attempt, bool 
     lately_ = result.back ? 0 : static_cast<std::uint8_t>(lately_ << 1);
     wants_check_ = false;
     failed_reads_ = failed_writes_ = 0;
+    if (result.back) silences_ = ProbeBudget{ProbeBudget::kSuspect};  // it is used at once
     if (group.silent) loses_frames_ = true;
     // A reply to a retry may be that to the attempt before.
     if (group.attempts <= 1) think_times_.add(needed);

@@ -178,6 +178,23 @@ TEST_F(ArbiterTest, P4ProbesOfASilentStationStayBelowTheirShareAndOneReplyBrings
     EXPECT_TRUE(bus.answer(ticket).pdu.has_value());
 }
 
+TEST_F(ArbiterTest, P4AStationThatIsBackIsUsedAtOnceThoughItsSilencesHaveCostMuch) {
+    const auto ask = [&](std::uint8_t station) {
+        const Ticket ticket = bus.submit(station, kRead);
+        answer(bus, station, kReply, 3ms);
+        EXPECT_TRUE(bus.answer(ticket).pdu);
+        bus.run_for(10ms);
+    };
+    ask(17);
+    silence(bus);
+    ask(18);
+    while (bus.sent.back().kind != FrameKind::probe) ASSERT_TRUE(bus.next_sent());
+    answer(bus, 17, kReply, 3ms);
+    bus.run_for(10ms);
+    ask(18);
+    ask(17);
+}
+
 TEST_F(ArbiterTest, P4AWriteMayBeTheProbeOnceAnInterval) {
     settings.offline.probe_min = settings.offline.probe_max = 60s;
     BusScript bus{settings};
