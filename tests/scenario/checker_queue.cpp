@@ -97,8 +97,9 @@ bool Checker::rides(const Open& newcomer) const {
     if (!newcomer.span || !settings_.share_reads) return false;
     return std::ranges::any_of(open_, [&](const auto& entry) {
         const Open& o = entry.second;
-        return &o != &newcomer && (!o.sent || o.again) && !o.gone && o.span &&
-               o.span->contains(*newcomer.span);
+        // It rides along with what waits, and with what is still leaving (P6).
+        const bool waits = !o.sent || o.again || newcomer.submitted < sent_until_;
+        return &o != &newcomer && waits && !o.gone && o.span && o.span->contains(*newcomer.span);
     });
 }
 
