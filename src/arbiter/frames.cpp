@@ -132,7 +132,8 @@ Duration Arbiter::carry_out(TimePoint now, const Unused& part, Done done) {
     return {};
 }
 
-/// Another station's reply shows that nothing is held back; its own, that it has served the rest.
+/// A late reply shows that its station has served the older requests of the same connection, and
+/// that the line holds back nothing older of any station (T8).
 Duration Arbiter::take_late(TimePoint now, const Unused& part) {
     const std::uint8_t id = part.bytes[0];
     Station& station = stations_.of(id);

@@ -171,7 +171,7 @@ TimePoint Schedule::clear_at(TimePoint now, const Stations& stations, const Stat
 /// Time from which a job may have its turn. A broadcast has no reply.
 TimePoint Schedule::ready_at(TimePoint now, const Stations& stations, const Job& job) const {
     if (job.station == kBroadcast) return {};
-    const TimePoint held = stations.held_until(job);
+    const TimePoint held = stations.held_until(now, job);
     const Station* const station = stations.find(job.station);
     if (station == nullptr) return held;
     const bool may_learn = !echo_known_ && !job.request.is_read();

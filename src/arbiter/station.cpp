@@ -83,7 +83,7 @@ Condition Station::condition() const {
     if (health_.offline()) return Condition::offline;
     if (failed_reads_ + failed_writes_ > 1) return Condition::failing;
     if (std::popcount(lately_) >= kFlaky) return Condition::flaky;
-    if (failed_reads_ + failed_writes_ > 0 || (lately_ & 1) != 0) return Condition::missed;
+    if (failed_reads_ + failed_writes_ > 0 || was_silent()) return Condition::missed;
     return health_.last_heard() ? Condition::well : Condition::unheard;
 }
 

@@ -100,22 +100,24 @@ bool Stations::refuses(TimePoint now, const Job& job) {
 
 bool Stations::may_spend(TimePoint now, const Job& job) const {
     const Station* const station = find(job.station);
-    if (station == nullptr) return true;
-    const bool is_read = job.request.is_read();
-    const bool pays = is_read || !station->answers_reads();
-    return (!pays || now >= station->affordable_at()) &&
-           (!station->is_doubtful(is_read) || budget_for(*station, is_read).allows(now, credit()));
+    return station == nullptr || now >= affordable_at(*station, job.request.is_read());
 }
 
-TimePoint Stations::held_until(const Job& job) const {
+/// Writes that are ignored beside answered reads have a budget of their own (T14).
+TimePoint Stations::affordable_at(const Station& station, bool is_read) const {
+    const bool pays = is_read || !station.answers_reads();
+    TimePoint at{};
+    if (pays) at = std::max(at, station.affordable_at());
+    if (station.is_doubtful(is_read))
+        at = std::max(at, (pays ? suspects_ : ignored_writes_).next() - credit());
+    return at;
+}
+
+TimePoint Stations::held_until(TimePoint now, const Job& job) const {
     const Station* const station = find(job.station);
     if (station == nullptr) return {};
-    const bool is_read = job.request.is_read();
-    TimePoint held{};
-    if (is_read || !station->answers_reads()) held = station->affordable_at();
-    if (station->is_doubtful(is_read))
-        held = std::max(held, budget_for(*station, is_read).next() - credit());
-    if (held == TimePoint{}) return held;
+    const TimePoint held = affordable_at(*station, job.request.is_read());
+    if (held <= now) return held;
     // Who looks for stations waits for others, not for what the search itself has asked.
     const Client self = station->speculative() ? job.client : 0;
     return std::min(held, others_active_until(job.station, self));

@@ -58,7 +58,7 @@ class Station {
     bool was_silent() const { return (lately_ & 1) != 0; }
     /// True if nothing shows that its next request may be unanswered: only then reads are retried.
     bool answers_now(bool is_read) const {
-        return !is_suspect(is_read) && (lately_ & 1) == 0 && !health_.offline() && !speculative();
+        return !is_suspect(is_read) && !was_silent() && !health_.offline() && !speculative();
     }
     /// True if it has answered reads, and the last one too.
     bool answers_reads() const { return reads_.any() && failed_reads_ == 0; }

@@ -42,7 +42,7 @@ class Stations {
     /// True if the budget of suspects allows to ask this station while others wait.
     bool may_spend(TimePoint now, const Job& job) const;
     /// Time until which a suspect waits for its share while others use the line.
-    TimePoint held_until(const Job& job) const;
+    TimePoint held_until(TimePoint now, const Job& job) const;
     /// True if a retry is within what silence may cost the others: the share of the station and,
     /// where several others are silent as well, that of all suspects.
     bool affords_retry(TimePoint now, const Station& station) const;
@@ -80,6 +80,8 @@ class Stations {
     StationSettings own_settings(std::uint8_t id) const;
     /// When this station is probed; empty: never.
     std::optional<TimePoint> probe_at(TimePoint now, const Station& station) const;
+    /// From when a request is within the share of its station and the budget of suspects (P4).
+    TimePoint affordable_at(const Station& station, bool is_read) const;
     /// Until when others use the line: one has answered since this station's last failure.
     TimePoint others_active_until(std::uint8_t id, Client self = 0) const;
     bool any_online() const;
@@ -95,11 +97,6 @@ class Stations {
     std::map<std::uint8_t, StationSettings> configured_;
     std::map<std::uint8_t, Station> stations_;
     Outstanding outstanding_;
-    /// The budget that this request of a doubtful station must be within.
-    const ProbeBudget& budget_for(const Station& station, bool is_read) const {
-        return !is_read && station.answers_reads() ? ignored_writes_ : suspects_;
-    }
-
     ProbeBudget suspects_{ProbeBudget::kSuspect};
     ProbeBudget ignored_writes_{ProbeBudget::kIgnored};  ///< reads do not pay for them (T14)
     ProbeBudget offline_{ProbeBudget::kOffline};

@@ -96,12 +96,12 @@ TEST_F(StationsTest, P4SuspectsAndStrangersTogetherHaveOneBudgetWhichIsNotThatOf
 
 TEST_F(StationsTest, P4ASuspectWaitsForItsShareOnlyWhileOthersUseTheLine) {
     for (int i = 0; i < 2; ++i) fail(1, 1s);
-    EXPECT_LE(stations.held_until(job_for(1)), now) << "nobody else is there";
+    EXPECT_LE(stations.held_until(now, job_for(1)), now) << "nobody else is there";
     answer(2);
-    EXPECT_GT(stations.held_until(job_for(1)), now);
-    EXPECT_LE(stations.held_until(job_for(2)), now);
+    EXPECT_GT(stations.held_until(now, job_for(1)), now);
+    EXPECT_LE(stations.held_until(now, job_for(2)), now);
     now += timing::kOthersActive;
-    EXPECT_LE(stations.held_until(job_for(1)), now);
+    EXPECT_LE(stations.held_until(now, job_for(1)), now);
 }
 
 TEST_F(StationsTest, P4AFlakyStationBeyondItsShareIsNotRetriedWhileOthersUseTheLine) {
