@@ -104,6 +104,9 @@ class Checker : public Witness {
         std::uint64_t turn = 0;    ///< turns until then
         bool write = false;
         bool sent = false;  ///< in a frame, and not known to wait again
+        /// Its frame was asked for by an older request. It waits all the same where a reply is
+        /// outstanding: nothing rides along with such a frame (T2).
+        bool along = false;
         bool gone = false;  ///< its client
         /// It was not answered with the frame that it was taken to be in: that was a part of a
         /// joined read, which goes alone, or the joined read itself, and has failed.

@@ -17,6 +17,7 @@ void Checker::mark_sent(std::uint8_t station, ByteView pdu, FrameKind what) {
         return;  // it answers nobody, or the same again
     const auto span = test::read_span(station, pdu);
     std::unordered_set<arbiter::Client> behind;  // those whose order lets no more go
+    bool first = true;
     for (auto& [ticket, open] : open_) {
         const bool concerned = open.job.station == station || open.job.station == kBroadcast;
         if (open.gone || !concerned) continue;
@@ -27,6 +28,7 @@ void Checker::mark_sent(std::uint8_t station, ByteView pdu, FrameKind what) {
         const bool taken = goes && (open.sent || !behind.contains(open.job.client));
         open.again = open.sent && !taken;
         open.sent = open.sent || taken;
+        if (taken) open.along = !std::exchange(first, false);
         if (!taken) behind.insert(open.job.client);
     }
 }
@@ -98,7 +100,7 @@ bool Checker::rides(const Open& newcomer) const {
     return std::ranges::any_of(open_, [&](const auto& entry) {
         const Open& o = entry.second;
         // It rides along with what waits, and with what is still leaving (P6).
-        const bool waits = !o.sent || o.again || newcomer.submitted < sent_until_;
+        const bool waits = !o.sent || o.again || o.along || newcomer.submitted < sent_until_;
         return &o != &newcomer && waits && !o.gone && o.span && o.span->contains(*newcomer.span);
     });
 }
