@@ -104,9 +104,6 @@ class Checker : public Witness {
         std::uint64_t turn = 0;    ///< turns until then
         bool write = false;
         bool sent = false;  ///< in a frame, and not known to wait again
-        /// Its frame was asked for by an older request. It waits all the same where a reply is
-        /// outstanding: nothing rides along with such a frame (T2).
-        bool along = false;
         bool gone = false;  ///< its client
         /// It was not answered with the frame that it was taken to be in: that was a part of a
         /// joined read, which goes alone, or the joined read itself, and has failed.
@@ -147,7 +144,6 @@ class Checker : public Witness {
     void mark_answered(std::uint8_t station);
     bool joins_attempt(TimePoint now, const arbiter::Job& job) const;
     std::size_t waiting(arbiter::Ticket but_for = 0) const;
-    bool rides(const Open& newcomer) const;
     void check_turn(TimePoint now, bool write);
     // What may be answered (checker.cpp)
     void check_reply(TimePoint now, const Open& open, const arbiter::Finish& finish);

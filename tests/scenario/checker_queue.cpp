@@ -17,7 +17,6 @@ void Checker::mark_sent(std::uint8_t station, ByteView pdu, FrameKind what) {
         return;  // it answers nobody, or the same again
     const auto span = test::read_span(station, pdu);
     std::unordered_set<arbiter::Client> behind;  // those whose order lets no more go
-    bool first = true;
     for (auto& [ticket, open] : open_) {
         const bool concerned = open.job.station == station || open.job.station == kBroadcast;
         if (open.gone || !concerned) continue;
@@ -28,7 +27,6 @@ void Checker::mark_sent(std::uint8_t station, ByteView pdu, FrameKind what) {
         const bool taken = goes && (open.sent || !behind.contains(open.job.client));
         open.again = open.sent && !taken;
         open.sent = open.sent || taken;
-        if (taken) open.along = !std::exchange(first, false);
         if (!taken) behind.insert(open.job.client);
     }
 }
@@ -67,42 +65,34 @@ std::uint64_t rank_of(const arbiter::ReadSpan& span) {
 
 }  // namespace
 
-/// Of reads that one transaction answers in any case only one counts: one that another contains
-/// rides. Those that only touch are joined as far as a panel is known to take the length, which is
-/// not known here: they count.
+/// Of reads that one transaction answers in any case only one counts: a read that another contains
+/// rides. An unanswered read whose frame was sent may wait all the same, because the frame was a
+/// proof, or no read rode along with it (T2): it does not count, and reads that it contains ride.
+/// Reads that only touch are joined as far as a panel is known to take the length, which is not
+/// known here: they count.
 std::size_t Checker::waiting(arbiter::Ticket but_for) const {
     std::size_t waiting = 0;
-    std::vector<std::uint64_t> reads;
+    std::vector<std::pair<std::uint64_t, bool>> reads;  // and whether it counts
     reads.reserve(open_.size());
     for (const auto& [ticket, open] : open_) {
-        if ((open.sent && !open.again) || open.gone || ticket == but_for) continue;
-        if (!open.span || !settings_.share_reads) {
+        if (open.gone || ticket == but_for) continue;
+        const bool waits = !open.sent || open.again;
+        if (open.span && settings_.share_reads) {
+            reads.emplace_back(rank_of(*open.span), waits);
+        } else if (waits) {
             ++waiting;
-        } else {
-            reads.push_back(rank_of(*open.span));
         }
     }
     std::ranges::sort(reads);
     std::uint64_t table = 0;
     std::uint64_t end = 0;
-    for (const std::uint64_t read : reads) {
+    for (const auto& [read, waits] : reads) {
         if (std::exchange(table, read >> 32) != read >> 32) end = 0;
         const std::uint64_t own = (read >> 16 & 0xFFFF) + 0xFFFF - (read & 0xFFFF);
-        if (own > end) ++waiting;
+        if (own > end && waits) ++waiting;
         end = std::max(end, own);
     }
     return waiting;
-}
-
-/// One that waits contains it: it does not count.
-bool Checker::rides(const Open& newcomer) const {
-    if (!newcomer.span || !settings_.share_reads) return false;
-    return std::ranges::any_of(open_, [&](const auto& entry) {
-        const Open& o = entry.second;
-        // It rides along with what waits, and with what is still leaving (P6).
-        const bool waits = !o.sent || o.again || o.along || newcomer.submitted < sent_until_;
-        return &o != &newcomer && waits && !o.gone && o.span && o.span->contains(*newcomer.span);
-    });
 }
 
 /// A newcomer may not raise what waits beyond the limit. More than it may wait all the same: what
@@ -115,7 +105,7 @@ void Checker::on_settled() {
     const bool gone = std::exchange(frames_settled_, frames_) != frames_;
     if (!came || gone || displaced_ || open_.size() <= settings_.queue.limit) return;
     const auto newcomer = open_.find(last_ticket_);
-    if (newcomer == open_.end() || rides(newcomer->second)) return;
+    if (newcomer == open_.end()) return;
     const std::size_t after = waiting();
     if (after > settings_.queue.limit && after > waiting(last_ticket_))
         fail("P9: more requests wait than the limit allows: " + std::to_string(after) + " of " +
