@@ -105,11 +105,12 @@ bool Stations::may_spend(TimePoint now, const Job& job) const {
 
 /// Writes that are ignored beside answered reads have a budget of their own (T14).
 TimePoint Stations::affordable_at(const Station& station, bool is_read) const {
+    const bool outage = station.is_suspect(is_read) && several_fail(station);
     const bool pays = is_read || !station.answers_reads();
     TimePoint at{};
     if (pays) at = std::max(at, station.affordable_at());
-    if (station.is_doubtful(is_read))
-        at = std::max(at, (pays ? suspects_ : ignored_writes_).next() - credit());
+    if (outage || station.is_doubtful(is_read))
+        at = std::max(at, (pays || outage ? suspects_ : ignored_writes_).next() - credit());
     return at;
 }
 
@@ -120,30 +121,32 @@ TimePoint Stations::held_until(TimePoint now, const Job& job) const {
     if (held <= now) return held;
     // Who looks for stations waits for others, not for what the search itself has asked.
     const Client self = station->speculative() ? job.client : 0;
-    return std::min(held, others_active_until(job.station, self));
+    return std::min(held, others_active_until(job.station, station->failed(), self));
 }
 
-TimePoint Stations::others_active_until(std::uint8_t id, Client self) const {
-    const Station* const station = find(id);
-    const TimePoint failed = station == nullptr ? TimePoint{} : station->failed();
+TimePoint Stations::others_active_until(std::uint8_t id, TimePoint since, Client self) const {
     TimePoint until{};
     for (const auto& [other_id, other] : stations_) {
         const auto heard = other.health().last_heard();
         const bool is_own = self != 0 && other.wanted_by() == self;
-        if (other_id != id && !is_own && heard && *heard > failed)
+        if (other_id != id && !is_own && heard && *heard > since)
             until = std::max(until, *heard + timing::kOthersActive);
     }
     return until;
 }
 
-bool Stations::affords_retry(TimePoint now, const Station& station) const {
+/// Where panels die together one failure is sign enough (T1).
+bool Stations::several_fail(const Station& but_for) const {
     constexpr int kSeveral = 2;
-    if (now >= others_active_until(station.id())) return true;
-    const auto silent = std::ranges::count_if(stations_, [&](const auto& entry) {
-        const Station& other = entry.second;
-        return &other != &station && other.was_silent() && !other.health().offline();
-    });
-    return now >= station.affordable_at() && (silent < kSeveral || suspects_.allows(now, credit()));
+    return kSeveral <= std::ranges::count_if(stations_, [&](const auto& entry) {
+               const Station& other = entry.second;
+               return &other != &but_for && !other.answers_now(false) && other.health().suspect();
+           });
+}
+
+bool Stations::affords_retry(TimePoint now, const Station& station) const {
+    if (!several_fail(station) || now >= others_active_until(station.id(), {})) return true;
+    return now >= station.affordable_at() && suspects_.allows(now, credit());
 }
 
 void Stations::on_probe(TimePoint now, std::uint8_t id) {
@@ -157,7 +160,8 @@ void Stations::on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration 
     const Station& station = of(id);
     if (station.health().offline()) return;  // paid for in advance
     const Duration most = kMemory * suspects_.time_for(std::max(unlisted_.response_timeout, cost));
-    (!is_read && station.answers_reads() ? ignored_writes_ : suspects_).spend(now, cost, most);
+    const bool ignored = !is_read && station.answers_reads() && !several_fail(station);
+    (ignored ? ignored_writes_ : suspects_).spend(now, cost, most);
 }
 
 void Stations::on_broadcast(const Asked& broadcast) {

@@ -43,8 +43,8 @@ class Stations {
     bool may_spend(TimePoint now, const Job& job) const;
     /// Time until which a suspect waits for its share while others use the line.
     TimePoint held_until(TimePoint now, const Job& job) const;
-    /// True if a retry is within what silence may cost the others: the share of the station and,
-    /// where several others are silent as well, that of all suspects.
+    /// True if a retry is within what silence may cost the others: where several other stations
+    /// fail as well, the share of the station and that of all suspects.
     bool affords_retry(TimePoint now, const Station& station) const;
     /// An offline station is asked, or a request to it accepted: paid for in advance.
     void on_probe(TimePoint now, std::uint8_t id);
@@ -82,8 +82,9 @@ class Stations {
     std::optional<TimePoint> probe_at(TimePoint now, const Station& station) const;
     /// From when a request is within the share of its station and the budget of suspects (P4).
     TimePoint affordable_at(const Station& station, bool is_read) const;
-    /// Until when others use the line: one has answered since this station's last failure.
-    TimePoint others_active_until(std::uint8_t id, Client self = 0) const;
+    /// Until when stations other than this one use the line: one of them has answered after `since`.
+    TimePoint others_active_until(std::uint8_t id, TimePoint since, Client self = 0) const;
+    bool several_fail(const Station& but_for) const;
     bool any_online() const;
     const ProbeBudget& probes(TimePoint now) const;
     /// What suspects may cost in advance: two whole timeouts.
