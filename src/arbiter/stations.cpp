@@ -103,20 +103,24 @@ bool Stations::may_spend(TimePoint now, const Job& job) const {
     return station == nullptr || now >= affordable_at(*station, job.request.is_read());
 }
 
-/// Writes that are ignored beside answered reads have a budget of their own (T14).
+/// While others want the line a station waits for its own share, and a doubtful station for that of
+/// suspects. Writes that are ignored beside answered reads have a budget of their own (T14).
 TimePoint Stations::affordable_at(const Station& station, bool is_read) const {
-    const bool outage = station.is_suspect(is_read) && several_fail(station);
     const bool pays = is_read || !station.answers_reads();
-    TimePoint at{};
-    if (pays) at = std::max(at, station.affordable_at());
-    if (outage || station.is_doubtful(is_read))
-        at = std::max(at, (pays || outage ? suspects_ : ignored_writes_).next() - credit());
-    return at;
+    const TimePoint own = pays ? station.affordable_at() : TimePoint{};
+    if (!is_doubtful(station, is_read)) return own;
+    const bool ignored = !pays && !several_fail(station);
+    return std::max(own, (ignored ? ignored_writes_ : suspects_).next() - credit());
+}
+
+/// Where panels die together one failure is sign enough (T1).
+bool Stations::is_doubtful(const Station& station, bool is_read) const {
+    return station.is_doubtful(is_read) || (station.is_suspect(is_read) && several_fail(station));
 }
 
 TimePoint Stations::held_until(TimePoint now, const Job& job) const {
     const Station* const station = find(job.station);
-    if (station == nullptr) return {};
+    if (station == nullptr || !is_doubtful(*station, job.request.is_read())) return {};
     const TimePoint held = affordable_at(*station, job.request.is_read());
     if (held <= now) return held;
     // Who looks for stations waits for others, not for what the search itself has asked.
@@ -135,7 +139,6 @@ TimePoint Stations::others_active_until(std::uint8_t id, TimePoint since, Client
     return until;
 }
 
-/// Where panels die together one failure is sign enough (T1).
 bool Stations::several_fail(const Station& but_for) const {
     constexpr int kSeveral = 2;
     return kSeveral <= std::ranges::count_if(stations_, [&](const auto& entry) {
@@ -155,13 +158,18 @@ void Stations::on_probe(TimePoint now, std::uint8_t id) {
     alone_.spend(now + cost, cost);
 }
 
+/// A lossy panel whose retries are answered has its own share, and may not use up that of suspects.
 void Stations::on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration cost) {
     constexpr int kMemory = 3;  // whole timeouts, or failures of this cost
     const Station& station = of(id);
     if (station.health().offline()) return;  // paid for in advance
     const Duration most = kMemory * suspects_.time_for(std::max(unlisted_.response_timeout, cost));
-    const bool ignored = !is_read && station.answers_reads() && !several_fail(station);
-    (ignored ? ignored_writes_ : suspects_).spend(now, cost, most);
+    const bool outage = several_fail(station);
+    if (!is_read && station.answers_reads() && !outage) {
+        ignored_writes_.spend(now, cost, most);
+    } else if (outage || !station.loses_frames() || station.is_suspect(is_read)) {
+        suspects_.spend(now, cost, most);
+    }
 }
 
 void Stations::on_broadcast(const Asked& broadcast) {

@@ -69,15 +69,14 @@ void Checker::on_answered(TimePoint now, std::uint8_t station) {
 /// A copy that comes while nothing is asked tells that this station says its replies twice (T12):
 /// but not one behind a retry, which may be the reply to that. What comes before in place of the
 /// answer to another request is that answer for any gateway, and what it has displaced comes one
-/// late.
+/// late; so does what the retry is owed, if the copy is taken for the reply to the retry.
 void Checker::on_copy(TimePoint now, ByteView adu) {
     const std::uint8_t station = adu[0];
     const bool awaited = !attempt_.answered && attempt_.station == station;
-    if (!awaited && retried_.contains(station)) return;
     const auto said = said_.find(station);
     if (said == said_.end() || !std::ranges::equal(said->second, adu)) return;
-    if (!awaited) known_doublers_.insert(station);
-    if (!awaited || known_doublers_.contains(station)) return;
+    if (!awaited && !retried_.contains(station)) known_doublers_.insert(station);
+    if (known_doublers_.contains(station)) return;
     ++first_copies_;
     if (plan_.limit == Limit::copies_first) return;
     ++excused_;

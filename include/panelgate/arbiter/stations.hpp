@@ -84,6 +84,8 @@ class Stations {
     TimePoint affordable_at(const Station& station, bool is_read) const;
     /// Until when stations other than this one use the line: one of them has answered after `since`.
     TimePoint others_active_until(std::uint8_t id, TimePoint since, Client self = 0) const;
+    /// True if the budget of suspects holds requests to this station (P4).
+    bool is_doubtful(const Station& station, bool is_read) const;
     bool several_fail(const Station& but_for) const;
     bool any_online() const;
     const ProbeBudget& probes(TimePoint now) const;
