@@ -8,7 +8,9 @@ namespace panelgate::arbiter {
 
 namespace {
 constexpr std::size_t kUsualReply = 45;  // bytes: 20 registers
-}
+constexpr int kTurn = 3;                 // times the share of one doubtful station
+constexpr int kSeveral = 2;              // stations that fail beside another station: an outage
+}  // namespace
 
 void Stations::apply(const Settings& settings) {
     offline_settings_ = settings.offline;
@@ -109,13 +111,19 @@ TimePoint Stations::affordable_at(const Station& station, bool is_read) const {
     const bool pays = is_read || !station.answers_reads();
     const TimePoint own = pays ? station.affordable_at() : TimePoint{};
     if (!is_doubtful(station, is_read)) return own;
-    const bool ignored = !pays && !several_fail(station);
-    return std::max(own, (ignored ? ignored_writes_ : suspects_).next() - credit());
+    const auto failing = failing_beside(station);
+    const ProbeBudget& budget = pays || failing >= kSeveral ? suspects_ : ignored_writes_;
+    const TimePoint shared = budget.next() - credit();
+    if (station.failed() == TimePoint{}) return std::max(own, shared);
+    // Each has its turn, whatever stations spend that are not doubtful.
+    const Duration turn = kTurn * budget.time_for(station.settings().response_timeout);
+    return std::max(own, std::min(shared, station.failed() + (failing + 1) * turn));
 }
 
 /// Where panels die together one failure is sign enough (T1).
 bool Stations::is_doubtful(const Station& station, bool is_read) const {
-    return station.is_doubtful(is_read) || (station.is_suspect(is_read) && several_fail(station));
+    return station.is_doubtful(is_read) ||
+           (station.is_suspect(is_read) && failing_beside(station) >= kSeveral);
 }
 
 TimePoint Stations::held_until(TimePoint now, const Job& job) const {
@@ -139,16 +147,16 @@ TimePoint Stations::others_active_until(std::uint8_t id, TimePoint since, Client
     return until;
 }
 
-bool Stations::several_fail(const Station& but_for) const {
-    constexpr int kSeveral = 2;
-    return kSeveral <= std::ranges::count_if(stations_, [&](const auto& entry) {
-               const Station& other = entry.second;
-               return &other != &but_for && !other.answers_now(false) && other.health().suspect();
-           });
+std::ptrdiff_t Stations::failing_beside(const Station& station) const {
+    return std::ranges::count_if(stations_, [&](const auto& entry) {
+        const Station& other = entry.second;
+        return &other != &station && !other.answers_now(false) && other.health().suspect();
+    });
 }
 
 bool Stations::affords_retry(TimePoint now, const Station& station) const {
-    if (!several_fail(station) || now >= others_active_until(station.id(), {})) return true;
+    if (failing_beside(station) < kSeveral || now >= others_active_until(station.id(), {}))
+        return true;
     return now >= station.affordable_at() && suspects_.allows(now, credit());
 }
 
@@ -164,7 +172,7 @@ void Stations::on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration 
     const Station& station = of(id);
     if (station.health().offline()) return;  // paid for in advance
     const Duration most = kMemory * suspects_.time_for(std::max(unlisted_.response_timeout, cost));
-    const bool outage = several_fail(station);
+    const bool outage = failing_beside(station) >= kSeveral;
     if (!is_read && station.answers_reads() && !outage) {
         ignored_writes_.spend(now, cost, most);
     } else if (outage || !station.loses_frames() || station.is_suspect(is_read)) {

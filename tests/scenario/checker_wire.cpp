@@ -53,6 +53,9 @@ void Checker::on_answered(TimePoint now, std::uint8_t station) {
     const bool is_its =
         said == said_.end() || modbus::answers(asked_[station], modbus::pdu_of(said->second));
     if (attempt_.answered || attempt_.station != station || !is_its) return;
+    // An exception may be that of an earlier request: the wait goes on (T2, T10).
+    if (attempt_.owed && said != said_.end() && modbus::exception_of(modbus::pdu_of(said->second)))
+        return;
     attempt_.answered = true;
     // The request has left sooner than anybody computes (T7).
     if (!settings_.paced) sent_until_ = std::min(sent_until_, now);

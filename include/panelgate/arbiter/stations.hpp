@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <optional>
 
@@ -86,7 +87,7 @@ class Stations {
     TimePoint others_active_until(std::uint8_t id, TimePoint since, Client self = 0) const;
     /// True if the budget of suspects holds requests to this station (P4).
     bool is_doubtful(const Station& station, bool is_read) const;
-    bool several_fail(const Station& but_for) const;
+    std::ptrdiff_t failing_beside(const Station& station) const;
     bool any_online() const;
     const ProbeBudget& probes(TimePoint now) const;
     /// What suspects may cost in advance: two whole timeouts.
