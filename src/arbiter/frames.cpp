@@ -144,7 +144,7 @@ Duration Arbiter::take_late(TimePoint now, const Unused& part) {
     const auto asked = stations_.outstanding().on_late(now, id, pdu, is_open);
     const Duration lateness =
         std::max(now - asked->sent - station.settings().response_timeout, Duration{});
-    stations_.outstanding().on_delivered(now, asked->sent, station.latest_reply());
+    stations_.outstanding().on_delivered(now, asked->sent);
     if (station.on_late(now, lateness)) {
         stations_.on_recovery();
         outbox_.event(StationEvent::Kind::online, id);

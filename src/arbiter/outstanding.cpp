@@ -214,11 +214,10 @@ void Outstanding::on_other_answered(TimePoint now, std::uint8_t station, ByteVie
     }
 }
 
-void Outstanding::on_delivered(TimePoint now, TimePoint sent, Duration window) {
+void Outstanding::on_delivered(TimePoint now, TimePoint sent) {
     for (Page& all : pages_) {
         for (Asked& asked : all.asked) {
-            if (asked.by == By::us && asked.sent < sent)
-                asked.until = std::min(asked.until, now + window);
+            if (asked.until == kInTransit && asked.sent < sent) asked.until = now + asked.window;
         }
     }
 }

@@ -53,10 +53,11 @@ void Arbiter::end_broadcast(TimePoint now) {
 Asked Arbiter::asked_of(const Attempt& attempt, bool in_transit) const {
     const Group& group = attempt.group();
     const TimePoint sent = attempt.timing().sent;
+    const Duration window = stations_.latest_reply(group.station);
     return {.by = attempt.is_broadcast() ? Asked::By::broadcast : Asked::By::us,
             .sent = sent,
-            .until = in_transit ? Outstanding::kInTransit
-                                : sent + latency_ + stations_.latest_reply(group.station),
+            .until = in_transit ? Outstanding::kInTransit : sent + latency_ + window,
+            .window = window,
             .pdu = group.request.pdu(),
             .byte_count = group.request.byte_count()};
 }
@@ -78,7 +79,7 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
     group.started = std::min(group.started, answered);
     const Station::Replied replied = station.on_reply(came, attempt, refused, needed);
     const bool is_own = close_request(now, attempt, reply);
-    outstanding.on_delivered(now, answered, station.latest_reply());
+    outstanding.on_delivered(now, answered);
     stations_.on_reply(now);
     if (replied.back) stations_.on_recovery();
     explain_condition(now, group.station, before);

@@ -104,11 +104,16 @@ constexpr BrokenOnce kBrokenOnce[] = {
     {Kind::dead, 10030},
     {Kind::mass, 60},
     {Kind::loss, 482},
+    // T1: failures of a lossy panel used up the budget of another.
+    {Kind::faults, 266},
+    {Kind::mass, 45},
+    {Kind::receiver, 147, SerialMode::ascii},
     // T2: late replies, and confirmations that equal their write, met a later request.
     {Kind::company, 508},
     {Kind::company, 1429},
     {Kind::receiver, 851},
     {Kind::adaptive, 182},
+    {Kind::wild, 509},
     // T3: a reply between other bytes, or behind the first ones of itself.
     {Kind::company, 35},
     {Kind::company, 84},
@@ -145,7 +150,9 @@ constexpr BrokenOnce kBrokenOnce[] = {
     // T11: a broadcast's client, and the write that its answer would confirm.
     {Kind::company, 21},
     {Kind::company, 2598},
-    // T12: copies, of confirmations and behind damage, too.
+    // T12: copies, of confirmations, behind damage, and of late replies, too.
+    {Kind::wild, 100},
+    {Kind::wild, 231},
     {Kind::adaptive, 20169},
     {Kind::company, 82},
     {Kind::company, 338},

@@ -24,6 +24,7 @@ struct Asked {
     By by = By::us;
     TimePoint sent{};    ///< last bit out; of another master's request: last byte in
     TimePoint until{};   ///< no reply comes later than this, as far as the late window tells
+    Duration window{};   ///< of a request in transit, from when it has arrived (T8): see kInTransit
     unsigned epoch = 0;  ///< number of the connection that carried the request (T8); set by add()
     Bytes pdu{};
     modbus::ByteCount byte_count = modbus::ByteCount::as_asked;  ///< of its reply (T14)
@@ -99,8 +100,8 @@ class Outstanding {
     void set_last_reply(TimePoint now, std::uint8_t station, ByteView reply);
     /// Another master's request has had its reply.
     void on_other_answered(TimePoint now, std::uint8_t station, ByteView reply);
-    /// A request that left at `sent` was answered: older ones have `window` from now.
-    void on_delivered(TimePoint now, TimePoint sent, Duration window);
+    /// A request that left at `sent` was answered: the windows of older ones in transit begin.
+    void on_delivered(TimePoint now, TimePoint sent);
     /// Requests of other masters are of no interest any more.
     void forget_other_masters();
     void forget(std::uint8_t station);

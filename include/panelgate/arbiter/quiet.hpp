@@ -48,7 +48,7 @@ class Quiet {
     void await_until(TimePoint until) { awaited_until_ = std::max(awaited_until_, until); }
     void has_come() { awaited_until_ = {}; }
     /// The trail of our own answer is expected until then, or until the trail has come (T12).
-    void trail_until(TimePoint until) { trail_until_ = until; }
+    void trail_until(TimePoint until) { trail_until_ = std::max(trail_until_, until); }
     void trail_has_come() { trail_until_ = {}; }
 
     /// Earliest time for a frame that needs `gap` of silence before it.

@@ -182,15 +182,23 @@ TEST_F(OutstandingTest, P1T8OverTwoConnectionsTheOrderIsUnknown) {
 TEST_F(OutstandingTest, P1T8WhatMayBeInTransitIsOutstandingUntilALaterRequestWasAnswered) {
     Asked stalled = asked(1s, kThree);
     stalled.until = Outstanding::kInTransit;
+    stalled.window = 2s;
     memory.add(kId, stalled);
     EXPECT_TRUE(memory.is_in_transit(kId));
     EXPECT_TRUE(memory.any(at(24h), kId));
     EXPECT_EQ(memory.all_clear_at(at(5s), 2s), at(7s));
-    memory.on_delivered(at(5s), at(1s), 2s);
+    memory.on_delivered(at(5s), at(1s));
     EXPECT_TRUE(memory.is_in_transit(kId)) << "the answered request had not left later";
-    memory.on_delivered(at(5s), at(4s), 2s);
+    memory.on_delivered(at(5s), at(4s));
     EXPECT_FALSE(memory.is_in_transit(kId));
     EXPECT_EQ(clear(kThree), at(7s));
+}
+
+/// The replies of a quick station once ended the late window of a slow station.
+TEST_F(OutstandingTest, P1T2AReplyOfAnotherStationEndsNoLateWindow) {
+    add(1s, kThree);
+    memory.on_delivered(at(5s), at(4s));
+    EXPECT_EQ(clear(kThree), at(11s));
 }
 
 // Other masters (T9), and limits
