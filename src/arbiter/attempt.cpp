@@ -115,18 +115,14 @@ void Attempt::on_silence(TimePoint now) {
 void Attempt::collect(std::optional<Bytes> reply) {
     const std::size_t behind = framer_.parts_behind();
     std::vector<Unused> parts = framer_.take_unused();
-    const std::size_t front = parts.size() - std::min(behind, parts.size());
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-        if (i == front && reply) break;
-        add(std::move(parts[i]), false, !reply || i < front);
+    const std::size_t front = reply ? parts.size() - std::min(behind, parts.size()) : parts.size();
+    if (reply) {
+        const Bytes adu = modbus::encode_adu(group_.station, *reply, orders_.of(group_.station));
+        parts.insert(parts.begin() + static_cast<std::ptrdiff_t>(front),
+                     modbus::classify_frame(adu, group_.station, true));
     }
-    if (!reply) return;
-    Unused whole;
-    whole.kind = Unused::Kind::own;
-    whole.station = group_.station;
-    whole.bytes = modbus::encode_adu(group_.station, *reply, orders_.of(group_.station));
-    add(std::move(whole), true, false);
-    for (std::size_t i = front; i < parts.size(); ++i) add(std::move(parts[i]), false, false);
+    for (std::size_t i = 0; i < parts.size(); ++i)
+        add(std::move(parts[i]), reply && i == front, i < front);
 }
 
 void Attempt::add(Unused part, bool answers, bool in_front) {
@@ -140,7 +136,7 @@ void Attempt::add(Unused part, bool answers, bool in_front) {
         disturbed_ = disturbed_ || foreign;
         fragment_ = fragment_ || (in_front && holds_beginning(part.bytes, echo_.frame()));
     }
-    heard_.push_back({std::move(part), answers, in_front});
+    heard_.push_back({std::move(part), answers});
 }
 
 std::optional<TimePoint> Attempt::busy_until() const {

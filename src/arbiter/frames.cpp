@@ -44,6 +44,17 @@ void Arbiter::conclude(TimePoint now) {
 }
 
 void Arbiter::judge_part(TimePoint now, const Unused& part, bool answers) {
+    const ByteView own = last_frame_;
+    const ByteView all = part.bytes;
+    if (part.kind == Unused::Kind::damaged && all.size() > own.size() &&
+        std::ranges::equal(all.first(own.size()), own) && !own.empty()) {
+        // Our echo may be as late as the reply behind it (T6, T8).
+        judge_part(now, modbus::classify_frame(own, quiet_.station(), true), false);
+        for (const Unused& behind :
+             modbus::classify_heard(all.subspan(own.size()), quiet_.station(), orders_))
+            judge_part(now, behind, false);
+        return;
+    }
     const Done done = judge(facts_of(now, part, answers));
     if (done == Done::accept) {
         const ByteView pdu = modbus::pdu_of(part.bytes);
@@ -150,7 +161,7 @@ Duration Arbiter::take_late(TimePoint now, const Unused& part) {
         outbox_.event(StationEvent::Kind::online, id);
     }
     outbox_.event(StationEvent::Kind::late, id, lateness);
-    quiet_.trail_until(station.trail().until());
+    if (station.trail().copies()) quiet_.trail_until(station.trail().until());
     if (!stations_.outstanding().any(now, id)) quiet_.lift(now, id);
     return lateness;
 }

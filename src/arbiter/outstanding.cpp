@@ -53,9 +53,8 @@ const Asked* Outstanding::answered_by(TimePoint now, std::uint8_t station, ByteV
 
 bool Outstanding::is_last_reply(TimePoint now, std::uint8_t station, ByteView reply,
                                 Duration within) const {
-    const Page* const all = find(station);
-    return all != nullptr && !all->reply.empty() && now - all->replied <= within &&
-           std::ranges::equal(all->reply, reply);
+    return has_last_form(now, station, reply, within) &&
+           std::ranges::equal(find(station)->reply, reply);
 }
 
 bool Outstanding::has_last_form(TimePoint now, std::uint8_t station, ByteView reply,
@@ -69,13 +68,6 @@ bool Outstanding::any(TimePoint now, std::uint8_t station) const {
     const Page* const all = find(station);
     return all != nullptr &&
            std::ranges::any_of(all->asked, [&](const Asked& asked) { return is_ours(asked, now); });
-}
-
-bool Outstanding::is_in_transit(std::uint8_t station) const {
-    const Page* const all = find(station);
-    return all != nullptr && std::ranges::any_of(all->asked, [](const Asked& asked) {
-               return asked.by == By::us && asked.until == kInTransit;
-           });
 }
 
 /// An exception names its function alone.

@@ -282,18 +282,17 @@ std::optional<Group> Schedule::read_before(const Line& line, const Job& job) {
 }
 
 std::optional<Group> Schedule::next_job(const Line& line) {
-    struct {
-        TimePoint since;
-        bool in_budget = true;
-    } wanted{others_go_first(line) ? backlog_.retries().front().retry_since : TimePoint::max()};
+    const TimePoint since =
+        others_go_first(line) ? backlog_.retries().front().retry_since : TimePoint::max();
+    bool in_budget = true;
     const JobQueue::Test test = [&](const Job& job) {
-        return job.arrived <= wanted.since && may_run(line, job) &&
-               (!wanted.in_budget || line.stations.may_spend(line.now, job));
+        return job.arrived <= since && may_run(line, job) &&
+               (!in_budget || line.stations.may_spend(line.now, job));
     };
     const JobQueue& queue = backlog_.queue();
     JobQueue::Choice next = queue.choose(test);
     // A suspect waits for its share only while others want the line.
-    wanted.in_budget = next.job() != nullptr;
+    in_budget = next.job() != nullptr;
     if (next.job() == nullptr) next = queue.choose(test);
     if (next.job() == nullptr || !gap_is_over(line, next.job()->station)) return std::nullopt;
     if (auto before = read_before(line, *next.job())) return before;
@@ -310,26 +309,23 @@ std::optional<Group> Schedule::next_job(const Line& line) {
 
 std::optional<TimePoint> Schedule::next_start(TimePoint now, const Stations& stations,
                                               const Quiet& quiet) const {
-    const struct {
-        TimePoint now;
-        TimePoint free;
-        TimePoint quarantined;
-    } line{now, quiet.free_at(stations.gap(quiet.station())), quiet.quarantined_until()};
+    const TimePoint free = quiet.free_at(stations.gap(quiet.station()));
+    const TimePoint quarantined = quiet.quarantined_until();
     std::optional<TimePoint> next;
     const auto earlier = [&](TimePoint t) {
         if (t == Outstanding::kInTransit) return;
-        t = std::max(line.free, t);
+        t = std::max(free, t);
         next = next ? std::min(*next, t) : t;
     };
     for (const Group& group : backlog_.retries()) earlier(repeat_from(now, group, stations));
     // Usually the first may start at once: then nothing can start sooner.
     const bool at_once = backlog_.queue().any_first([&](const Job& job) {
         if (backlog_.has_retry(job.station)) return false;
-        earlier(std::max(line.quarantined, ready_at(line.now, stations, job)));
-        return *next <= line.free;
+        earlier(std::max(quarantined, ready_at(now, stations, job)));
+        return *next <= free;
     });
     if (at_once) return next;
-    if (const auto probe = stations.next_probe(now)) earlier(std::max(line.quarantined, *probe));
+    if (const auto probe = stations.next_probe(now)) earlier(std::max(quarantined, *probe));
     return next;
 }
 

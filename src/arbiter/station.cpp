@@ -63,16 +63,19 @@ bool StationHealth::take_half_open(TimePoint now) {
     return true;
 }
 
-Station::Station(const StationSettings& settings, const OfflineSettings& offline, bool listed,
-                 Duration frame)
-    : settings_(settings),
-      listed_(listed),
-      health_(offline),
+Station::Station(std::uint8_t id, const StationSettings& settings, const OfflineSettings& offline,
+                 bool listed, Duration frame)
+    : health_(offline),
       late_window_(settings.late_window, settings.response_timeout),
-      trail_(frame) {}
+      trail_(frame) {
+    settings_.id = id;
+    apply(settings, offline, listed);
+}
 
 void Station::apply(const StationSettings& settings, const OfflineSettings& offline, bool listed) {
+    const std::uint8_t id = settings_.id;
     settings_ = settings;
+    settings_.id = id;
     listed_ = listed;
     health_.apply(offline);
     late_window_.apply(settings.late_window, settings.response_timeout);

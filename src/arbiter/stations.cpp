@@ -1,6 +1,7 @@
 #include "panelgate/arbiter/stations.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "panelgate/arbiter/timing.hpp"
 
@@ -20,7 +21,7 @@ void Stations::apply(const Settings& settings) {
     configured_.clear();
     for (const StationSettings& station : settings.stations) configured_[station.id] = station;
     for (auto& [id, station] : stations_)
-        station.apply(own_settings(id), offline_settings_, configured_.contains(id));
+        station.apply(this->settings(id), offline_settings_, configured_.contains(id));
     for (const auto& [id, station] : configured_) of(id);
 }
 
@@ -29,17 +30,11 @@ const StationSettings& Stations::settings(std::uint8_t id) const {
     return found == configured_.end() ? unlisted_ : found->second;
 }
 
-StationSettings Stations::own_settings(std::uint8_t id) const {
-    StationSettings own = settings(id);
-    own.id = id;
-    return own;
-}
-
 Station& Stations::of(std::uint8_t id) {
     const auto found = stations_.find(id);
     if (found != stations_.end()) return found->second;
     const bool listed = configured_.contains(id);
-    return stations_.try_emplace(id, own_settings(id), offline_settings_, listed, frame_)
+    return stations_.try_emplace(id, id, settings(id), offline_settings_, listed, frame_)
         .first->second;
 }
 
@@ -49,8 +44,7 @@ const Station* Stations::find(std::uint8_t id) const {
 }
 
 Station* Stations::find(std::uint8_t id) {
-    const auto found = stations_.find(id);
-    return found == stations_.end() ? nullptr : &found->second;
+    return const_cast<Station*>(std::as_const(*this).find(id));
 }
 
 Duration Stations::gap(std::uint8_t id) const {
@@ -115,7 +109,7 @@ TimePoint Stations::affordable_at(const Station& station, bool is_read) const {
     const ProbeBudget& budget = pays || failing >= kSeveral ? suspects_ : ignored_writes_;
     const TimePoint shared = budget.next() - credit();
     if (station.failed() == TimePoint{}) return std::max(own, shared);
-    // Each has its turn, whatever stations spend that are not doubtful.
+    // Each has its turn, whatever a lossy panel spends whose retries are answered.
     const Duration turn = kTurn * budget.time_for(station.settings().response_timeout);
     return std::max(own, std::min(shared, station.failed() + (failing + 1) * turn));
 }
@@ -128,6 +122,7 @@ bool Stations::is_doubtful(const Station& station, bool is_read) const {
 
 TimePoint Stations::held_until(TimePoint now, const Job& job) const {
     const Station* const station = find(job.station);
+    // A station that answers waits only behind requests of others.
     if (station == nullptr || !is_doubtful(*station, job.request.is_read())) return {};
     const TimePoint held = affordable_at(*station, job.request.is_read());
     if (held <= now) return held;
@@ -166,18 +161,14 @@ void Stations::on_probe(TimePoint now, std::uint8_t id) {
     alone_.spend(now + cost, cost);
 }
 
-/// A lossy panel whose retries are answered has its own share, and may not use up that of suspects.
 void Stations::on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration cost) {
     constexpr int kMemory = 3;  // whole timeouts, or failures of this cost
     const Station& station = of(id);
     if (station.health().offline()) return;  // paid for in advance
     const Duration most = kMemory * suspects_.time_for(std::max(unlisted_.response_timeout, cost));
     const bool outage = failing_beside(station) >= kSeveral;
-    if (!is_read && station.answers_reads() && !outage) {
-        ignored_writes_.spend(now, cost, most);
-    } else if (outage || !station.loses_frames() || station.is_suspect(is_read)) {
-        suspects_.spend(now, cost, most);
-    }
+    const bool ignored = !is_read && station.answers_reads() && !outage;
+    (ignored ? ignored_writes_ : suspects_).spend(now, cost, most);
 }
 
 void Stations::on_broadcast(const Asked& broadcast) {
@@ -199,8 +190,7 @@ const ProbeBudget& Stations::probes(TimePoint now) const {
 
 bool Stations::any_online() const {
     return std::ranges::any_of(stations_, [](const auto& entry) {
-        const StationHealth& health = entry.second.health();
-        return !health.offline() && health.last_heard();
+        return !entry.second.health().offline() && entry.second.health().last_heard();
     });
 }
 

@@ -57,9 +57,9 @@ Asked Arbiter::asked_of(const Attempt& attempt, bool in_transit) const {
     return {.by = attempt.is_broadcast() ? Asked::By::broadcast : Asked::By::us,
             .sent = sent,
             .until = in_transit ? Outstanding::kInTransit : sent + latency_ + window,
-            .window = window,
             .pdu = group.request.pdu(),
-            .byte_count = group.request.byte_count()};
+            .byte_count = group.request.byte_count(),
+            .window = window};
 }
 
 /// The reply has come: it is handed on.
@@ -139,7 +139,8 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     if (Station* const earlier = stations_.find(replied_before_);
         earlier != nullptr && attempt.heard() && verdict != Verdict::wrong)
         earlier->on_disturbed(attempt.timing().started);
-    finish_barred(group);
+    for (const Job& job : take_if(group.jobs, [](const Job& one) { return one.barred; }))
+        outbox_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
     const std::uint8_t id = group.station;
     if (in_time(now, group) && affordable && station.may_retry(group)) {
         schedule_.retry(now, std::move(group));
@@ -172,12 +173,6 @@ void Arbiter::explain_condition(TimePoint now, std::uint8_t station, Condition b
     if (is != before && before != Condition::unheard)
         outbox_.decide(
             {.at = now, .kind = Decision::Kind::condition, .station = station, .condition = is});
-}
-
-/// Ends those who may not ask again.
-void Arbiter::finish_barred(Group& group) {
-    for (const Job& job : take_if(group.jobs, [](const Job& one) { return one.barred; }))
-        outbox_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
 }
 
 /// The parts of a joined read are sent again, except for clients that have left.

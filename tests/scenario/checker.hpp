@@ -190,6 +190,7 @@ class Checker : public Witness {
     std::uint64_t first_copies_ = 0;
     std::uint64_t excused_ = 0;
     TimePoint garbled_{};
+    TimePoint retry_from_{};   ///< until then only those who waited before the silence go first
     std::uint64_t lucky_ = 0;  ///< see is_luck()
     Attempt attempt_;
     std::map<std::uint8_t, bool> silent_before_;               ///< each station's transaction began

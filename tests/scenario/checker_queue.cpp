@@ -113,8 +113,9 @@ void Checker::on_settled() {
 }
 
 /// P9: a waiting reader gets every fifth turn at least, unless its station rests, for what it owes
-/// (P1) or as its settings say, or has not answered when it was asked last: then it has a share of
-/// its own (P4). A write that is repeated takes no other turn.
+/// (P1) or as its settings say, or has not answered when it was asked last, or lately too often:
+/// then it has a share of its own (P4). Behind a silence those go first who waited before. A write
+/// that is repeated takes no other turn.
 void Checker::check_turn(TimePoint now, bool write) {
     constexpr std::uint64_t kWritesInARow = 4;
     constexpr std::size_t kRemembered = 8;
@@ -133,7 +134,8 @@ void Checker::check_turn(TimePoint now, bool write) {
         return !o.sent && !o.gone && o.job.priority == PriorityClass::read &&
                o.turn + kWritesInARow < turns_ && client != clients_.end() &&
                client->second.single && watch_.is_good(o.job.station, o.submitted) &&
-               !watch_.is_failing(o.job.station) && rests_for(o) <= first;
+               !watch_.is_failing(o.job.station) && rests_for(o) <= first &&
+               watch_.paid(o.job.station) <= first && retry_from_ <= first;
     });
     if (starves != open_.end())
         fail("P9: five writes in a row while a reader waits: " + std::to_string(starves->first));

@@ -62,7 +62,9 @@ void Checker::on_answered(TimePoint now, std::uint8_t station) {
     silent_before_[station] = false;
     silent_to_reads_before_.erase(station);
     replied_[station] = now;
-    const bool is_first = watch_.on_answered(now, station);
+    // Damage, and a confirmation that equals its request, may tell the gateway nothing.
+    const bool told = garbled_ < attempt_.started && !attempt_.like_echo;
+    const bool is_first = told && watch_.on_answered(now, station);
     // What the way held back may have reached the station only now, and of two attempts nobody
     // knows which one the reply was for.
     if ((is_first && settings_.may_stall) || attempt_.owed) watch_.on_owed(station, owed_until());
@@ -78,7 +80,9 @@ void Checker::on_copy(TimePoint now, ByteView adu) {
     const bool awaited = !attempt_.answered && attempt_.station == station;
     const auto said = said_.find(station);
     if (said == said_.end() || !std::ranges::equal(said->second, adu)) return;
-    if (!awaited && !retried_.contains(station)) known_doublers_.insert(station);
+    const bool owed = retried_.contains(station) || now < watch_.rests_until(station) ||
+                      garbled_ >= attempt_.started;
+    if (!awaited && !owed) known_doublers_.insert(station);
     if (known_doublers_.contains(station)) return;
     ++first_copies_;
     if (plan_.limit == Limit::copies_first) return;
@@ -184,6 +188,7 @@ void Checker::close_attempt(TimePoint now) {
     watch_.on_unanswered(attempt_.station, !attempt_.heard, attempt_.read);
     watch_.on_cost(now, attempt_.station, cost);
     watch_.on_owed(attempt_.station, owed_until());
+    retry_from_ = now + settings_of(attempt_.station).response_timeout / 2;
 }
 
 const arbiter::StationSettings& Checker::settings_of(std::uint8_t station) const {

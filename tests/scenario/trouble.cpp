@@ -41,7 +41,10 @@ void Trouble::begin_to_float() {
 }
 
 void Trouble::hum(TimePoint until) {
-    wire_.whisper({static_cast<std::uint8_t>(random_.chance(0.5) ? 0 : random_.next())});
+    auto byte = static_cast<std::uint8_t>(random_.chance(0.5) ? 0 : random_.next());
+    // A line feed ends an ASCII frame, for any master (SL 2.5.2).
+    if (plan_.settings.serial.mode == SerialMode::ascii && byte == '\n') byte = 0;
+    wire_.whisper({byte});
     if (agenda_.now() < until && !is_over_())
         agenda_.at(agenda_.now() + 1500us, [this, until] { hum(until); });
 }

@@ -32,6 +32,7 @@ Wire::FramePtr Wire::put(Said said) {
         witness_.on_collision(now, other->station);
         witness_.on_collision(now, frame->station);
     }
+    if (now < whispered_until_) witness_.on_collision(now, frame->station);
     air_.push_back(frame);
     return frame;
 }
@@ -54,6 +55,7 @@ void Wire::whisper(Bytes bytes) {
     frame->bytes = std::move(bytes);
     frame->start = agenda_.now();
     frame->connection = connection_;
+    whispered_until_ = frame->end_of(frame->bytes.size() - 1, *this);
     deliver_in_chunks(frame);
 }
 

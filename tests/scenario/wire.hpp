@@ -107,6 +107,7 @@ class Wire {
     Begin begin_;
     std::list<FramePtr> air_;
     TimePoint spoken_until_{};
+    TimePoint whispered_until_{};
     TimePoint stalled_until_{};
     TimePoint says_held_until_{};  ///< what a stall has held back, and what came since
     TimePoint asked_since_{};

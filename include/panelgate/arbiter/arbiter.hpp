@@ -158,7 +158,6 @@ class Arbiter {
     void reopen_if_mute(TimePoint now, const Attempt& attempt, Verdict verdict);
     void give_back(Group& group);
     void give_up(TimePoint now, const Group& group, Fault fault);
-    void finish_barred(Group& group);
     void explain_condition(TimePoint now, std::uint8_t station, Condition before);
     Attempt take_active(TimePoint now);
 

@@ -98,7 +98,6 @@ class Attempt {
     struct Heard {
         modbus::Unused part;
         bool answers = false;  ///< the frame answers the open request
-        bool in_front = true;  ///< of a frame that answers, or none did
     };
 
     // Input; what has come is then in take_heard().

@@ -24,10 +24,10 @@ struct Asked {
     By by = By::us;
     TimePoint sent{};    ///< last bit out; of another master's request: last byte in
     TimePoint until{};   ///< no reply comes later than this, as far as the late window tells
-    Duration window{};   ///< of a request in transit, from when it has arrived (T8): see kInTransit
     unsigned epoch = 0;  ///< number of the connection that carried the request (T8); set by add()
     Bytes pdu{};
     modbus::ByteCount byte_count = modbus::ByteCount::as_asked;  ///< of its reply (T14)
+    Duration window{};  ///< of a request in transit, from when it has arrived (T8): see kInTransit
 
     /// True if this reply PDU may be the reply.
     bool may_be_answered(ByteView reply) const;
@@ -58,8 +58,6 @@ class Outstanding {
 
     /// True if a request of this gateway to the station is outstanding.
     bool any(TimePoint now, std::uint8_t station) const;
-    /// True if one is outstanding whose time has not begun to run: see kInTransit.
-    bool is_in_transit(std::uint8_t station) const;
     /// Time from which no outstanding reply or exception could be taken for the reply to `request`.
     /// `again`: a retry, for which the reply to its own earlier attempt counts as well.
     TimePoint clear_at(TimePoint now, std::uint8_t station, const modbus::Request& request,

@@ -19,8 +19,8 @@ namespace panelgate::arbiter {
 class Station {
   public:
     /// `frame`: duration of a usual reply on this line.
-    Station(const StationSettings& settings, const OfflineSettings& offline, bool listed,
-            Duration frame);
+    Station(std::uint8_t id, const StationSettings& settings, const OfflineSettings& offline,
+            bool listed, Duration frame);
 
     /// Applies new settings; what is known of the station is kept.
     void apply(const StationSettings& settings, const OfflineSettings& offline, bool listed);
@@ -128,7 +128,7 @@ class Station {
 
   private:
     StationSettings settings_;
-    bool listed_;
+    bool listed_ = false;
     StationHealth health_;
     KnownReads reads_;
     ThinkTimes think_times_;

@@ -28,7 +28,6 @@ class StationHealth {
     /// The health shown everywhere. Unknown until the station is asked over the open line.
     Health state() const { return known_ ? state_ : Health::unknown; }
     bool offline() const { return state_ == Health::offline; }
-    bool online() const { return state_ == Health::online; }
     bool suspect() const { return state_ == Health::suspect; }
     /// Time of its last answer in time. A late reply is a sign of life but no success.
     std::optional<TimePoint> last_success() const { return last_success_; }

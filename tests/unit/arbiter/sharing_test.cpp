@@ -23,10 +23,9 @@ class SharingTest : public test::QueueFixture {
     /// A station whose profile guarantees this many registers; 0: none does.
     static Station station_that_takes(std::uint16_t count) {
         StationSettings settings;
-        settings.id = 1;
         settings.vouched = count > 0;
         if (count > 0) settings.max_registers = count;
-        return {settings, OfflineSettings{}, true, 40ms};
+        return {1, settings, OfflineSettings{}, true, 40ms};
     }
     Group gather(const Bytes& leader) { return gather(leader, station_); }
     Group gather(const Bytes& leader, const Station& station) {

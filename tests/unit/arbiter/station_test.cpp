@@ -21,11 +21,6 @@ const Bytes kReply = "03 02 02 2B"_hex;
 
 class StationTest : public testing::Test {
   protected:
-    static Station made() {
-        StationSettings settings;
-        settings.id = kId;
-        return {settings, OfflineSettings{}, true, 40ms};
-    }
     /// A request left 30 ms ago and is answered now; the first sign of the reply took 25 ms.
     Station::Replied answer(const Bytes& pdu = kRead, const Bytes& reply = kReply) {
         now += 1s;
@@ -50,7 +45,7 @@ class StationTest : public testing::Test {
         return group;
     }
 
-    Station station = made();
+    Station station{kId, StationSettings{}, OfflineSettings{}, true, 40ms};
     TimePoint now{1h};
 };
 

@@ -36,7 +36,7 @@ namespace panelgate::arbiter {
 /// not call the queue.
 class JobQueue {
   public:
-    using Test = InlineFunction<bool(const Job&), 48>;
+    using Test = InlineFunction<bool(const Job&), 64>;
     static constexpr std::size_t kMost = 4096;
     static constexpr int kReadTurn = 5;   ///< a read gets at least every fifth turn
     static constexpr int kPollTurn = 10;  ///< a poll gets at least every tenth
