@@ -80,9 +80,8 @@ void Checker::on_copy(TimePoint now, ByteView adu) {
     const bool awaited = !attempt_.answered && attempt_.station == station;
     const auto said = said_.find(station);
     if (said == said_.end() || !std::ranges::equal(said->second, adu)) return;
-    const bool owed = retried_.contains(station) || now < watch_.rests_until(station) ||
-                      garbled_ >= attempt_.started;
-    if (!awaited && !owed) known_doublers_.insert(station);
+    const bool retried = retried_.contains(station);
+    if (!awaited && !retried) known_doublers_.insert(station);
     if (known_doublers_.contains(station)) return;
     ++first_copies_;
     if (plan_.limit == Limit::copies_first) return;
