@@ -180,8 +180,9 @@ class Checker : public Witness {
     std::unordered_set<std::uint8_t> known_doublers_;  ///< were heard to say a reply twice
     std::map<std::uint8_t, TimePoint> replied_;        ///< each station, the last time
     std::map<std::uint8_t, Bytes> said_;               ///< its last answer that was heard whole
-    std::unordered_set<std::uint8_t> retried_;         ///< whose last request was a retry
-    std::map<std::uint8_t, Bytes> asked_;              ///< what each station was asked last
+    std::map<std::uint8_t, TimePoint> said_at_;
+    std::unordered_set<std::uint8_t> retried_;  ///< whose last request was a retry
+    std::map<std::uint8_t, Bytes> asked_;       ///< what each station was asked last
     std::map<Bytes, TimePoint> spread_;  ///< when broadcasts had left, by what would answer them
     std::map<std::uint8_t, TimePoint> excused_from_;  ///< see on_copy()
     /// Until when the reply may come that a refusal for being busy has announced, by the station

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "checker.hpp"
+#include "panelgate/arbiter/timing.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
@@ -82,14 +83,20 @@ void Checker::on_copy(TimePoint now, ByteView adu) {
     if (said == said_.end() || !std::ranges::equal(said->second, adu)) return;
     const bool retried = retried_.contains(station);
     if (!awaited && !retried) known_doublers_.insert(station);
-    if (known_doublers_.contains(station)) return;
+    // A transport that stalls may hold a copy back for longer than copies are learned (T8).
+    const bool held_back = now > said_at_[station] + arbiter::timing::kLongestTrail +
+                                     frame_time(settings_.serial, kLongestAdu);
+    if (known_doublers_.contains(station) && !held_back) return;
     ++first_copies_;
     if (plan_.limit == Limit::copies_first) return;
     ++excused_;
     excused_from_[station] = now;
 }
 
-void Checker::on_reply(TimePoint, ByteView adu) { said_[adu[0]].assign(adu.begin(), adu.end()); }
+void Checker::on_reply(TimePoint now, ByteView adu) {
+    said_[adu[0]].assign(adu.begin(), adu.end());
+    said_at_[adu[0]] = now;
+}
 
 /// Bytes without a pause for longer than any frame: nobody's answer, and no reason to wait
 /// (LAT-02).

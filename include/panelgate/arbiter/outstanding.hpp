@@ -73,8 +73,8 @@ class Outstanding {
                   bool again = false) const;
     /// The last outstanding read of the station, or null.
     const Asked* last_read(TimePoint now, std::uint8_t station) const;
-    /// Time from which no reply of any station is outstanding. Requests in transit count as sent
-    /// `window` before their time is over, now.
+    /// Time from which no reply of any station is outstanding; of requests in transit as if their
+    /// `window` began now.
     TimePoint all_clear_at(TimePoint now, Duration window) const;
     /// When the first request left that a reply to `pdu`, sent at `sent`, may answer.
     TimePoint sampled(TimePoint now, std::uint8_t station, ByteView pdu, TimePoint sent) const;
@@ -91,8 +91,8 @@ class Outstanding {
     bool on_reply(TimePoint now, std::uint8_t station, Asked asked, ByteView reply);
     /// A reply came that is not the open request's. Closes the oldest request that the reply may
     /// answer and, of the same connection, those before; none where requests of two connections
-    /// fit, for their order is unknown. `is_open`: the open request fits as well. Returns the
-    /// oldest; empty: the reply answers none.
+    /// fit, for their order is unknown. `is_open`: the open request fits as well, so that a
+    /// request of another connection stays. Returns the oldest; empty: the reply answers none.
     std::optional<Asked> on_late(TimePoint now, std::uint8_t station, ByteView reply, bool is_open);
     /// This is the last reply of the station, whatever it answers.
     void set_last_reply(TimePoint now, std::uint8_t station, ByteView reply);

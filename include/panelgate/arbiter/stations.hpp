@@ -53,7 +53,7 @@ class Stations {
     void on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration cost);
     /// A station answered.
     void on_reply(TimePoint now) { lively_ = now; }
-    /// A station is back: others may be back for the same reason, and are asked at once.
+    /// A station is back: others may be back for the same reason, so their budget is new.
     void on_recovery() { offline_.clear(); }
     /// The line was opened: all stations may be there.
     void on_opened(TimePoint now) {
