@@ -434,17 +434,12 @@ std::optional<TimePoint> Arbiter::next_deadline() const {
 
 // Invariants. Tests check them after every call.
 
-namespace {
-
-void must(bool holds, const char* what) {
-    if (holds) return;
-    std::fprintf(stderr, "invariant broken: %s\n", what);
-    std::abort();
-}
-
-}  // namespace
-
 void Arbiter::check_invariants() const {
+    const auto must = [](bool holds, const char* what) {
+        if (holds) return;
+        std::fprintf(stderr, "invariant broken: %s\n", what);
+        std::abort();
+    };
     const Backlog& backlog = schedule_.backlog();
     must(up_ || (!active_ && !resetting_), "a line that is down carries nothing");
     must(up_ || suspended_ || backlog.empty(), "a line that is down has nothing waiting");

@@ -229,13 +229,12 @@ std::optional<Group> Schedule::next_retry(const Line& line) {
 }
 
 /// Behind a silence those who wait go first, for the retry may cost them as much again (P4). Not
-/// where frames of this station get lost: its last retry was answered, and its client waits, too.
+/// where frames get lost on this line: a last retry was answered, and this client waits, too.
 bool Schedule::others_go_first(const Line& line) const {
     if (backlog_.retries().empty()) return false;
     const Group& retry = backlog_.retries().front();
-    const Duration most = line.stations.response_timeout(retry.station) / 2;
-    const bool is_lost = line.stations.of(retry.station).loses_frames();
-    if (!retry.silent || is_lost || line.now >= retry.retry_since + most) return false;
+    const TimePoint latest = retry.retry_since + line.stations.response_timeout(retry.station) / 2;
+    if (!retry.silent || line.now >= latest || line.stations.lose_frames()) return false;
     return backlog_.queue().any_first([&](const Job& job) {
         return job.arrived <= retry.retry_since && may_run(line, job) &&
                line.stations.may_spend(line.now, job);

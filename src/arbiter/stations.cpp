@@ -1,6 +1,7 @@
 #include "panelgate/arbiter/stations.hpp"
 
 #include <algorithm>
+#include <ranges>
 #include <utility>
 
 #include "panelgate/arbiter/timing.hpp"
@@ -53,10 +54,9 @@ Duration Stations::gap(std::uint8_t id) const {
 
 std::optional<Duration> Stations::slowest() const {
     std::optional<Duration> slowest;
-    for (const auto& [id, station] : stations_) {
+    for (const auto& [id, station] : stations_)
         if (station.health().last_heard())
             slowest = std::max(slowest.value_or(Duration{}), station.think_times().quantile(1));
-    }
     return slowest;
 }
 
@@ -143,10 +143,13 @@ TimePoint Stations::others_active_until(std::uint8_t id, TimePoint since, Client
 }
 
 std::ptrdiff_t Stations::failing_beside(const Station& station) const {
-    return std::ranges::count_if(stations_, [&](const auto& entry) {
-        const Station& other = entry.second;
+    return std::ranges::count_if(stations_ | std::views::values, [&](const Station& other) {
         return &other != &station && !other.answers_now(false) && other.health().suspect();
     });
+}
+
+bool Stations::lose_frames() const {
+    return std::ranges::any_of(stations_ | std::views::values, &Station::loses_frames);
 }
 
 bool Stations::affords_retry(TimePoint now, const Station& station) const {
@@ -189,8 +192,8 @@ const ProbeBudget& Stations::probes(TimePoint now) const {
 }
 
 bool Stations::any_online() const {
-    return std::ranges::any_of(stations_, [](const auto& entry) {
-        return !entry.second.health().offline() && entry.second.health().last_heard();
+    return std::ranges::any_of(stations_ | std::views::values, [](const Station& station) {
+        return !station.health().offline() && station.health().last_heard();
     });
 }
 

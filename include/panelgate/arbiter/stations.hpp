@@ -47,6 +47,8 @@ class Stations {
     /// True if a retry is within what silence may cost the others: where several other stations
     /// fail as well, the share of the station and that of all suspects.
     bool affords_retry(TimePoint now, const Station& station) const;
+    /// True if frames get lost on this line: the last retry of a station was answered (T1).
+    bool lose_frames() const;
     /// An offline station is asked, or a request to it accepted: paid for in advance.
     void on_probe(TimePoint now, std::uint8_t id);
     /// An attempt that occupied the line for `cost` failed.
