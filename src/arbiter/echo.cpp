@@ -26,6 +26,10 @@ bool holds_beginning(ByteView heard, ByteView frame) {
 ByteView EchoFilter::feed(ByteView bytes) {
     if (expect_ == Expect::nothing) return bytes;
     std::size_t taken = 0;
+    // A receiver that is switched on late loses the first byte (T6).
+    if (matched_ == 0 && !bytes.empty() && frame_.size() > 1 && bytes[0] != frame_[0] &&
+        bytes[0] == frame_[1])
+        matched_ = 1, lost_ = 1;
     while (taken < bytes.size() && matched_ < frame_.size() && bytes[taken] == frame_[matched_]) {
         ++matched_;
         ++taken;
@@ -37,7 +41,8 @@ ByteView EchoFilter::feed(ByteView bytes) {
         return {};
     } else {
         mismatch_ = certain;
-        released_.assign(frame_.begin(), frame_.begin() + static_cast<std::ptrdiff_t>(matched_));
+        released_.assign(frame_.begin() + lost_,
+                         frame_.begin() + static_cast<std::ptrdiff_t>(matched_));
         released_.insert(released_.end(), bytes.begin() + static_cast<std::ptrdiff_t>(taken),
                          bytes.end());
     }
@@ -56,7 +61,7 @@ std::size_t EchoFilter::missing() const {
 Bytes EchoFilter::release() {
     if (!pending()) return {};
     expect_ = Expect::nothing;
-    return {frame_.begin(),
+    return {frame_.begin() + lost_,
             frame_.begin() + static_cast<std::ptrdiff_t>(std::exchange(matched_, 0))};
 }
 

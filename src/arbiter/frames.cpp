@@ -45,14 +45,13 @@ void Arbiter::conclude(TimePoint now) {
 
 void Arbiter::judge_part(TimePoint now, const Unused& part, bool answers) {
     const ByteView own = last_frame_;
-    const ByteView all = part.bytes;
-    if (part.kind == Unused::Kind::damaged && all.size() > own.size() &&
-        std::ranges::equal(all.first(own.size()), own) && !own.empty()) {
+    if (part.kind == Unused::Kind::damaged && part.bytes.size() > own.size() && !own.empty() &&
+        std::ranges::equal(ByteView(part.bytes).first(own.size()), own)) {
         // Our echo may be as late as the reply behind it (T6, T8).
         judge_part(now, modbus::classify_frame(own, quiet_.station(), true), false);
-        for (const Unused& behind :
-             modbus::classify_heard(all.subspan(own.size()), quiet_.station(), orders_))
-            judge_part(now, behind, false);
+        const ByteView behind = ByteView(part.bytes).subspan(own.size());
+        for (const Unused& other : modbus::classify_heard(behind, quiet_.station(), orders_))
+            judge_part(now, other, false);
         return;
     }
     const Done done = judge(facts_of(now, part, answers));

@@ -78,25 +78,14 @@ bool Outstanding::may_be_taken(const Asked& asked, const modbus::Request& reques
 }
 
 TimePoint Outstanding::clear_at(TimePoint now, std::uint8_t station, const modbus::Request& request,
-                                bool again) const {
-    TimePoint clear{};
-    const Page* const all = find(station);
-    if (all == nullptr) return clear;
-    for (const Asked& asked : all->asked) {
-        if (is_live(asked, now) && may_be_taken(asked, request, again))
-            clear = std::max(clear, asked.until);
-    }
-    return clear;
-}
-
-TimePoint Outstanding::earlier_clear_at(TimePoint now, std::uint8_t station,
-                                        const modbus::Request& request) const {
+                                bool again, bool earlier_alone) const {
     TimePoint clear{};
     const Page* const all = find(station);
     if (all == nullptr) return clear;
     for (const Asked& asked : all->asked) {
         const bool earlier = asked.epoch != epoch_ && asked.until != kInTransit;
-        if (earlier && is_live(asked, now) && may_be_taken(asked, request, false))
+        if ((earlier || !earlier_alone) && is_live(asked, now) &&
+            may_be_taken(asked, request, again))
             clear = std::max(clear, asked.until);
     }
     return clear;
@@ -168,6 +157,17 @@ void Outstanding::set_last_reply(TimePoint now, std::uint8_t station, ByteView r
     all.replied = now;
 }
 
+namespace {
+
+/// True for an exception that the real reply may follow (T10; AP 7: acknowledge and busy).
+bool announces_reply(ByteView reply) {
+    const auto code = modbus::exception_of(reply);
+    return code == static_cast<std::uint8_t>(modbus::ExceptionCode::acknowledge) ||
+           code == static_cast<std::uint8_t>(modbus::ExceptionCode::server_device_busy);
+}
+
+}  // namespace
+
 bool Outstanding::on_reply(TimePoint now, std::uint8_t station, Asked asked, ByteView reply) {
     set_last_reply(now, station, reply);
     Page& all = page(station);
@@ -176,10 +176,12 @@ bool Outstanding::on_reply(TimePoint now, std::uint8_t station, Asked asked, Byt
         all.asked, [&](const Asked& old) { return is_ours(old, now) && is_same(old, asked.pdu); });
     if (equal == all.asked.end()) {
         close(all, asked.epoch, asked.sent);
+        if (announces_reply(reply)) add(station, std::move(asked));
         return true;
     }
     // Over two connections the order is unknown.
-    if (equal->epoch == asked.epoch) close(all, asked.epoch, equal->sent);
+    if (equal->epoch == asked.epoch && !announces_reply(reply))
+        close(all, asked.epoch, equal->sent);
     add(station, std::move(asked));
     return false;
 }
@@ -194,8 +196,12 @@ std::optional<Asked> Outstanding::on_late(TimePoint now, std::uint8_t station, B
     const bool is_sure = std::ranges::none_of(all.asked, [&](const Asked& asked) {
         return is_ours(asked, now) && asked.epoch != answered.epoch && asked.may_be_answered(reply);
     });
-    if (is_sure && (!is_open || answered.epoch == epoch_))
-        close(all, answered.epoch, answered.sent);
+    if (!is_sure || (is_open && answered.epoch != epoch_)) return answered;
+    close(all, answered.epoch, answered.sent);
+    if (!announces_reply(reply)) return answered;
+    Asked announced = answered;
+    announced.until = std::max(answered.until, now + answered.window);
+    all.asked.push_back(std::move(announced));
     return answered;
 }
 

@@ -155,11 +155,11 @@ TimePoint Schedule::clear_at(TimePoint now, const Stations& stations, const Stat
     const Outstanding& outstanding = stations.outstanding();
     const std::uint8_t id = station.id();
     TimePoint clear = outstanding.clear_at(now, id, request);
-    TimePoint earlier = outstanding.earlier_clear_at(now, id, request);
+    TimePoint earlier = outstanding.clear_at(now, id, request, false, true);
     if (may_learn) {
         const modbus::Request probe = station.reads().probe();
         clear = std::max(clear, outstanding.clear_at(now, id, probe));
-        earlier = std::max(earlier, outstanding.earlier_clear_at(now, id, probe));
+        earlier = std::max(earlier, outstanding.clear_at(now, id, probe, false, true));
     }
     constexpr int kAnswers = 2;  // silent transactions in a row: more, and a proof is no quicker
     if (clear <= now || station.health().offline() ||
@@ -197,16 +197,15 @@ std::optional<Group> Schedule::next(TimePoint now, Stations& stations, Quiet& qu
     if (now < quiet.free_at(stations.gap(quiet.station()))) return {};
     const bool alone = !backlog_.retries().empty() &&
                        (quarantine_ == Quarantine::line || now < quiet.quarantined_until());
-    if (alone || !others_go_first(line)) {
-        if (auto group = next_retry(line)) return group;
-        if (alone) return {};
-    }
+    if (!alone && others_go_first(line)) return next_job(line, true);
+    if (auto group = next_retry(line)) return group;
+    if (alone) return {};
     const auto due = stations.next_probe(now);
     // A busy line must not keep a station offline: the budget limits probes.
     if (due && now >= *due + timing::kProbeWaits) {
         if (auto group = next_probe(line)) return group;
     }
-    if (auto group = next_job(line)) return group;
+    if (auto group = next_job(line, false)) return group;
     if (auto group = next_retry(line)) return group;
     if (due && now >= *due) return next_probe(line);
     return {};
@@ -228,17 +227,19 @@ std::optional<Group> Schedule::next_retry(const Line& line) {
     });
 }
 
-/// Behind a silence those who wait go first, for the retry may cost them as much again (P4). Not
-/// where frames get lost on this line: a last retry was answered, and this client waits, too.
+/// Behind a silence those who wait go first, for what comes next may cost them as much again (P4).
+/// Not where frames get lost on this line: who is asked again waits, too.
 bool Schedule::others_go_first(const Line& line) const {
-    if (backlog_.retries().empty()) return false;
-    const Group& retry = backlog_.retries().front();
-    const TimePoint latest = retry.retry_since + line.stations.response_timeout(retry.station) / 2;
-    if (!retry.silent || line.now >= latest || line.stations.lose_frames()) return false;
-    return backlog_.queue().any_first([&](const Job& job) {
-        return job.arrived <= retry.retry_since && may_run(line, job) &&
-               line.stations.may_spend(line.now, job);
-    });
+    const Duration most = line.stations.response_timeout(line.quiet.station()) / 2;
+    if (line.now >= silent_ + most || line.stations.loses_frames(line.now)) return false;
+    return backlog_.queue().any_first([&](const Job& job) { return goes_first(line, job); });
+}
+
+bool Schedule::goes_first(const Line& line, const Job& job) const {
+    const Station* const station = line.stations.find(job.station);
+    return job.arrived <= silent_ && station != nullptr && station->health().last_heard() &&
+           station->answers_now(job.request.is_read()) && may_run(line, job) &&
+           line.stations.may_spend(line.now, job);
 }
 
 std::optional<Group> Schedule::next_probe(const Line& line) const {
@@ -280,13 +281,12 @@ std::optional<Group> Schedule::read_before(const Line& line, const Job& job) {
     return group;
 }
 
-std::optional<Group> Schedule::next_job(const Line& line) {
-    const TimePoint since =
-        others_go_first(line) ? backlog_.retries().front().retry_since : TimePoint::max();
+/// `behind_silence`: of those who go first.
+std::optional<Group> Schedule::next_job(const Line& line, bool behind_silence) {
     bool in_budget = true;
     const JobQueue::Test test = [&](const Job& job) {
-        return job.arrived <= since && may_run(line, job) &&
-               (!in_budget || line.stations.may_spend(line.now, job));
+        if (behind_silence) return goes_first(line, job);
+        return may_run(line, job) && (!in_budget || line.stations.may_spend(line.now, job));
     };
     const JobQueue& queue = backlog_.queue();
     JobQueue::Choice next = queue.choose(test);
@@ -340,11 +340,6 @@ std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& 
         failed.was_online && worst > Duration::zero() && worst <= own.response_timeout;
     if (quarantine_ != Quarantine::automatic || !is_late) return std::nullopt;
     return std::min(rested, sent + own.response_timeout + worst * 5 / 4);
-}
-
-void Schedule::retry(TimePoint now, Group group) {
-    group.retry_since = now;
-    backlog_.retry(std::move(group));
 }
 
 Jobs Schedule::give_back(Group& group) {

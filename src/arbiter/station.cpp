@@ -111,9 +111,9 @@ Station::Replied Station::on_reply(TimePoint came, const Attempt& attempt, bool 
     result.trailed = trail_.seen();
     lately_ = result.back ? 0 : static_cast<std::uint8_t>(lately_ << 1);
     wants_check_ = false;
-    failed_reads_ = failed_writes_ = 0;
+    failed_reads_ = 0;
+    if (!group.request.is_read()) failed_writes_ = 0;  // reads say nothing about writes (T14)
     if (result.back) silences_ = ProbeBudget{ProbeBudget::kSuspect};  // it is used at once
-    if (group.silent) loses_frames_ = true;
     // A reply to a retry may be that to the attempt before.
     if (group.attempts <= 1) think_times_.add(needed);
     result.drift = think_times_.take_report(settings_.response_timeout);
@@ -139,7 +139,6 @@ bool Station::on_late(TimePoint now, Duration lateness) {
 void Station::on_failed(TimePoint now, const Attempt& attempt, Verdict verdict, Duration cost,
                         bool learns_holes) {
     failed_ = now;
-    if (attempt.group().silent) loses_frames_ = verdict != Verdict::silent;
     if (attempt.group().probe && !health_.offline()) reads_.on_unanswered(attempt.group().request);
     const bool is_read = attempt.group().request.is_read();
     // An ignored write says nothing about reads (T14).

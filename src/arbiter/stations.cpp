@@ -96,15 +96,15 @@ bool Stations::refuses(TimePoint now, const Job& job) {
 
 bool Stations::may_spend(TimePoint now, const Job& job) const {
     const Station* const station = find(job.station);
-    return station == nullptr || now >= affordable_at(*station, job.request.is_read());
+    return station == nullptr || now >= affordable_at(now, *station, job.request.is_read());
 }
 
 /// While others want the line a station waits for its own share, and a doubtful station for that of
 /// suspects. Writes that are ignored beside answered reads have a budget of their own (T14).
-TimePoint Stations::affordable_at(const Station& station, bool is_read) const {
+TimePoint Stations::affordable_at(TimePoint now, const Station& station, bool is_read) const {
     const bool pays = is_read || !station.answers_reads();
     const TimePoint own = pays ? station.affordable_at() : TimePoint{};
-    if (!is_doubtful(station, is_read)) return own;
+    if (!is_doubtful(now, station, is_read)) return own;
     const auto failing = failing_beside(station);
     const ProbeBudget& budget = pays || failing >= kSeveral ? suspects_ : ignored_writes_;
     const TimePoint shared = budget.next() - credit();
@@ -114,17 +114,18 @@ TimePoint Stations::affordable_at(const Station& station, bool is_read) const {
     return std::max(own, std::min(shared, station.failed() + (failing + 1) * turn));
 }
 
-/// Where panels die together one failure is sign enough (T1).
-bool Stations::is_doubtful(const Station& station, bool is_read) const {
-    return station.is_doubtful(is_read) ||
-           (station.is_suspect(is_read) && failing_beside(station) >= kSeveral);
+/// Where panels die together one failure is enough, where frames get lost it is not (T1).
+bool Stations::is_doubtful(TimePoint now, const Station& station, bool is_read) const {
+    const bool outage = station.is_suspect(is_read) && failing_beside(station) >= kSeveral;
+    if (!loses_frames(now)) return outage || station.is_doubtful(is_read);
+    return station.speculative() || (station.is_suspect(is_read) && station.fails_often());
 }
 
 TimePoint Stations::held_until(TimePoint now, const Job& job) const {
     const Station* const station = find(job.station);
     // A station that answers waits only behind requests of others.
-    if (station == nullptr || !is_doubtful(*station, job.request.is_read())) return {};
-    const TimePoint held = affordable_at(*station, job.request.is_read());
+    if (station == nullptr || !is_doubtful(now, *station, job.request.is_read())) return {};
+    const TimePoint held = affordable_at(now, *station, job.request.is_read());
     if (held <= now) return held;
     // Who looks for stations waits for others, not for what the search itself has asked.
     const Client self = station->speculative() ? job.client : 0;
@@ -148,14 +149,17 @@ std::ptrdiff_t Stations::failing_beside(const Station& station) const {
     });
 }
 
-bool Stations::lose_frames() const {
-    return std::ranges::any_of(stations_ | std::views::values, &Station::loses_frames);
+bool Stations::affords_retry(TimePoint now, const Station& station, bool damaged) const {
+    if (now >= others_active_until(station.id(), {})) return true;
+    if (damaged) return now >= station.affordable_at();
+    if (loses_frames(now) || failing_beside(station) < kSeveral) return true;
+    return now >= station.affordable_at() && now + credit() >= suspects_.next();
 }
 
-bool Stations::affords_retry(TimePoint now, const Station& station) const {
-    if (failing_beside(station) < kSeveral || now >= others_active_until(station.id(), {}))
-        return true;
-    return now >= station.affordable_at() && suspects_.allows(now, credit());
+/// Panels that return together have lost no frames.
+void Stations::on_reply(TimePoint now, const Station& station, bool retried) {
+    lively_ = now;
+    if (retried && failing_beside(station) < kSeveral) lost_before_ = std::exchange(lost_, now);
 }
 
 void Stations::on_probe(TimePoint now, std::uint8_t id) {
@@ -169,8 +173,7 @@ void Stations::on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration 
     const Station& station = of(id);
     if (station.health().offline()) return;  // paid for in advance
     const Duration most = kMemory * suspects_.time_for(std::max(unlisted_.response_timeout, cost));
-    const bool outage = failing_beside(station) >= kSeveral;
-    const bool ignored = !is_read && station.answers_reads() && !outage;
+    const bool ignored = !is_read && station.answers_reads() && failing_beside(station) < kSeveral;
     (ignored ? ignored_writes_ : suspects_).spend(now, cost, most);
 }
 

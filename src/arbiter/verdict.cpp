@@ -28,13 +28,6 @@ bool in_time(TimePoint now, const Group& group) {
     return std::ranges::any_of(group.jobs, [&](const Job& job) { return now < job.start_by; });
 }
 
-/// True for an exception that the real reply may follow (T10; AP 7: acknowledge and busy).
-bool announces_reply(ByteView reply) {
-    const auto code = modbus::exception_of(reply);
-    return code == static_cast<std::uint8_t>(modbus::ExceptionCode::acknowledge) ||
-           code == static_cast<std::uint8_t>(modbus::ExceptionCode::server_device_busy);
-}
-
 }  // namespace
 
 /// The last bit of a broadcast has left: no reply comes, the line rests for the turnaround.
@@ -80,7 +73,7 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
     const Station::Replied replied = station.on_reply(came, attempt, refused, needed);
     const bool is_own = close_request(now, attempt, reply);
     outstanding.on_delivered(now, answered);
-    stations_.on_reply(now);
+    stations_.on_reply(now, station, group.silent);
     if (replied.back) stations_.on_recovery();
     explain_condition(now, group.station, before);
     // The reply to a retry may be that to the attempt before: the retry may still be leaving.
@@ -108,9 +101,7 @@ bool Arbiter::close_request(TimePoint now, const Attempt& attempt, const Bytes& 
     Asked asked = asked_of(attempt, settings_.may_stall && station.reads().longer());
     if (asked.until != Outstanding::kInTransit)
         asked.until = std::max(asked.until, now + latency_ + station.latest_reply());
-    const bool is_own = stations_.outstanding().on_reply(now, id, asked, reply);
-    if (is_own && announces_reply(reply)) stations_.outstanding().add(id, std::move(asked));
-    return is_own;
+    return stations_.outstanding().on_reply(now, id, std::move(asked), reply);
 }
 
 void Arbiter::fail(TimePoint now, Verdict verdict) {
@@ -125,9 +116,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     stations_.outstanding().add(group.station, asked_of(attempt, settings_.may_stall));
     station.on_failed(now, attempt, verdict, cost, settings_.learns_holes);
     stations_.on_failed(now, group.station, group.request.is_read(), cost);
-    // Damage costs the station's own share alone.
-    const bool affordable = verdict == Verdict::damaged ? now >= station.affordable_at()
-                                                        : stations_.affords_retry(now, station);
+    const bool affordable = stations_.affords_retry(now, station, verdict == Verdict::damaged);
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
         quiet_.quarantine(now, group.station, *until);
         outbox_.decide({.at = now,
@@ -136,6 +125,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
                         .time = *until - now});
     }
     group.silent = verdict == Verdict::silent;
+    if (group.silent) schedule_.on_silence(now);
     if (Station* const earlier = stations_.find(replied_before_);
         earlier != nullptr && attempt.heard() && verdict != Verdict::wrong)
         earlier->on_disturbed(attempt.timing().started);
@@ -143,7 +133,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
         outbox_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
     const std::uint8_t id = group.station;
     if (in_time(now, group) && affordable && station.may_retry(group)) {
-        schedule_.retry(now, std::move(group));
+        schedule_.retry(std::move(group));
     } else if (group.joined()) {
         give_back(group);  // health unaffected: the panel may only not answer this length (T14)
     } else {

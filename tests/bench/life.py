@@ -244,7 +244,9 @@ def run(scene, seconds, seed):
         guarded = stack.enter_context(panels_of(scene, folder, "guarded", scene.tcp))
         plain = stack.enter_context(panels_of(scene, folder, "plain", False))
         device = f"tcp://{guarded.names[0]}" if scene.tcp else guarded.names[0]
-        line = config.line("life", device, config.station_ids(scene.units), baud=scene.baud)
+        # Both know how long their clients wait.
+        line = config.line("life", device, config.station_ids(scene.units), baud=scene.baud,
+                           queue=f"{{deadline: {1000 * PATIENCE:.0f}ms}}")
         program = stack.enter_context(harness.configured(config.gateway(line)))
         program.log.wait_for("line up")
         port = stack.enter_context(plain_bridge(plain.names[0], scene.baud))

@@ -55,6 +55,7 @@ class EchoFilter {
     Expect expect_ = Expect::nothing;
     bool possible_ = false;
     std::size_t matched_ = 0;  ///< bytes of the frame that have matched so far
+    std::ptrdiff_t lost_ = 0;  ///< bytes of those that were not heard: the first at most
     bool complete_ = false;
     bool mismatch_ = false;
     Bytes released_;

@@ -19,7 +19,6 @@ struct Group {
     int attempts = 0;
     Transaction transaction = 0;  ///< of the latest attempt
     TimePoint started{};          ///< of the first attempt: the answer was sampled then or later
-    TimePoint retry_since{};      ///< when the retry began to wait
     bool silent = false;          ///< the previous attempt was silent
     bool probe = false;           ///< shows whether an offline station is back, or is a proof (T2)
     bool repeatable = true;       ///< of a write: the station's `retry_writes` when it began

@@ -60,12 +60,10 @@ class Outstanding {
     bool any(TimePoint now, std::uint8_t station) const;
     /// Time from which no outstanding reply or exception could be taken for the reply to `request`.
     /// `again`: a retry, for which the reply to its own earlier attempt counts as well.
+    /// `earlier_alone`: only of requests that left over an earlier connection and are delivered: a
+    /// reply over this connection proves nothing about those.
     TimePoint clear_at(TimePoint now, std::uint8_t station, const modbus::Request& request,
-                       bool again = false) const;
-    /// clear_at() of the requests that left over an earlier connection and are delivered: a reply
-    /// over this connection proves nothing about those.
-    TimePoint earlier_clear_at(TimePoint now, std::uint8_t station,
-                               const modbus::Request& request) const;
+                       bool again = false, bool earlier_alone = false) const;
     /// True if the normal reply to this read differs from each outstanding reply in function or
     /// length: that reply proves that the station has served all earlier requests. `again`: the
     /// very same read does not count, though its reply proves only that the station is there.

@@ -106,9 +106,11 @@ class Schedule {
 
     Backlog& backlog() { return backlog_; }
     const Backlog& backlog() const { return backlog_; }
-    /// Queues a retry. Behind a silence the jobs that wait by now go first, for half of the
-    /// station's timeout, unless the line loses frames.
-    void retry(TimePoint now, Group group);
+    /// Queues a retry.
+    void retry(Group group) { backlog_.retry(std::move(group)); }
+    /// An attempt was silent. Who waits by now for a station that answers goes first, for half a
+    /// timeout, unless the line loses frames.
+    void on_silence(TimePoint now) { silent_ = now; }
     /// Puts the parts of a joined read back, each alone. Returns the jobs of clients that left.
     Jobs give_back(Group& group);
 
@@ -123,7 +125,7 @@ class Schedule {
     static bool gap_is_over(const Line& line, std::uint8_t station);
     std::optional<Group> next_retry(const Line& line);
     std::optional<Group> next_probe(const Line& line) const;
-    std::optional<Group> next_job(const Line& line);
+    std::optional<Group> next_job(const Line& line, bool behind_silence);
     std::optional<Group> read_before(const Line& line, const Job& job);
     bool may_run(const Line& line, const Job& job) const;
     TimePoint ready_at(TimePoint now, const Stations& stations, const Job& job) const;
@@ -131,9 +133,11 @@ class Schedule {
                               const modbus::Request& request, bool may_learn);
     static TimePoint repeat_from(TimePoint now, const Group& group, const Stations& stations);
     bool others_go_first(const Line& line) const;
+    bool goes_first(const Line& line, const Job& job) const;
 
     Quarantine quarantine_;
     bool echo_known_ = false;
+    TimePoint silent_{};  ///< end of the last silent attempt
     Backlog backlog_;
     Sharing sharing_;
     Ticket learned_for_ = 0;  ///< a read was sent for it to show the echo (P8)

@@ -45,15 +45,14 @@ class Station {
     /// True if the budget of suspects holds its requests (P4). One damaged transaction is not
     /// enough: it may have met another station's frame (T3).
     bool is_doubtful(bool is_read) const {
-        return (is_suspect(is_read) && (was_silent() || failed_reads_ + failed_writes_ > 1)) ||
-               speculative();
+        return (is_suspect(is_read) && (was_silent() || fails_often())) || speculative();
     }
+    /// True if more than one transaction in a row failed.
+    bool fails_often() const { return failed_reads_ + failed_writes_ > 1; }
     /// From when its failures are within its own share, with two timeouts in advance (P4).
     TimePoint affordable_at() const {
         return silences_.next() - 2 * silences_.time_for(settings_.response_timeout);
     }
-    /// True if its last retry behind a silence was answered: frames get lost, it is there (T1).
-    bool loses_frames() const { return loses_frames_; }
     /// True if its last attempt was silent.
     bool was_silent() const { return (lately_ & 1) != 0; }
     /// True if nothing shows that its next request may be unanswered: only then reads are retried.
@@ -140,7 +139,6 @@ class Station {
     int failed_reads_ = 0;     ///< transactions in a row
     int failed_writes_ = 0;    ///< likewise
     bool wants_check_ = false;
-    bool loses_frames_ = false;
     TimePoint rests_until_{};
     TimePoint asked_{};
     Client wanted_by_ = 0;

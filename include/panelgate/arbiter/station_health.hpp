@@ -83,8 +83,7 @@ class ProbeBudget {
 
     explicit ProbeBudget(double share) : share_(share) {}
 
-    /// True if the budget allows spending now, but for an excess paid off within `credit`.
-    bool allows(TimePoint now, Duration credit = {}) const { return now + credit >= next_; }
+    bool allows(TimePoint now) const { return now >= next_; }
     TimePoint next() const { return next_; }
     /// An unanswered attempt that occupied the line for `cost` ended at `now`. Earlier excess is
     /// remembered up to what takes `most` to pay off.

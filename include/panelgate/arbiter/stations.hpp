@@ -8,6 +8,7 @@
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station.hpp"
 #include "panelgate/arbiter/station_health.hpp"
+#include "panelgate/arbiter/timing.hpp"
 
 namespace panelgate::arbiter {
 
@@ -44,17 +45,19 @@ class Stations {
     bool may_spend(TimePoint now, const Job& job) const;
     /// Time until which a suspect waits for its share while others use the line.
     TimePoint held_until(TimePoint now, const Job& job) const;
-    /// True if a retry is within what silence may cost the others: where several other stations
-    /// fail as well, the share of the station and that of all suspects.
-    bool affords_retry(TimePoint now, const Station& station) const;
-    /// True if frames get lost on this line: the last retry of a station was answered (T1).
-    bool lose_frames() const;
+    /// True if a retry is within what failures may cost the others: behind damage the share of the
+    /// station; where several stations fail, and frames do not get lost, that of all suspects, too.
+    bool affords_retry(TimePoint now, const Station& station, bool damaged) const;
+    /// True if frames get lost on this line: two retries behind silences were answered lately (T1).
+    bool loses_frames(TimePoint now) const {
+        return lost_before_ != TimePoint{} && now < lost_before_ + timing::kLosesFrames;
+    }
     /// An offline station is asked, or a request to it accepted: paid for in advance.
     void on_probe(TimePoint now, std::uint8_t id);
     /// An attempt that occupied the line for `cost` failed.
     void on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration cost);
-    /// A station answered.
-    void on_reply(TimePoint now) { lively_ = now; }
+    /// This station answered; `retried`: behind a silence.
+    void on_reply(TimePoint now, const Station& station, bool retried);
     /// A station is back: others may be back for the same reason, so their budget is new.
     void on_recovery() { offline_.clear(); }
     /// The line was opened: all stations may be there.
@@ -80,19 +83,18 @@ class Stations {
     std::optional<modbus::Request> proof_for(TimePoint now, const Station& station) const;
 
   private:
-    /// When this station is probed; empty: never.
     std::optional<TimePoint> probe_at(TimePoint now, const Station& station) const;
     /// From when a request is within the share of its station and the budget of suspects (P4).
-    TimePoint affordable_at(const Station& station, bool is_read) const;
+    TimePoint affordable_at(TimePoint now, const Station& station, bool is_read) const;
     /// Until when stations other than this one use the line: one of them has answered after
     /// `since`.
     TimePoint others_active_until(std::uint8_t id, TimePoint since, Client self = 0) const;
     /// True if the budget of suspects holds requests to this station (P4).
-    bool is_doubtful(const Station& station, bool is_read) const;
+    bool is_doubtful(TimePoint now, const Station& station, bool is_read) const;
     std::ptrdiff_t failing_beside(const Station& station) const;
     bool any_online() const;
     const ProbeBudget& probes(TimePoint now) const;
-    /// What suspects may cost in advance: two whole timeouts.
+    /// In advance: two timeouts.
     Duration credit() const { return 2 * suspects_.time_for(unlisted_.response_timeout); }
     void forget_unheard(TimePoint now);
 
@@ -107,7 +109,9 @@ class Stations {
     ProbeBudget ignored_writes_{ProbeBudget::kIgnored};  ///< reads do not pay for them (T14)
     ProbeBudget offline_{ProbeBudget::kOffline};
     ProbeBudget alone_{ProbeBudget::kAlone};
-    TimePoint lively_{};  ///< the last reply of any station, or when the line was opened
+    TimePoint lost_{};         ///< when a retry behind a silence was answered, the last time
+    TimePoint lost_before_{};  ///< and the time before
+    TimePoint lively_{};       ///< the last reply of any station, or when the line was opened
 };
 
 }  // namespace panelgate::arbiter

@@ -17,6 +17,8 @@ inline constexpr Duration kOthersActive = 5s;
 inline constexpr Duration kForgetUnheard = 60s;
 /// T1: a probe waits no longer than this for a line that is free.
 inline constexpr Duration kProbeWaits = 20ms;
+/// T1: of two frames that were lost, the first tells for so long that frames get lost on the line.
+inline constexpr Duration kLosesFrames = 10s;
 /// T4: pauses inside the replies of a station are forgotten when there was none for so long.
 inline constexpr Duration kForgetHole = 10min;
 /// T6: collisions are reported no more often.

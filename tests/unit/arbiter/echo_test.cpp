@@ -48,6 +48,18 @@ TEST(EchoFilter, DetectsADifferenceAndReturnsWhatItBuffered) {
     }
 }
 
+TEST(EchoFilter, T6TheFirstByteMayBeLost) {
+    for (const Expect expect : {Expect::certainly, Expect::perhaps}) {
+        EchoFilter filter(kFrame, expect);
+        EXPECT_TRUE(filter.feed(ByteView(kFrame).subspan(1, 4)).empty());
+        EXPECT_EQ(copy(filter.feed("03 9A 9B AA"_hex).last(1)), "AA"_hex);
+        EXPECT_TRUE(filter.complete());
+        EchoFilter other(kFrame, expect);
+        EXPECT_TRUE(other.feed("06 00"_hex).empty());
+        EXPECT_EQ(copy(other.feed("FF"_hex)), "06 00 FF"_hex) << "nothing is made up";
+    }
+}
+
 TEST(Echo, OnlyARequestWhoseReplyCannotEqualItTeaches) {
     EXPECT_TRUE(teaches_echo(request_of(kRead)));
     EXPECT_TRUE(teaches_echo(request_of("10 00 01 00 01 02 00 03"_hex)));

@@ -172,8 +172,8 @@ TEST_F(OutstandingTest, P1T8OverTwoConnectionsTheOrderIsUnknown) {
     memory.on_reply(at(4s), kId, asked(3s, kWrite), kWrite);
     EXPECT_EQ(oldest(kReplyOfThree), at(1s)) << "asked over the connection before";
     EXPECT_FALSE(fits(kReplyOfTwo));
-    EXPECT_EQ(memory.earlier_clear_at(at(5s), kId, request_of(kTwo)), at(11s));
-    EXPECT_EQ(memory.earlier_clear_at(at(5s), kId, request_of(kWrite)), TimePoint{});
+    EXPECT_EQ(memory.clear_at(at(5s), kId, request_of(kTwo), false, true), at(11s));
+    EXPECT_EQ(memory.clear_at(at(5s), kId, request_of(kWrite), false, true), TimePoint{});
     add(4s, kThree);
     memory.on_late(at(5s), kId, kReplyOfThree, false);
     EXPECT_EQ(oldest(kReplyOfThree), at(1s)) << "a reply of either connection closes neither";
@@ -198,6 +198,19 @@ TEST_F(OutstandingTest, P1T2AReplyOfAnotherStationEndsNoLateWindow) {
     add(1s, kThree);
     memory.on_delivered(at(5s), at(4s));
     EXPECT_EQ(clear(kThree), at(11s));
+}
+
+/// A late reply answers the client; the retry is refused 05 or 06, and the real reply follows.
+TEST_F(OutstandingTest, P1T10WhatIsRefusedBusyStaysOutstandingAlsoBehindALateReply) {
+    for (const Bytes& busy : {"83 05"_hex, "83 06"_hex}) {
+        Asked retry = asked(2s, kThree);
+        retry.window = 5s;
+        memory.add(kId, retry);
+        memory.on_late(at(3s), kId, busy, false);
+        EXPECT_EQ(clear(kThree), at(12s));
+        memory.on_late(at(4s), kId, kReplyOfThree, false);
+        EXPECT_EQ(clear(kThree), TimePoint{});
+    }
 }
 
 // Other masters (T9), and limits

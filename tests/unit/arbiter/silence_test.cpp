@@ -81,6 +81,11 @@ TEST_F(SilenceTest, P4BeforeARetryTheRequestsThatWaitByThenHaveTheirTurns) {
     settings.stations.push_back(settings.unlisted);
     settings.stations.back().id = 19;
     BusScript line{settings};
+    for (const std::uint8_t id : Bytes{18, 19}) {
+        line.submit(id, kRead, 9);
+        answer(line, id, reply_number(1), 3ms);
+        line.run_for(10ms);
+    }
     line.submit(17, kRead, 1);
     line.submit(18, kRead, 2);
     line.submit(19, kRead, 3);
@@ -92,6 +97,28 @@ TEST_F(SilenceTest, P4BeforeARetryTheRequestsThatWaitByThenHaveTheirTurns) {
     }
     EXPECT_EQ(asked, (std::vector<std::uint8_t>{18, 19, 17}));
     EXPECT_EQ(line.next_sent().value().adu[0], 18);
+}
+
+/// Two panels had died: their retries went one behind the other, and a sound one waited for four
+/// timeouts.
+TEST_F(SilenceTest, P4BetweenTwoSilencesAStationThatAnswersHasItsTurn) {
+    know(18);
+    bus.submit(17, kRead, 1);
+    bus.submit(kStranger, kRead, 2);
+    bus.submit(18, read_at(1), 3);
+    std::uint8_t before = 0;
+    for (int silences = 0; silences < 3;) {
+        const std::uint8_t asked = bus.sent.back().adu[0];
+        EXPECT_FALSE(before != 18 && before != 0 && asked != 18) << "silences " << silences;
+        before = asked;
+        if (asked != 18) {
+            ++silences;
+        } else {
+            answer(bus, 18, reply_number(1), 3ms);
+            bus.submit(18, read_at(1), 3);
+        }
+        ASSERT_TRUE(bus.next_sent());
+    }
 }
 
 TEST_F(SilenceTest, P4OthersGoBeforeARetryForNoLongerThanATimeout) {
@@ -109,8 +136,9 @@ TEST_F(SilenceTest, P4OthersGoBeforeARetryForNoLongerThanATimeout) {
     EXPECT_LE(bus.now() - silent, Duration(600ms));
 }
 
-TEST_F(SilenceTest, P4WhereTheLastRetryWasAnsweredTheNextOneGoesFirst) {
-    for (const bool answered : {false, true}) {
+TEST_F(SilenceTest, P4WhereTwoRetriesWereAnsweredTheNextOneGoesFirst) {
+    know(18);
+    for (const bool answered : {false, false, true}) {
         bus.submit(17, read_at(1), 1);
         bus.submit(18, read_at(2), 2);
         EXPECT_EQ(bus.next_sent().value().adu[0], answered ? 17 : 18) << "the line loses frames";

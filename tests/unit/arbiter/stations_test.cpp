@@ -36,7 +36,7 @@ class StationsTest : public testing::Test {
     void answer(std::uint8_t id) {
         now += 1s;
         const auto attempt = test::answered(now - 30ms, now, group_of(id, kRead), kReply);
-        stations.on_reply(now);
+        stations.on_reply(now, stations.of(id), false);
         if (stations.of(id).on_reply(now, attempt, false, 25ms).back) stations.on_recovery();
     }
     /// A transaction of one attempt fails.
@@ -110,11 +110,11 @@ TEST_F(StationsTest, P4WhileSeveralFailAStationBeyondItsShareIsNotRetriedIfOther
         fail(1, 2s);
     }
     answer(2);
-    EXPECT_TRUE(stations.affords_retry(now, stations.of(1))) << "its frames get lost";
+    EXPECT_TRUE(stations.affords_retry(now, stations.of(1), false)) << "its frames get lost";
     for (const std::uint8_t id : Bytes{3, 4}) fail(id);
-    EXPECT_FALSE(stations.affords_retry(now, stations.of(1)));
+    EXPECT_FALSE(stations.affords_retry(now, stations.of(1), false));
     now += timing::kOthersActive;
-    EXPECT_TRUE(stations.affords_retry(now, stations.of(1)));
+    EXPECT_TRUE(stations.affords_retry(now, stations.of(1), false));
 }
 
 TEST_F(StationsTest, P4AnyRequestMayWakeAStrangerAndAScanAsksEachTime) {
