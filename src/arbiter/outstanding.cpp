@@ -30,6 +30,13 @@ bool confirms(const Asked& broadcast, const modbus::Request& write) {
            modbus::answers(write.pdu(), modbus::normal_write_reply(broadcast.pdu));
 }
 
+/// True for an exception that the real reply may follow (T10; AP 7: acknowledge and busy).
+bool announces_reply(ByteView reply) {
+    const auto code = modbus::exception_of(reply);
+    return code == static_cast<std::uint8_t>(modbus::ExceptionCode::acknowledge) ||
+           code == static_cast<std::uint8_t>(modbus::ExceptionCode::server_device_busy);
+}
+
 }  // namespace
 
 const Outstanding::Page* Outstanding::find(std::uint8_t station) const {
@@ -156,17 +163,6 @@ void Outstanding::set_last_reply(TimePoint now, std::uint8_t station, ByteView r
     all.reply.assign(reply.begin(), reply.end());
     all.replied = now;
 }
-
-namespace {
-
-/// True for an exception that the real reply may follow (T10; AP 7: acknowledge and busy).
-bool announces_reply(ByteView reply) {
-    const auto code = modbus::exception_of(reply);
-    return code == static_cast<std::uint8_t>(modbus::ExceptionCode::acknowledge) ||
-           code == static_cast<std::uint8_t>(modbus::ExceptionCode::server_device_busy);
-}
-
-}  // namespace
 
 bool Outstanding::on_reply(TimePoint now, std::uint8_t station, Asked asked, ByteView reply) {
     set_last_reply(now, station, reply);

@@ -145,7 +145,8 @@ TimePoint Stations::others_active_until(std::uint8_t id, TimePoint since, Client
 
 std::ptrdiff_t Stations::failing_beside(const Station& station) const {
     return std::ranges::count_if(stations_ | std::views::values, [&](const Station& other) {
-        return &other != &station && !other.answers_now(false) && other.health().suspect();
+        const bool fails = other.was_silent() || other.health().suspect();
+        return &other != &station && fails && !other.health().offline();
     });
 }
 
@@ -157,9 +158,10 @@ bool Stations::affords_retry(TimePoint now, const Station& station, bool damaged
 }
 
 /// Panels that return together have lost no frames.
-void Stations::on_reply(TimePoint now, const Station& station, bool retried) {
+void Stations::on_reply(TimePoint now, bool retried) {
     lively_ = now;
-    if (retried && failing_beside(station) < kSeveral) lost_before_ = std::exchange(lost_, now);
+    const auto silent = std::ranges::count_if(stations_ | std::views::values, &Station::was_silent);
+    if (retried && silent < kSeveral) lost_before_ = std::exchange(lost_, now);
 }
 
 void Stations::on_probe(TimePoint now, std::uint8_t id) {

@@ -73,7 +73,7 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
     const Station::Replied replied = station.on_reply(came, attempt, refused, needed);
     const bool is_own = close_request(now, attempt, reply);
     outstanding.on_delivered(now, answered);
-    stations_.on_reply(now, station, group.silent);
+    stations_.on_reply(now, group.silent);
     if (replied.back) stations_.on_recovery();
     explain_condition(now, group.station, before);
     // The reply to a retry may be that to the attempt before: the retry may still be leaving.

@@ -82,7 +82,9 @@ void Checker::on_copy(TimePoint now, ByteView adu) {
     const auto said = said_.find(station);
     if (said == said_.end() || !std::ranges::equal(said->second, adu)) return;
     const bool retried = retried_.contains(station);
-    if (!awaited && !retried) known_doublers_.insert(station);
+    // What an outstanding request may have had teaches nothing.
+    if (!awaited && !retried && now >= watch_.rests_until(station)) known_doublers_.insert(station);
+    if (!awaited && !retried) return;
     // A transport that stalls may hold a copy back for longer than copies are learned (T8).
     const bool held_back = now > said_at_[station] + arbiter::timing::kLongestTrail +
                                      frame_time(settings_.serial, kLongestAdu);

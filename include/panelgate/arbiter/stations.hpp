@@ -56,8 +56,8 @@ class Stations {
     void on_probe(TimePoint now, std::uint8_t id);
     /// An attempt that occupied the line for `cost` failed.
     void on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration cost);
-    /// This station answered; `retried`: behind a silence.
-    void on_reply(TimePoint now, const Station& station, bool retried);
+    /// A station has answered (Station::on_reply()); `retried`: behind a silence.
+    void on_reply(TimePoint now, bool retried);
     /// A station is back: others may be back for the same reason, so their budget is new.
     void on_recovery() { offline_.clear(); }
     /// The line was opened: all stations may be there.

@@ -36,7 +36,7 @@ class StationsTest : public testing::Test {
     void answer(std::uint8_t id) {
         now += 1s;
         const auto attempt = test::answered(now - 30ms, now, group_of(id, kRead), kReply);
-        stations.on_reply(now, stations.of(id), false);
+        stations.on_reply(now, false);
         if (stations.of(id).on_reply(now, attempt, false, 25ms).back) stations.on_recovery();
     }
     /// A transaction of one attempt fails.
