@@ -116,13 +116,11 @@ void Attempt::collect(std::optional<Bytes> reply) {
     const std::size_t behind = framer_.parts_behind();
     std::vector<Unused> parts = framer_.take_unused();
     const std::size_t front = reply ? parts.size() - std::min(behind, parts.size()) : parts.size();
-    if (reply) {
-        const Bytes adu = modbus::encode_adu(group_.station, *reply, orders_.of(group_.station));
-        parts.insert(parts.begin() + static_cast<std::ptrdiff_t>(front),
-                     modbus::classify_frame(adu, group_.station, true));
-    }
-    for (std::size_t i = 0; i < parts.size(); ++i)
-        add(std::move(parts[i]), reply && i == front, i < front);
+    for (std::size_t i = 0; i < front; ++i) add(std::move(parts[i]), false, true);
+    if (!reply) return;
+    const Bytes adu = modbus::encode_adu(group_.station, *reply, orders_.of(group_.station));
+    add(modbus::classify_frame(adu, group_.station, true), true, false);
+    for (std::size_t i = front; i < parts.size(); ++i) add(std::move(parts[i]), false, false);
 }
 
 void Attempt::add(Unused part, bool answers, bool in_front) {
