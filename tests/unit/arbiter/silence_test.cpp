@@ -77,28 +77,6 @@ TEST_F(SilenceTest, P4SoIsThatOfAnAddressThatNobodyListed) {
     EXPECT_LT(bus.now() - start, 30s);
 }
 
-TEST_F(SilenceTest, P4BeforeARetryTheRequestsThatWaitByThenHaveTheirTurns) {
-    settings.stations.push_back(settings.unlisted);
-    settings.stations.back().id = 19;
-    BusScript line{settings};
-    for (const std::uint8_t id : Bytes{18, 19}) {
-        line.submit(id, kRead, 9);
-        answer(line, id, reply_number(1), 3ms);
-        line.run_for(10ms);
-    }
-    line.submit(17, kRead, 1);
-    line.submit(18, kRead, 2);
-    line.submit(19, kRead, 3);
-    std::vector<std::uint8_t> asked;
-    for (int i = 0; i < 3; ++i) {
-        asked.push_back(line.next_sent().value().adu[0]);
-        answer(line, asked.back(), reply_number(asked.back()), 3ms);
-        if (i == 0) line.submit(18, read_at(7), 2);  // behind the silence
-    }
-    EXPECT_EQ(asked, (std::vector<std::uint8_t>{18, 19, 17}));
-    EXPECT_EQ(line.next_sent().value().adu[0], 18);
-}
-
 /// Two panels had died: their retries went one behind the other, and a sound one waited for four
 /// timeouts.
 TEST_F(SilenceTest, P4BetweenTwoSilencesAStationThatAnswersHasItsTurn) {

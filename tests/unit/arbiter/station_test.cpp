@@ -84,20 +84,6 @@ TEST_F(StationTest, T1ReadsOfAStationThatIsOnlineAreRetriedAndWritesWhereTheStat
     EXPECT_FALSE(station.may_retry(other)) << "not allowed when the write began";
 }
 
-TEST_F(StationTest, P4T14ReadsDoNotPayForWritesThatAreIgnored) {
-    answer();
-    EXPECT_FALSE(fail(Verdict::silent, kWrite));
-    EXPECT_TRUE(station.is_suspect(false));
-    EXPECT_FALSE(station.is_suspect(true));
-    fail(Verdict::silent, kWrite);
-    EXPECT_FALSE(station.wants_check());
-    EXPECT_FALSE(fail(Verdict::silent, kWrite));
-    EXPECT_TRUE(station.wants_check()) << "a read shows whether the station is there";
-    station.on_asked(now, group_of(kId, kRead));
-    EXPECT_FALSE(station.wants_check());
-    EXPECT_TRUE(fail()) << "the read was silent, too";
-}
-
 TEST_F(StationTest, IsInTheWorstConditionThatIsTrueOfIt) {
     EXPECT_EQ(station.condition(), Condition::unheard);
     fail();

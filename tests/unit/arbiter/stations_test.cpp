@@ -104,19 +104,6 @@ TEST_F(StationsTest, P4ASuspectWaitsForItsShareOnlyWhileOthersUseTheLine) {
     EXPECT_LE(stations.held_until(now, job_for(1)), now);
 }
 
-TEST_F(StationsTest, P4WhileSeveralFailAStationBeyondItsShareIsNotRetriedIfOthersUseTheLine) {
-    for (int i = 0; i < 3; ++i) {
-        answer(1);
-        fail(1, 2s);
-    }
-    answer(2);
-    EXPECT_TRUE(stations.affords_retry(now, stations.of(1), false)) << "its frames get lost";
-    for (const std::uint8_t id : Bytes{3, 4}) fail(id);
-    EXPECT_FALSE(stations.affords_retry(now, stations.of(1), false));
-    now += timing::kOthersActive;
-    EXPECT_TRUE(stations.affords_retry(now, stations.of(1), false));
-}
-
 TEST_F(StationsTest, P4AnyRequestMayWakeAStrangerAndAScanAsksEachTime) {
     Job read = job_for(kStranger);
     EXPECT_FALSE(stations.refuses(now, read));
