@@ -116,9 +116,9 @@ TimePoint Stations::affordable_at(TimePoint now, const Station& station, bool is
 
 /// Where panels die together one failure is enough, where frames get lost it is not (T1).
 bool Stations::is_doubtful(TimePoint now, const Station& station, bool is_read) const {
-    const bool outage = station.is_suspect(is_read) && failing_beside(station) >= kSeveral;
-    if (!loses_frames(now)) return outage || station.is_doubtful(is_read);
-    return station.speculative() || (station.is_suspect(is_read) && station.fails_often());
+    const bool lossy = loses_frames(now);
+    if (station.is_doubtful(is_read, lossy)) return true;
+    return !lossy && station.is_suspect(is_read) && failing_beside(station) >= kSeveral;
 }
 
 TimePoint Stations::held_until(TimePoint now, const Job& job) const {
@@ -127,7 +127,7 @@ TimePoint Stations::held_until(TimePoint now, const Job& job) const {
     if (station == nullptr || !is_doubtful(now, *station, job.request.is_read())) return {};
     const TimePoint held = affordable_at(now, *station, job.request.is_read());
     if (held <= now) return held;
-    // Who looks for stations waits for others, not for what the search itself has asked.
+    // A search for stations waits for the stations of other clients alone.
     const Client self = station->speculative() ? job.client : 0;
     return std::min(held, others_active_until(job.station, station->failed(), self));
 }

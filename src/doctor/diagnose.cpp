@@ -25,7 +25,7 @@ constexpr Causes causes(Cause... some) {
 
 struct Row {
     Cause cause;
-    Counts needs;     ///< one of them was counted, at least; none: no count of ours shows it
+    Counts needs;     ///< one of these counters is not 0; empty: no counter shows the cause
     Causes excludes;  ///< it is not named beside these, of the line or of the same station
     void (*of_line)(Case&);
     void (*of_station)(Case&, std::uint8_t, const S&);
@@ -52,8 +52,8 @@ constexpr Causes kEncoding = causes(wrong_crc_order, ascii_lower_case);
 /// Others send.
 constexpr Causes kSenders = causes(echo, other_master, collision);
 
-/// Which cause needs which counts, and which causes exclude it. A row sees what the rows above have
-/// found; how much of a count it needs, and what of it they explain, is in its function.
+/// The causes, the counters that each cause needs, and the causes that exclude the cause. A row
+/// sees the findings of the rows above; the row's function has the thresholds of its counters.
 constexpr Row kRows[] = {
     station(repeats_requests, {&S::echoes}, {}, find_repeated_requests),
     line(echo, {&S::echoes, &S::collided}, {}, find_echo, causes(repeats_requests)),

@@ -19,7 +19,7 @@
 
 namespace panelgate::arbiter {
 
-/// Reads that share one transaction (P6), and joins that panels refused. Pure.
+/// Joins reads to one transaction (P6), and remembers the joined reads that panels refused. Pure.
 class Sharing {
   public:
     static constexpr std::size_t kRemembered = 64;

@@ -86,8 +86,8 @@ class Stations {
     std::optional<TimePoint> probe_at(TimePoint now, const Station& station) const;
     /// From when a request is within the share of its station and the budget of suspects (P4).
     TimePoint affordable_at(TimePoint now, const Station& station, bool is_read) const;
-    /// Until when stations other than this one use the line: one of them has answered after
-    /// `since`.
+    /// Until when the other stations use the line: kOthersActive behind their last reply, if that
+    /// reply came after `since`.
     TimePoint others_active_until(std::uint8_t id, TimePoint since, Client self = 0) const;
     /// True if the budget of suspects holds requests to this station (P4).
     bool is_doubtful(TimePoint now, const Station& station, bool is_read) const;

@@ -20,6 +20,10 @@ using test::BusScript;
 inline const Bytes kRead = "03 00 6B 00 03"_hex;
 inline const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
 inline const Bytes kWrite = "06 00 01 00 03"_hex;
+/// A broadcast, the same write to one station with other values, and the confirmation of either.
+inline const Bytes kToAll = "10 00 64 00 02 04 00 0A 01 02"_hex;
+inline const Bytes kToOne = "10 00 64 00 02 04 00 0B 00 00"_hex;
+inline const Bytes kConfirmed = "10 00 64 00 02"_hex;
 /// From the end of a request to the end of the wait for its reply.
 inline constexpr Duration kSilence = 500ms + timing::kListensAgain;
 

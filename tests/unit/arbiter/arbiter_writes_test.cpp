@@ -8,9 +8,6 @@
 namespace panelgate::arbiter::arbiter_writes_test {
 namespace {
 
-const Bytes kToAll = "10 00 64 00 02 04 00 0A 01 02"_hex;
-const Bytes kConfirmed = "10 00 64 00 02"_hex;
-
 TEST_F(ArbiterTest, P2NeverRepeatsAWriteUnlessTheStationAllowsIt) {
     for (const Bytes& write :
          {kWrite, "05 00 01 FF 00"_hex, "10 00 01 00 01 02 00 03"_hex, "0F 00 01 00 01 01 01"_hex,

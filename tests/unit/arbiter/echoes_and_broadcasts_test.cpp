@@ -12,9 +12,6 @@ namespace panelgate::arbiter::echoes_and_broadcasts_test {
 namespace {
 
 using modbus::encode_adu;
-const Bytes kToAll = "10 00 64 00 02 04 00 0A 01 02"_hex;
-const Bytes kToOne = "10 00 64 00 02 04 00 0B 00 00"_hex;
-const Bytes kConfirmed = "10 00 64 00 02"_hex;
 
 class EchoesAndBroadcasts : public ArbiterTest {
   protected:

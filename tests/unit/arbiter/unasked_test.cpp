@@ -14,10 +14,7 @@ namespace {
 
 using modbus::encode_adu;
 
-const Bytes kToAll = "10 00 64 00 02 04 00 0A 01 02"_hex;
-const Bytes kToOne = "10 00 64 00 02 04 00 0B 00 00"_hex;
 const Bytes kElsewhere = "10 00 68 00 02 04 00 0B 00 00"_hex;
-const Bytes kConfirmed = "10 00 64 00 02"_hex;
 
 class UnaskedTest : public ArbiterTest {
   protected:
