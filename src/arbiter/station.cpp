@@ -84,7 +84,7 @@ void Station::apply(const StationSettings& settings, const OfflineSettings& offl
 Condition Station::condition() const {
     constexpr int kFlaky = 4;  // of the last eight attempts
     if (health_.offline()) return Condition::offline;
-    if (failed_reads_ + failed_writes_ > 1) return Condition::failing;
+    if (fails_often()) return Condition::failing;
     if (std::popcount(lately_) >= kFlaky) return Condition::flaky;
     if (failed_reads_ + failed_writes_ > 0 || was_silent()) return Condition::missed;
     return health_.last_heard() ? Condition::well : Condition::unheard;

@@ -114,9 +114,11 @@ TimePoint Stations::affordable_at(TimePoint now, const Station& station, bool is
     return std::max(own, std::min(shared, station.failed() + (failing + 1) * turn));
 }
 
-/// Where panels die together one failure is enough, where frames get lost it is not (T1).
+/// Where panels die together one failure is enough. Where frames get lost, or no panel has failed
+/// twice yet, one failure is not enough (T1).
 bool Stations::is_doubtful(TimePoint now, const Station& station, bool is_read) const {
-    const bool lossy = loses_frames(now);
+    const bool lossy = loses_frames(now) ||
+                       std::ranges::none_of(stations_ | std::views::values, &Station::fails_often);
     if (station.is_doubtful(is_read, lossy)) return true;
     return !lossy && station.is_suspect(is_read) && failing_beside(station) >= kSeveral;
 }

@@ -46,9 +46,11 @@ class Station {
     /// enough: it may have met another station's frame (T3); nor is one silence where frames get
     /// lost on the line, `lossy` (T1).
     bool is_doubtful(bool is_read, bool lossy) const {
-        const bool often = failed_reads_ + failed_writes_ > 1;
-        return (is_suspect(is_read) && (often || (was_silent() && !lossy))) || speculative();
+        return (is_suspect(is_read) && (fails_often() || (was_silent() && !lossy))) ||
+               speculative();
     }
+    /// True if two transactions in a row failed.
+    bool fails_often() const { return failed_reads_ + failed_writes_ > 1; }
     /// From when its failures are within its own share, with two timeouts in advance (P4).
     TimePoint affordable_at() const {
         return silences_.next() - 2 * silences_.time_for(settings_.response_timeout);

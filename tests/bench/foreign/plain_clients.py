@@ -23,9 +23,9 @@ BITS = ("coils", "discrete")
 EXCEPTIONS = {"illegal function": 1, "illegal data address": 2, "illegal data value": 3}
 
 
-def quietly(*command, **options):
+def quietly(*command, timeout=2 * harness.PATIENCE, **options):
     return subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False,
-                          stdin=subprocess.DEVNULL, timeout=2 * harness.PATIENCE, **options)
+                          stdin=subprocess.DEVNULL, timeout=timeout, **options)
 
 
 def packaged(name):

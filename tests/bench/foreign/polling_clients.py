@@ -65,6 +65,7 @@ class Collectd(Client):
 
 class Nmap(Client):
     """Its script asks each unit who it is, by 17 and 43/14, on a connection each."""
+    ADDRESSES_PATIENCE = 900  # seconds: nmap asks 246 addresses, and the gateway waits a timeout for each
 
     def __init__(self, name):
         super().__init__(name)
@@ -80,7 +81,8 @@ class Nmap(Client):
     def running(self, port, folder, calls):
         self.version = re.search(r"version (\S+)", quietly("nmap", "--version").stdout).group(1)
         self._text = quietly("nmap", "-n", "-Pn", "-sT", "-p", port, "--script", "+modbus-discover",
-                             "--script-args", "modbus-discover.aggressive=true", "127.0.0.1").stdout
+                             "--script-args", "modbus-discover.aggressive=true", "127.0.0.1",
+                             timeout=self.ADDRESSES_PATIENCE).stdout
         yield None
 
     def survey(self, unit):
