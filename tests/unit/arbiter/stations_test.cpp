@@ -104,6 +104,15 @@ TEST_F(StationsTest, P4ASuspectWaitsForItsShareOnlyWhileOthersUseTheLine) {
     EXPECT_LE(stations.held_until(now, job_for(1)), now);
 }
 
+TEST_F(StationsTest, T1SingleFailuresAreNoOutageBeforeOneStationHasFailedTwice) {
+    for (std::uint8_t id = 1; id < 5; ++id) fail(id, 1s);
+    answer(5);
+    EXPECT_LE(stations.held_until(now, job_for(1)), now);
+    fail(2, 1s);
+    answer(5);
+    EXPECT_GT(stations.held_until(now, job_for(1)), now);
+}
+
 TEST_F(StationsTest, P4AnyRequestMayWakeAStrangerAndAScanAsksEachTime) {
     Job read = job_for(kStranger);
     EXPECT_FALSE(stations.refuses(now, read));
