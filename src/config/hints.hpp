@@ -16,14 +16,11 @@ std::string listen_hint(std::string_view typed);
 std::string network_hint(std::string_view typed, std::string_view key);
 /// For an item of a list whose words have no blanks: "; a ',' is missing: write [a, b]".
 std::string missing_commas(std::string_view typed);
-
-/// For an entry of a map whose keys are numbers: "; write 1: on" for on: 1.
-std::string number_key_hint(const yaml::Entry& entry);
+/// For an invalid `device`.
+std::string device_hint(std::string_view typed);
 
 /// Returns `serial` as a map of what was typed instead: "9600 8N1" or [9600, 8, N, 1]. Only what
 /// was typed; an example if nothing is understood or typed (nullptr).
 std::string serial_example(const yaml::Node* typed);
-/// The probable meaning of an invalid `device`, as the end of a message. Empty if there is none.
-std::string device_hint(std::string_view typed);
 
 }  // namespace panelgate::config

@@ -129,7 +129,7 @@ void load_label(MapReader& in, const yaml::Entry& entry, Point& point) {
             is_null ? "a label must be a text, not nothing; for the word null write 'null' in "
                       "quotes: " +
                           entry.key + ": 'null'"
-                    : "labels are RAW-NUMBER: text, such as 1: running" + number_key_hint(entry));
+                    : "labels are RAW-NUMBER: text, such as 1: running");
         return;
     }
     if (const RawRange range = label_range(point.type); !range.contains(*raw)) {

@@ -209,8 +209,8 @@ void load_units(Loading& loading, MapReader& in, tcp_server::Settings& settings)
     for (const yaml::Entry& entry : map->entries) {
         const auto unit = yaml::parse_integer(entry.key);
         if (!unit || *unit < 0 || *unit > 255) {
-            loading.problems.add(entry.mark, "a unit id is a number from 0 to 255, not " +
-                                                 yaml::quote(entry.key) + number_key_hint(entry));
+            loading.problems.add(
+                entry.mark, "a unit id is a number from 0 to 255, not " + yaml::quote(entry.key));
             continue;
         }
         if (const auto target = unit_target(loading, entry.value)) {

@@ -17,8 +17,8 @@
 #include <utility>
 #include <vector>
 
+#include "advice.hpp"
 #include "encoding.hpp"
-#include "lint.hpp"
 #include "panelgate/yaml/settings.hpp"
 #include "source.hpp"
 
@@ -303,61 +303,64 @@ void add(const Source& source, const Findings& findings, Problems& problems) {
     }
 }
 
-/// Adds the causes, or `otherwise` at the place of the error.
-void explain(const Source& source, Mark mark, std::string otherwise, Problems& problems) {
-    const Findings causes = find_causes(Scanned(source));
-    add(source, causes, problems);
-    if (causes.empty()) problems.add(mark, std::move(otherwise), source.excerpt(mark));
-}
+/// A decoded text, and what its author may have meant where it is no YAML.
+struct Text {
+    explicit Text(std::string all)
+        : source(std::move(all)), masked(mask_variables(source.text())), lines(masked) {}
 
-/// Checked before yaml-cpp, which would use 2 GB for 8 MB of brackets.
-const Token* too_deep(const Scanned& scanned) {
-    const auto found = std::ranges::find_if(scanned.tokens, [](const Token& token) {
-        return token.kind == Token::Kind::open && token.depth >= kMaxDepth;
-    });
-    return found == scanned.tokens.end() ? nullptr : &*found;
+    Source source;
+    std::string masked;
+    Lines lines;
+};
+
+/// Adds the causes, or `otherwise` at the place of the error.
+void explain(const Text& text, Mark mark, std::string otherwise, Problems& problems) {
+    const Findings causes =
+        find_causes(text.source.text(), text.lines, text.source.end_of(mark.line));
+    add(text.source, causes, problems);
+    if (causes.empty()) problems.add(mark, std::move(otherwise), text.source.excerpt(mark));
 }
 
 /// Returns false if yaml-cpp refused the text: the reason goes to `problems`, other faults to
 /// `found`.
-bool build(const Scanned& scanned, Builder& builder, Problems& problems, Problems& found) {
-    const Source& source = scanned.source;
+bool build(const Text& text, Builder& builder, Problems& problems, Problems& found) {
     try {
-        std::istringstream in{without_blank_tabs(scanned, mask_variables(source.text()))};
+        std::istringstream in{without_blank_tabs(text.masked)};
         YAML::Parser parser(in);
-        return !parser.HandleNextDocument(builder) || refuse_second_document(parser, source, found);
+        return !parser.HandleNextDocument(builder) ||
+               refuse_second_document(parser, text.source, found);
     } catch (const TooLarge& reason) {
         problems.add(reason.mark, reason.message);
     } catch (const YAML::DeepRecursion& error) {
         problems.add(builder.mark_of(error.mark), kTooDeep);
     } catch (const Stray& stray) {
-        explain(source, stray.mark,
+        explain(text, stray.mark,
                 "this belongs to nothing above it; the file must be one map of "
                 "keys, such as 'lines:'",
                 problems);
     } catch (const YAML::Exception& error) {
-        explain(source, builder.mark_of(error.mark), reword_error(error.msg), problems);
+        explain(text, builder.mark_of(error.mark), reword_error(error.msg), problems);
     }
     return false;
 }
 
 }  // namespace
 
-Node parse(std::string_view text, Problems& problems) {
-    Decoded decoded = decode(text);
-    const Source source(std::move(decoded.text));
+Node parse(std::string_view bytes, Problems& problems) {
+    Decoded decoded = decode(bytes);
+    const Text text(std::move(decoded.text));
+    const Source& source = text.source;
     add(source, decoded.bad, problems);
     if (!decoded.bad.empty()) return {};  // all later problems may follow from it
-    const Scanned scanned(source);
-    if (const Token* bracket = too_deep(scanned)) {
-        problems.add(source.mark(bracket->begin), kTooDeep);
+    if (text.lines.too_deep) {            // yaml-cpp would use 2 GB for 8 MB of brackets
+        problems.add(source.mark(*text.lines.too_deep), kTooDeep);
         return {};
     }
     Problems found(problems.file());
     Builder builder(source, found);
     Problems refusal(problems.file());
-    const bool built = build(scanned, builder, refusal, found);
-    const Findings traps = built ? find_traps(scanned) : Findings();
+    const bool built = build(text, builder, refusal, found);
+    const Findings traps = built ? find_traps(source.text(), text.lines) : Findings();
     add(source, traps, problems);
     if (!traps.empty()) return {};  // the parsed tree is not what the user meant
     problems.take(refusal);
@@ -367,7 +370,7 @@ Node parse(std::string_view text, Problems& problems) {
     // A file of lines such as `device = /dev/ttyUSB0` is a single text.
     const bool is_text = root.kind == Node::Kind::scalar && !root.quoted;
     if (!is_text || root.scalar.find_first_of("=:") == root.scalar.npos) return root;
-    const Findings causes = find_causes(scanned);
+    const Findings causes = find_causes(source.text(), text.lines, source.text().size());
     add(source, causes, problems);
     return causes.empty() ? root : Node();
 }

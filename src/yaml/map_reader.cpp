@@ -42,8 +42,7 @@ std::string wrong(std::string_view key, std::string_view wanted, const Node& nod
     const std::string name(key);
     if (node.kind == Node::Kind::null)
         return name + " has no value; it must be " + std::string(wanted);
-    return name + " must be " + std::string(wanted) + ", not " + shown(node) +
-           variable_hint(node.scalar);
+    return name + " must be " + std::string(wanted) + ", not " + shown(node);
 }
 
 std::string list_hint(const Node& node, std::string_view example) {
@@ -241,7 +240,7 @@ std::optional<std::size_t> MapReader::choice_index(std::string_view key,
     }
     const std::string near = nearest(node->scalar, words);
     problem(key, wrong(key, join(words), *node) +
-                     (near.empty() ? comment_hint(*node) : "; did you mean '" + near + "'?") +
+                     (near.empty() ? "" : "; did you mean '" + near + "'?") +
                      (hint ? hint(node->scalar) : ""));
     return std::nullopt;
 }

@@ -188,9 +188,6 @@ std::optional<std::int64_t> parse_integer(std::string_view text);
 inline constexpr std::string_view kIntegerPattern = "^(0|-?[1-9][0-9]*)$";
 std::string duration_pattern(Duration min, Duration max);
 std::string integer_pattern(std::int64_t min, std::int64_t max);
-/// Returns "; a blank is missing after '101:'; write 101: floor1/31" for a key that is a number, a
-/// colon and its value; else "".
-std::string number_blank_hint(std::string_view key);
 /// Formats in the largest unit that is exact: 1500ms, 2s, 250us; nanoseconds below.
 std::string format_duration(Duration duration);
 /// Formats in whole milliseconds, rounded up, for times on the wire.

@@ -106,7 +106,7 @@ constexpr Row kRefused[] = {
      "f.yaml:3:3: duplicate key 'id', already on line 1; is a '- ' missing before it?\n"},
     // a syntax error is one problem, at its cause
     {"a: b: c\n",
-     "f.yaml:1:4: two keys on one line; begin a deeper line for 'b', or write a: {b: c}; "
+     "f.yaml:1:4: two keys on one line; begin a new line for 'b'; "
      "one text that holds ': ' must be in quotes: \"b: c\"\n"
      "  a: b: c\n"
      "     ^\n"},

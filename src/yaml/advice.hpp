@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "encoding.hpp"
+
+namespace panelgate::yaml {
+
+/// A line with text, outside of quotes and block texts, as its author reads it.
+struct TextLine {
+    std::size_t begin = 0;  ///< offset of the line
+    std::size_t at = 0;     ///< offset of its first character that is no blank
+    std::size_t end = 0;    ///< offset behind its last character but a comment
+    std::size_t depth = 0;  ///< brackets that are open before the line
+};
+
+/// The lines of a text that need not be YAML, and the quotes and brackets that do not fit.
+struct Lines {
+    explicit Lines(std::string_view masked);
+
+    std::vector<TextLine> all;
+    Findings quotes;                      ///< quotes that are never closed
+    Findings brackets;                    ///< brackets without their other half
+    std::optional<std::size_t> too_deep;  ///< the bracket that exceeds kMaxDepth
+};
+
+/// Finds what a parser accepts and no user means: quotes that swallow lines, characters that look
+/// like blanks, tabs in the indentation. `text` is decoded. At most one finding for each line.
+Findings find_traps(std::string_view text, const Lines& lines);
+/// Finds probable causes of a parser's error at the offset `error`, at the mistake: a parser often
+/// stops lines below. Empty: no cause is known.
+Findings find_causes(std::string_view text, const Lines& lines, std::size_t error);
+
+/// Returns `bytes`, which have the offsets of the text, with blanks for the tabs on empty lines and
+/// on lines with only a comment.
+std::string without_blank_tabs(std::string bytes);
+
+}  // namespace panelgate::yaml
