@@ -67,7 +67,7 @@ class Walk {
     }
 
   private:
-    const yaml::KeyShape* key_named(std::string_view name) const {
+    const config::KeyShape* key_named(std::string_view name) const {
         const std::string path = (key_ == nullptr ? "" : key_->path + '/') + std::string(name);
         return config::describe().find(path);
     }
@@ -89,14 +89,14 @@ class Walk {
         made_ += "/NAME";
     }
     void take_key() {
-        const yaml::KeyShape* found = key_named(next());
+        const config::KeyShape* found = key_named(next());
         is_key_ = found != nullptr || (key_ != nullptr && !key_->keys.empty());
         if (!is_key_) return left_.clear();
         made_ += (made_.empty() ? "" : "/") + std::string(next());
         take(next().size());
         key_ = found;
-        names_ = key_ != nullptr && key_->kind == yaml::KeyShape::Kind::list && !left_.empty() &&
-                 std::ranges::any_of(config::describe().keys, [&](const yaml::KeyShape& one) {
+        names_ = key_ != nullptr && key_->kind == config::KeyShape::Kind::list && !left_.empty() &&
+                 std::ranges::any_of(config::describe().keys, [&](const config::KeyShape& one) {
                      return is_below(one.path, key_->path);
                  });
     }
@@ -105,7 +105,7 @@ class Walk {
     std::string left_;
     std::string made_;
     std::string list_;  ///< the first one without an entry of that name
-    const yaml::KeyShape* key_ = nullptr;
+    const config::KeyShape* key_ = nullptr;
     bool names_ = false;
     bool is_key_ = false;
 };
@@ -148,8 +148,8 @@ std::string printable(const std::string& value) {
 
 /// As it is typed in a file: a text may need quotes.
 std::string listed_value(const Setting& setting) {
-    using Kind = yaml::KeyShape::Kind;
-    const yaml::KeyShape* key = config::describe().of(setting);
+    using Kind = config::KeyShape::Kind;
+    const config::KeyShape* key = config::describe().of(setting);
     const bool is_text = key != nullptr && (key->kind == Kind::text || key->kind == Kind::map);
     return printable(is_text ? yaml::written(setting.value) : setting.value);
 }
@@ -161,8 +161,8 @@ std::string words_text(const std::vector<std::string>& words) {
 }
 
 /// "1 to 4096", "10ms to 10min, or auto"; "" where anything goes.
-std::string values_text(const yaml::KeyShape& shape) {
-    using Kind = yaml::KeyShape::Kind;
+std::string values_text(const config::KeyShape& shape) {
+    using Kind = config::KeyShape::Kind;
     if (shape.kind == Kind::boolean) return "true, false";
     if (shape.kind == Kind::word) return words_text(shape.words);
     std::string text;
@@ -177,7 +177,7 @@ std::string values_text(const yaml::KeyShape& shape) {
     return text;
 }
 
-void print(const yaml::KeyShape& key) {
+void print(const config::KeyShape& key) {
     std::cout << shown_path(key.path);
     if (const std::string values = values_text(key); !values.empty()) std::cout << ": " << values;
     if (key.required) std::cout << " (required)";
@@ -189,7 +189,7 @@ void print(const yaml::KeyShape& key) {
     std::cout << '\n';
 }
 
-boost::json::object to_json(const yaml::KeyShape& key) {
+boost::json::object to_json(const config::KeyShape& key) {
     constexpr std::array<const char*, 8> kKinds{"text",     "integer", "number", "boolean",
                                                 "duration", "word",    "map",    "list"};
     boost::json::object made{{"path", shown_path(key.path)},
@@ -211,7 +211,7 @@ boost::json::object to_json(const yaml::KeyShape& key) {
 /// "; did you mean 'lines.timing'?" or "".
 std::string nearest_key(const std::string& path) {
     std::vector<std::string_view> paths;
-    for (const yaml::KeyShape& key : config::describe().keys) paths.push_back(key.path);
+    for (const config::KeyShape& key : config::describe().keys) paths.push_back(key.path);
     const std::string near = nearest(path, paths);
     return near.empty() ? "" : "; did you mean '" + shown_path(near) + "'?";
 }
@@ -220,8 +220,8 @@ std::string nearest_key(const std::string& path) {
 
 ExitCode config_keys(const std::string& typed, bool as_json) {
     const std::string path = path_typed(typed);
-    std::vector<yaml::KeyShape> keys = config::describe().keys;
-    std::erase_if(keys, [&](const yaml::KeyShape& key) {
+    std::vector<config::KeyShape> keys = config::describe().keys;
+    std::erase_if(keys, [&](const config::KeyShape& key) {
         return !path.empty() && key.path != path && !key.path.starts_with(path + '/');
     });
     if (keys.empty()) {
@@ -231,11 +231,11 @@ ExitCode config_keys(const std::string& typed, bool as_json) {
     }
     if (as_json) {
         boost::json::array all;
-        for (const yaml::KeyShape& key : keys) all.push_back(to_json(key));
+        for (const config::KeyShape& key : keys) all.push_back(to_json(key));
         std::cout << web::json_text(boost::json::object{{"keys", std::move(all)}}) << '\n';
         return kFine;
     }
-    for (const yaml::KeyShape& key : keys) print(key);
+    for (const config::KeyShape& key : keys) print(key);
     return kFine;
 }
 

@@ -242,7 +242,7 @@ std::vector<Change> differences(const config::Config& before, const config::Conf
         if (is_within(all, path) || follows(all, difference)) continue;
         changes.push_back(change_of(path, difference));
         if (is_one_sided(difference)) continue;
-        const yaml::KeyShape* key = keys.of(*difference.after);
+        const config::KeyShape* key = keys.of(*difference.after);
         if (key != nullptr && !is_taken_over(before, after, path))
             changes.back().needs = key->change;
     }

@@ -22,7 +22,7 @@ namespace panelgate::app {
 namespace {
 
 namespace json = boost::json;
-using KeyKind = yaml::KeyShape::Kind;
+using KeyKind = config::KeyShape::Kind;
 
 /// Whole milliseconds as an integer.
 json::value milliseconds(Duration duration) {
@@ -41,7 +41,7 @@ json::value number(const std::string& text) {
     return text == "null" ? json::value(nullptr) : json::value(text);
 }
 
-json::value list_json(const std::string& text, const yaml::KeyShape& key) {
+json::value list_json(const std::string& text, const config::KeyShape& key) {
     yaml::Problems problems("");
     json::array made;
     for (const yaml::Node& item : yaml::parse(text, problems).items)
@@ -50,7 +50,7 @@ json::value list_json(const std::string& text, const yaml::KeyShape& key) {
     return made;
 }
 
-json::value value_json(const std::string& value, const yaml::KeyShape* key) {
+json::value value_json(const std::string& value, const config::KeyShape* key) {
     if (key == nullptr) return json::value(value);
     switch (key->kind) {
         case KeyKind::integer:
@@ -101,7 +101,7 @@ json::object object_of(const SettingTree& tree) {
     json::object made;
     for (const config::Setting* setting : tree.settings) {
         if (setting->secret || !setting->applies || setting->value.empty()) continue;
-        const yaml::KeyShape* key = config::describe().of(*setting);
+        const config::KeyShape* key = config::describe().of(*setting);
         const bool is_time = key != nullptr && key->kind == KeyKind::duration;
         made[std::string(setting->key()) + (is_time ? "_ms" : "")] =
             value_json(setting->value, key);

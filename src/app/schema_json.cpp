@@ -25,8 +25,8 @@ boost::json::object schema_json();
 namespace {
 
 namespace json = boost::json;
-using yaml::KeyRule;
-using yaml::KeyShape;
+using config::KeyRule;
+using config::KeyShape;
 using Kind = KeyShape::Kind;
 
 /// Scalars are read as written, so a text may look like a number.

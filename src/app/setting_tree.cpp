@@ -64,7 +64,7 @@ bool is_default(const config::Setting& setting,
     const config::Setting* owner = setting.otherwise.empty() ? nullptr : find(setting.otherwise);
     if (owner != nullptr) return owner->value == setting.value;
     if (setting.initial) return *setting.initial == setting.value;
-    const yaml::KeyShape* key = config::describe().of(setting);
+    const config::KeyShape* key = config::describe().of(setting);
     return key != nullptr && !key->initial.empty() && key->initial == setting.value;
 }
 

@@ -1,7 +1,10 @@
 #include "panelgate/config/config.hpp"
 
+#include <algorithm>
 #include <map>
 #include <string_view>
+
+#include "loader.hpp"
 
 namespace panelgate::config {
 
@@ -18,6 +21,11 @@ void share_profiles(Config& next, const Config& running) {
                 station.profile = found->second;
         }
     }
+}
+
+const Line* find_line(const Config& config, std::string_view name) {
+    const auto found = std::ranges::find(config.lines, name, &Line::name);
+    return found == config.lines.end() ? nullptr : &*found;
 }
 
 }  // namespace panelgate::config

@@ -8,12 +8,12 @@
 #include <string_view>
 #include <utility>
 
-#include "load_stations.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "tables.hpp"
 
 namespace panelgate::config {
 

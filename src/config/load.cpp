@@ -1,4 +1,4 @@
-#include "load.hpp"
+// A configuration as a whole: templates, the rows of the file, and what is served.
 
 #include <algorithm>
 #include <array>
@@ -13,218 +13,22 @@
 #include <vector>
 
 #include "check_doors.hpp"
-#include "load_roles.hpp"
-#include "load_stations.hpp"
-#include "loader.hpp"
-#include "panelgate/base/text.hpp"
-#include "panelgate/config/config.hpp"
-#include "panelgate/config/describe.hpp"
-#include "panelgate/config/real_files.hpp"
 #include "panelgate/yaml/document.hpp"
 #include "panelgate/yaml/variables.hpp"
 #include "tables.hpp"
+#include "templates.hpp"
 
 namespace panelgate::config {
 
+bool load_mqtt(Reader& root, Config& config);
+
 namespace {
 
+using Kind = KeyShape::Kind;
 using yaml::Entry;
 using yaml::Node;
 
-std::optional<Node> take(Node& map, std::string_view key) {
-    const auto found = std::ranges::find(map.entries, key, &Entry::key);
-    if (found == map.entries.end()) return std::nullopt;
-    Node value = std::move(found->value);
-    map.entries.erase(found);
-    return value;
-}
-
-/// Adds the keys that `map` does not have.
-void add_missing(Node& map, const Node& from) {
-    for (const Entry& entry : from.entries) {
-        Node* own = map.find(entry.key);
-        if (own == nullptr) {
-            map.entries.push_back(entry);
-        } else if (own->kind == Node::Kind::map && entry.value.kind == Node::Kind::map) {
-            add_missing(*own, entry.value);
-        }
-    }
-}
-
-/// Repetitions by an alias keep the places of their keys.
-using Place = std::pair<int, int>;
-Place place_of(const Entry& entry) { return {entry.mark.line, entry.mark.column}; }
-
-/// `lines` may be null.
-template <class Do>
-void for_stations(Node* lines, const Do& todo) {
-    if (lines == nullptr) return;
-    for (Node& line : lines->items) {
-        Node* stations = line.find("stations");
-        if (stations == nullptr) continue;
-        for (Node& station : stations->items) todo(station);
-    }
-}
-
-struct Template {
-    yaml::Mark mark;
-    Node body;
-    yaml::Size size;
-    bool used = false;
-};
-
-class Templates {
-  public:
-    explicit Templates(Loading& loading) : loading_(loading) {}
-
-    void read(Node& list) {
-        if (list.kind != Node::Kind::map && list.kind != Node::Kind::null) {
-            loading_.problems.add(list.mark,
-                                  "templates must be a map of stations by name, such as "
-                                  "templates: {meter: {profile: generic}}");
-        }
-        move_bodies(list);
-        for (Entry& entry : list.entries) read_one(entry);
-    }
-
-    void apply(Node& station) {
-        const auto named = take(station, "template");
-        if (!named) return;
-        if (named->kind != Node::Kind::scalar) {
-            loading_.problems.add(named->mark, "template must be the name of one of 'templates'");
-            return;
-        }
-        const auto found = templates_.find(named->scalar);
-        if (found == templates_.end()) {
-            loading_.problems.add(named->mark, unknown(named->scalar));
-            return;
-        }
-        found->second.used = true;
-        const bool had_room = has_room();
-        given_.nodes += found->second.size.nodes;
-        given_.text += found->second.size.text;
-        if (has_room()) {
-            add_missing(station, found->second.body);
-        } else if (had_room) {
-            loading_.problems.add(named->mark,
-                                  "templates give more than " + std::to_string(kMaxTemplateValues) +
-                                      " values, or " + std::to_string(kMaxTemplateText >> 20U) +
-                                      " MiB of text, to all stations together");
-        }
-    }
-
-    /// A merge key in `lines` may have used part of them.
-    std::vector<Node> take_unused(Node* lines) {
-        std::set<Place> taken;
-        for_stations(lines, [&](const Node& station) {
-            for (const Entry& entry : station.entries) taken.insert(place_of(entry));
-        });
-        std::vector<Node> unused;
-        for (auto& [name, one] : templates_) {
-            const bool merged = std::ranges::any_of(one.body.entries, [&](const Entry& entry) {
-                return taken.contains(place_of(entry));
-            });
-            if (one.used || merged) continue;
-            loading_.warn(one.mark, "no station has template: " + name);
-            if (one.body.kind == Node::Kind::map) unused.push_back(std::move(one.body));
-        }
-        return unused;
-    }
-
-  private:
-    bool has_room() const {
-        return given_.nodes <= kMaxTemplateValues && given_.text <= kMaxTemplateText;
-    }
-    /// Reports a station's keys that follow a name without a body, and takes them as that body.
-    void move_bodies(Node& list) {
-        const std::vector<std::string_view> keys = station_keys().names();
-        std::vector<Entry> kept;
-        for (Entry& entry : list.entries) {
-            Entry* name = kept.empty() ? nullptr : &kept.back();
-            const bool open = name != nullptr &&
-                              (name->value.kind == Node::Kind::null || opened_.contains(name->key));
-            if (!open || std::ranges::find(keys, entry.key) == keys.end()) {
-                kept.push_back(std::move(entry));
-                continue;
-            }
-            loading_.problems.add(entry.mark, "'" + entry.key + "' must be indented deeper than '" +
-                                                  name->key + "' (line " +
-                                                  std::to_string(name->mark.line) +
-                                                  "), whose body it is: type 2 blanks before it");
-            opened_.insert(name->key);
-            name->value.kind = Node::Kind::map;
-            name->value.entries.push_back(std::move(entry));
-        }
-        list.entries = std::move(kept);
-    }
-
-    void read_one(Entry& entry) {
-        if (!is_name(entry.key))
-            loading_.problems.add(entry.mark,
-                                  "the name of a template must be of a-z, 0-9 and '-', "
-                                  "not '" +
-                                      entry.key + '\'');
-        Node& body = entry.value;
-        if (body.kind != Node::Kind::map)
-            loading_.problems.add(body.mark,
-                                  "a template must be a map of a station's keys, such as "
-                                  "{profile: generic}");
-        for (const std::string_view own : {"id", "name", "template"}) {
-            const auto key = std::ranges::find(body.entries, own, &Entry::key);
-            if (key == body.entries.end()) continue;
-            loading_.problems.add(
-                key->mark,
-                "'" + std::string(own) + "' is a station's own: it cannot be in a template");
-            body.entries.erase(key);
-        }
-        const yaml::Size size = yaml::size_of(body);
-        templates_[entry.key] = {entry.mark, std::move(body), size, false};
-    }
-
-    std::string unknown(const std::string& typed) const {
-        const std::string text = "there is no template '" + typed + '\'';
-        if (templates_.empty())
-            return text + "; add 'templates', such as templates: {" + typed +
-                   ": {profile: generic}}";
-        std::vector<std::string_view> names;
-        for (const auto& [name, one] : templates_) names.push_back(name);
-        return text + did_you_mean(typed, names, "templates");
-    }
-
-    Loading& loading_;
-    std::map<std::string, Template> templates_;
-    yaml::Size given_;
-    std::set<std::string> opened_;  ///< names whose bodies are not indented
-};
-
-}  // namespace
-
-std::vector<Node> apply_templates(Loading& loading, Node& tree) {
-    Templates templates(loading);
-    if (auto list = take(tree, "templates")) templates.read(*list);
-    Node* lines = tree.find("lines");
-    for_stations(lines, [&](Node& station) { templates.apply(station); });
-    return templates.take_unused(lines);
-}
-
-namespace {
-
-using yaml::MapReader;
-
 constexpr std::string_view kNameLetters = "abcdefghijklmnopqrstuvwxyz0123456789-";
-
-/// The shipped profiles; those of profiles_dir are added or replace them.
-std::shared_ptr<const profile::Catalogue> load_profiles(Loading& loading, MapReader& root) {
-    auto catalogue = std::make_shared<profile::Catalogue>(profile::Catalogue::shipped());
-    const auto dir = root.text("profiles_dir");
-    if (!dir) return catalogue;
-    loading.config.profiles_dir = *dir;
-    for (const std::string& fault :
-         add_profiles(loading.path_of(*dir), loading.files, *catalogue, loading.problems)) {
-        root.problem("profiles_dir", "profiles_dir: " + fault);
-    }
-    return catalogue;
-}
 
 /// Removes `x-` keys, where users may keep anchors.
 void drop_extensions(yaml::Node& tree) {
@@ -265,7 +69,7 @@ bool is_http(std::string_view key) {
 
 constexpr std::array<std::string_view, 4> kServing{"modbus_tcp", "http", "serial_masters", "mqtt"};
 
-bool serves(MapReader& root) {
+bool serves(Reader& root) {
     return std::ranges::any_of(kServing, [&](std::string_view key) {
         const yaml::Node* node = root.child(key);
         return node != nullptr &&
@@ -282,49 +86,210 @@ void keep_profiles(Config& config) {
 }
 
 /// Something must be served, unless a key is probably mistyped.
-void check_servers(Loading& loading, MapReader& root, const yaml::Node& tree) {
+void check_servers(Reader& root, const Node& tree) {
     const bool mistyped = root.is_mistyped("modbus_tcp") || root.is_mistyped("http") ||
                           std::ranges::any_of(tree.entries, [](const yaml::Entry& entry) {
                               return is_http(entry.key);
                           });
     if (!serves(root) && !mistyped)
-        loading.problems.add({1, 1},
-                             "nothing to serve: add 'modbus_tcp' or 'http', such as modbus_tcp: "
-                             "[{listen: 127.0.0.1:502}]");
+        root.problems().add({1, 1},
+                            "nothing to serve: add 'modbus_tcp' or 'http', such as modbus_tcp: "
+                            "[{listen: 127.0.0.1:502}]");
 }
 
-void load_tree(Loading& loading, yaml::Node& tree) {
+// The rows of the file
+
+/// The shipped profiles; those of profiles_dir are added or replace them.
+bool read_profiles(Reader& root, Config& config) {
+    auto catalogue = std::make_shared<profile::Catalogue>(profile::Catalogue::shipped());
+    if (const auto dir = root.text("profiles_dir")) {
+        config.profiles_dir = *dir;
+        for (const std::string& fault : add_profiles(root.loading.path_of(*dir), root.loading.files,
+                                                     *catalogue, root.problems()))
+            root.problem("profiles_dir", "profiles_dir: " + fault);
+    }
+    config.profiles = std::move(catalogue);
+    return root.has("profiles_dir");
+}
+
+constexpr std::string_view kLineListExample = "[{name: floor1, device: /dev/ttyUSB0}]";
+
+void refuse_no_lines(Reader& root) {
+    root.problems().add(root.mark("lines"),
+                        "a configuration needs at least one line in 'lines', such as lines: " +
+                            std::string(kLineListExample));
+}
+
+/// Missing lines are reported, unless a key is probably a mistyped `lines`.
+bool read_lines(Reader& root, Config& config) {
+    const Node* list = root.sequence("lines", kLineListExample);
+    if (list == nullptr && root.is_mistyped("lines")) return false;
+    root.loading.names_missing = list == nullptr && root.child("lines") != nullptr;
+    if (root.loading.names_missing) return false;
+    if (list == nullptr || list->items.empty()) return refuse_no_lines(root), false;
+    for (const Node& node : list->items)
+        if (auto line = load_line(root, node)) config.lines.push_back(std::move(*line));
+    return true;
+}
+
+const Keys<rt::LogSettings>& log_keys() {
+    using Log = rt::LogSettings;
+    static constexpr Words<rt::LogLevel, 5> kLevels{{{"error", rt::LogLevel::error},
+                                                     {"warn", rt::LogLevel::warn},
+                                                     {"info", rt::LogLevel::info},
+                                                     {"debug", rt::LogLevel::debug},
+                                                     {"trace", rt::LogLevel::trace}}};
+    static constexpr Words<rt::LogFormat, 2> kFormats{
+        {{"text", rt::LogFormat::text}, {"json", rt::LogFormat::json}}};
+    static const auto kKeys =
+        Keys<Log>()
+            .word("level", &Log::level, kLevels, "Lowest severity that is logged.")
+            .example("info")
+            .word("format", &Log::format, kFormats, "text for people, json for programs.");
+    return kKeys;
+}
+
+const Keys<rt::RealtimeSettings>& realtime_keys() {
+    using Realtime = rt::RealtimeSettings;
+    static const auto kKeys =
+        Keys<Realtime>()
+            .integer("priority", &Realtime::priority, 0, 99,
+                     "Priority of SCHED_FIFO, which needs CAP_SYS_NICE; 0: none.")
+            .example("20")
+            .boolean("lock_memory", &Realtime::lock_memory,
+                     "Keeps all memory in RAM (mlockall), which needs CAP_IPC_LOCK.");
+    return kKeys;
+}
+
+/// A section that a file may leave out: its map is read into the member that then exists.
+template <class T, class U>
+auto optional_section(std::string_view key, std::string_view example,
+                      std::optional<T> Config::* member, const Keys<T, U>& (*table)()) {
+    return [=](Reader& root, Config& config) {
+        const Node* node = root.map(key, example);
+        if (node == nullptr) return false;
+        Reader in(root.loading, *node, std::string(key));
+        in.elsewhere(root.loading.top_keys);
+        table().read(in, (config.*member).emplace());
+        in.finish();
+        return true;
+    };
+}
+
+template <class T, class U>
+auto shown_section(std::string_view key, std::optional<T> Config::* member,
+                   const Keys<T, U>& (*table)()) {
+    return [=](const SettingWriter& out, const Config& config, const SettingWriter*) {
+        if (config.*member) table().show(out.item(key), *(config.*member));
+    };
+}
+
+void check_http(Reader& root, const Config& config) {
+    const Node* node = root.child("http");
+    if (!config.http || config.http->port == 0) return;
+    const Node* listen = node->find("listen");
+    const std::string first = root.loading.firsts.again(
+        "listener " + config.http->name(), listen == nullptr ? node->mark : listen->mark);
+    if (!first.empty())
+        root.problems().add(listen == nullptr ? node->mark : listen->mark,
+                            config.http->name() + " is a modbus_tcp listener already" + first);
+}
+
+}  // namespace
+
+const Keys<Config>& root_keys() {
+    KeyShape lines = shape_of("lines", Kind::list, "Serial lines, at least one.");
+    lines.required = true;
+    lines.may_be_null = false;
+    lines.fewest = 1;
+    static const auto kKeys =
+        Keys<Config>()
+            .value(shape_of("profiles_dir", Kind::text,
+                            "Folder of further panel profiles, relative to this file; its *.yaml "
+                            "add to the shipped ones or replace them."),
+                   read_profiles, [](const Config& config) { return config.profiles_dir; })
+            .below(shape_of("templates", Kind::map,
+                            "Keys that many stations share, by the template's name: all of a "
+                            "station's but id and name."),
+                   {}, [](Reader& root, Config&) { return root.has("templates"); }, {})
+            .below(
+                lines, []() -> const Table& { return line_keys(); }, read_lines,
+                [](const SettingWriter& out, const Config& config, const SettingWriter*) {
+                    for (const Line& line : config.lines)
+                        line_keys().show(out.item("lines", line.name), line);
+                })
+            .maps("modbus_tcp", &Config::modbus_tcp, listener_keys, "[{listen: 127.0.0.1:502}]",
+                  yaml::MapReader::kAnyNumber, load_listener, &tcp_server::Settings::name,
+                  "Listeners for Modbus/TCP.")
+            .maps("serial_masters", &Config::serial_masters, master_keys,
+                  "[{name: plc, device: /dev/ttyUSB1, lines: [floor1]}]",
+                  yaml::MapReader::kAnyNumber, load_master, &serial_server::Settings::name,
+                  "Masters that ask on serial ports of their own, such as a PLC.")
+            .below(
+                shape_of("http", Kind::map, "REST API, dashboard and metrics."),
+                []() -> const Table& { return http_keys(); },
+                optional_section("http", "{listen: 127.0.0.1:8080}", &Config::http, http_keys),
+                shown_section("http", &Config::http, http_keys))
+            .below(
+                shape_of("mqtt", Kind::map, "Values published at an MQTT broker."),
+                []() -> const Table& { return mqtt_keys(); }, load_mqtt,
+                [](const SettingWriter& out, const Config& config, const SettingWriter*) {
+                    if (!config.mqtt) return;
+                    mqtt_keys().show(out.item("mqtt"), *config.mqtt);
+                    if (!config.mqtt->password.empty())
+                        out.below("mqtt").put_secret("password", config.mqtt->password);
+                })
+            .change_needs(kConnectsAnew)
+            .map("access", &Config::access, access_keys,
+                 "{default: allow, rules: [{name: a, deny: [write]}]}",
+                 "Who may do what: the first rule that matches decides.")
+            .not_empty("leave it out for no rules")
+            .below(
+                shape_of("relays", Kind::list, "Values that are copied from panel to panel."),
+                []() -> const Table& { return relay_keys(); }, load_relays,
+                [](const SettingWriter& out, const Config& config, const SettingWriter*) {
+                    for (const points::Relay& relay : config.relays)
+                        relay_keys().show(out.item("relays", relay.name()), relay);
+                })
+            .in_schema([](KeyShape& shape) { shape.most_entries = points::kMaxRelays; })
+            .map("log", &Config::log, log_keys, "{level: info}", "Log on stderr.")
+            .map("realtime", &Config::realtime, realtime_keys, "{priority: 20, lock_memory: true}",
+                 "Priority over other programs, so that frames are on time.")
+            .change_needs(kNextStart)
+            .below(
+                shape_of("audit", Kind::map,
+                         "Record of what was done, by whom, in a file that can be proven."),
+                []() -> const Table& { return audit_keys(); },
+                optional_section("audit", "{file: /var/log/panelgate/audit.jsonl}", &Config::audit,
+                                 audit_keys),
+                shown_section("audit", &Config::audit, audit_keys))
+            .not_empty("give file, or leave it out");
+    return kKeys;
+}
+
+namespace {
+
+void load_tree(Loading& loading, Node& tree) {
     yaml::resolve_merge_keys(tree, loading.problems);
     drop_extensions(tree);
-    const std::vector<yaml::Node> unused = apply_templates(loading, tree);
-    if (yaml::Description* description = loading.problems.description()) description->begin(tree);
-    MapReader root(tree, loading.problems, "the configuration");
-    if (tree.kind != yaml::Node::Kind::map) return;
+    const std::vector<Node> unused = apply_templates(loading, tree);
+    Reader root(loading, tree, "the configuration");
+    if (tree.kind != Node::Kind::map) return;
+    root.top = true;
     for (const std::string_view key : root_keys().names())
         loading.top_keys.push_back({key, {}, "the top level", {}, {}, tree.mark.column});
-    loading.config.profiles = load_profiles(loading, root);
-    load_lines(loading, root);
-    keep_profiles(loading.config);
-    for (const yaml::Node& body : unused) check_template(loading, body);
-    load_own_roles(loading, root);
-    load_modbus_tcp(loading, root);
-    load_serial_masters(loading, root);
-    load_http(loading, root);
-    load_mqtt(loading, root);
-    load_rules(loading, root);
-    load_section(loading, root, "log", "{level: info}",
-                 [&](MapReader& in) { log_keys().read(in, loading.config.log); });
-    load_section(loading, root, "realtime", "{priority: 20, lock_memory: true}",
-                 [&](MapReader& in) { realtime_keys().read(in, loading.config.realtime); });
-    load_audit(loading, root);
-    load_relays(loading, root);
-    check_servers(loading, root, tree);
-    root.elsewhere(kElsewhere);
-    root.has("templates");  // known, though already resolved
+    load_own_roles(loading, tree);
     root_keys().read(root, loading.config);
+    keep_profiles(loading.config);
+    for (const Node& body : unused) check_template(loading, body);
+    check_http(root, loading.config);
+    check_servers(root, tree);
+    root.elsewhere(kElsewhere);
     root.finish();
-    if (loading.problems.empty() && loading.config.lines.empty()) refuse_no_lines(loading, root);
-    if (loading.problems.empty()) warn_of_listeners(loading, tree);
+    if (!loading.problems.empty()) return;
+    if (loading.config.lines.empty()) return refuse_no_lines(root);
+    warn_of_rules(loading);
+    warn_of_listeners(loading, tree);
 }
 
 /// Adds all of `unset` and those of `found` that do not merely follow from it (at the same place).
@@ -359,21 +324,20 @@ std::string pattern_of(std::string_view letters) {
 
 std::string name_pattern() { return pattern_of(kNameLetters); }
 
-std::optional<std::string> load_name(MapReader& in, bool required, const std::string& pattern) {
-    auto name = required ? in.required_text("name") : in.text("name");
-    in.looks_like("name", pattern, true);
-    if (!name || is_name(*name)) return name;
-    in.problem("name",
-               "name must be of a-z, 0-9 and '-', not " + yaml::quote(*name) + name_hint(*name));
-    return std::nullopt;
+std::string name_fault(std::string_view typed) {
+    if (is_name(typed)) return "";
+    return "name must be of a-z, 0-9 and '-', not " + yaml::quote(typed) + name_hint(typed);
 }
 
-std::string load_unique_name(Loading& loading, MapReader& in, const std::string& what) {
-    std::string name = load_name(in, true).value_or("");
+const Form& name_form() {
+    static const Form kForm{name_pattern(), true, 0, name_fault};
+    return kForm;
+}
+
+void check_unique(Reader& in, const std::string& what, const std::string& name) {
     if (!name.empty())
-        loading.firsts.once(in, "name", what + ' ' + name,
-                            "there are two " + what + "s '" + name + '\'');
-    return name;
+        in.loading.firsts.once(in, "name", what + ' ' + name,
+                               "there are two " + what + "s '" + name + '\'');
 }
 
 std::string name_hint(std::string_view typed) {
@@ -386,20 +350,6 @@ std::string name_hint(std::string_view typed) {
         if (is_name(one)) name += one;
     }
     return name.empty() ? "" : "; write " + name;
-}
-
-std::optional<bool> load_read_only(MapReader& in) {
-    const yaml::Node* access = in.child("access");
-    if (access != nullptr && access->kind != yaml::Node::Kind::scalar) {
-        in.problem("access",
-                   "access here is read_write or read_only; rules by client and item are in the "
-                   "top-level 'access'");
-        return std::nullopt;
-    }
-    constexpr std::array<std::string_view, 2> kAccess{"read_write", "read_only"};
-    const auto chosen = in.choice_index("access", kAccess);
-    if (!chosen) return std::nullopt;
-    return *chosen == 1;
 }
 
 namespace {
@@ -417,11 +367,9 @@ std::optional<Config> load_text(std::string_view text, const Files& files, yaml:
     yaml::expand_variables(tree, environment, unset);
     refuse_control_characters(tree, unset);
     yaml::Problems found(problems.file());
-    found.describe(problems.description());
     Config config;
-    Loading loading{files, found, config, {}};
+    Loading loading{files, found, config};
     load_tree(loading, tree);
-    if (yaml::Description* description = problems.description()) description->forget();
     tell(unset, found, problems);
     if (!problems.empty()) return std::nullopt;
     apply_rules(config);

@@ -18,6 +18,7 @@
 namespace panelgate::config {
 
 using yaml::did_you_mean;
+struct LineContext;
 
 /// Where what may be there once was written first.
 class Firsts {
@@ -43,11 +44,15 @@ struct Loading {
     const Files& files;
     yaml::Problems& problems;
     Config& config;
-    std::set<std::string> station_names;
+    std::set<std::string> station_names{};
     /// `lines`, or a line's `stations`, was no list: names that are not known may be right.
     bool names_missing = false;
     Firsts firsts{};                          ///< "line floor1", "device /dev/ttyS1"
     std::vector<yaml::Elsewhere> top_keys{};  ///< of the file, for maps that may end unnoticed
+    LineContext* line = nullptr;              ///< that is being read
+    const Station* station = nullptr;         ///< that is being read
+    Firsts points{};                          ///< of that station
+    bool is_template = false;  ///< the body of a template is read as a station: it has no id
 
     /// The file that a text of the configuration names.
     std::string path_of(const std::string& typed) const { return beside(problems.file(), typed); }
@@ -65,31 +70,19 @@ struct Loading {
     }
 };
 
-/// Reads the map `key`, if it is there, by `load`; its other keys are unknown.
-template <class Load>
-void load_map(yaml::MapReader& in, std::string_view key, std::string_view example,
-              const Load& load) {
-    const yaml::Node* node = in.map(key, example);
-    if (node == nullptr) return;
-    yaml::MapReader inside(*node, in.problems(), std::string(key));
-    load(inside);
-    inside.finish();
-}
+/// A map of the file while its rows are read.
+class Reader : public yaml::MapReader {
+  public:
+    Reader(Loading& shared, const yaml::Node& node, std::string what, std::string_view example = {})
+        : MapReader(node, shared.problems, std::move(what), example), loading(shared) {}
 
-/// The same for a map at the top level: a key that belongs beside it is told so.
-template <class Load>
-void load_section(Loading& loading, yaml::MapReader& root, std::string_view key,
-                  std::string_view example, const Load& load) {
-    load_map(root, key, example, [&](yaml::MapReader& in) {
-        in.elsewhere(loading.top_keys);
-        load(in);
-    });
-}
+    void warn(std::string_view key, const std::string& message) {
+        loading.warn(mark(key), message);
+    }
 
-/// Warns at `device` if `device` and `other`, the device of `owner`, are two names of one adapter:
-/// only one owner can open an adapter (solax-modbus#1171).
-void warn_of_same_adapter(Loading& loading, yaml::MapReader& in, const std::string& device,
-                          const std::string& owner, const std::string& other);
+    Loading& loading;
+    bool top = false;  ///< the map is the whole file
+};
 
 /// Returns nullptr if there is none.
 const Line* find_line(const Config& config, std::string_view name);
@@ -98,31 +91,11 @@ const Line* find_line(const Config& config, std::string_view name);
 bool is_name(std::string_view text);
 /// Returns a regular expression for texts of these letters; a '-' must be the last of them.
 std::string pattern_of(std::string_view letters);
-/// Reads the key `name`; nothing if it is absent or invalid (a problem). `pattern` is for the
-/// schema.
-std::optional<std::string> load_name(yaml::MapReader& in, bool required,
-                                     const std::string& pattern = name_pattern());
-/// Reads the same, required, and reports one that is there before: "there are two rules 'a'"; "" if
-/// it is invalid.
-std::string load_unique_name(Loading& loading, yaml::MapReader& in, const std::string& what);
+/// Returns what is wrong with a name; "" if nothing is.
+std::string name_fault(std::string_view typed);
 /// Returns "; write big-press" for "Big Press"; "" if no letter is usable.
 std::string name_hint(std::string_view typed);
-/// Reads the key `access`: true for read_only.
-std::optional<bool> load_read_only(yaml::MapReader& in);
-
-/// Reports missing lines, unless a key is probably a mistyped `lines`: then call refuse_no_lines()
-/// if finish() accepted that key.
-void load_lines(Loading& loading, yaml::MapReader& root);
-void refuse_no_lines(Loading& loading, yaml::MapReader& root);
-void load_relays(Loading& loading, yaml::MapReader& root);
-void load_modbus_tcp(Loading& loading, yaml::MapReader& root);
-void load_serial_masters(Loading& loading, yaml::MapReader& root);
-void load_http(Loading& loading, yaml::MapReader& root);
-void load_mqtt(Loading& loading, yaml::MapReader& root);
-void load_audit(Loading& loading, yaml::MapReader& root);
-/// Needs lines, servers and masters loaded: rules name them.
-void load_rules(Loading& loading, yaml::MapReader& root);
-/// Gives each line its rules.
-void apply_rules(Config& config);
+/// Reports the second "rule 'a'", at its name.
+void check_unique(Reader& in, const std::string& what, const std::string& name);
 
 }  // namespace panelgate::config

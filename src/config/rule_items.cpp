@@ -1,10 +1,12 @@
-#include "rule_items.hpp"
+// The items that a rule of `access` is about.
 
 #include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "panelgate/profile/judge.hpp"
 #include "panelgate/profile/notation.hpp"
@@ -17,7 +19,6 @@ namespace {
 using access::Place;
 using access::Rule;
 using modbus::Span;
-using yaml::MapReader;
 using yaml::Node;
 
 constexpr Words<modbus::Table, 4> kTableWords{
@@ -38,10 +39,6 @@ void append(std::vector<Span>& to, const std::vector<Span>& more) {
         if (std::ranges::find(to, span) == to.end()) to.push_back(span);
     }
 }
-
-}  // namespace
-
-namespace {
 
 void append_in_all_tables(std::vector<Span>& to, const profile::Area& area, const Span& items) {
     append(to, {{area.table, items.first, items.count}});
@@ -74,17 +71,6 @@ std::vector<Span> shown(const profile::PanelProfile& profile, const Span& items,
     }
     return all;
 }
-
-}  // namespace
-
-std::vector<Span> shown_wholly(const profile::PanelProfile& profile, const Span& items) {
-    return shown(profile, items, true);
-}
-std::vector<Span> shown_in_part(const profile::PanelProfile& profile, const Span& items) {
-    return shown(profile, items, false);
-}
-
-namespace {
 
 /// GDT100-GDT199, or one item.
 struct Typed {
@@ -141,7 +127,7 @@ bool is_meant(const Rule& rule, const Place& place) {
 
 void add_items(Rule& rule, const Place& place, const profile::PanelProfile& profile,
                const Span& items) {
-    rule.items[place] = rule.allow ? shown_wholly(profile, items) : shown_in_part(profile, items);
+    rule.items[place] = rule.allow ? shown(profile, items, true) : shown(profile, items, false);
 }
 
 /// "holding-registers/100-109", as the map of the same is shown.
@@ -172,12 +158,12 @@ void add_everywhere(const Config& config, const Span& items, Rule& rule) {
     }
 }
 
-void load_notation(Loading& loading, MapReader& in, const std::string& text, Rule& rule) {
+void find_items(Reader& in, const std::string& text, Rule& rule) {
     const Typed typed = typed_range(text);
     if (const auto items = items_of_table(typed))
-        return add_everywhere(loading.config, *items, rule);
+        return add_everywhere(in.loading.config, *items, rule);
     std::string wrong;
-    for (const Line& line : loading.config.lines) {
+    for (const Line& line : in.loading.config.lines) {
         for (const Station& station : line.stations) {
             const Place place{line.name, station.id};
             if (!is_meant(rule, place)) continue;
@@ -195,44 +181,59 @@ void load_notation(Loading& loading, MapReader& in, const std::string& text, Rul
         wrong =
             "a notation needs listed stations, whose panels are known; write "
             "range: {table: holding-registers, address: 100, count: 10}";
-    if (!loading.names_missing) in.problem("range", wrong);
+    if (!in.loading.names_missing) in.problem("range", wrong);
 }
 
-void load_table_range(Loading& loading, const Node& node, Rule& rule) {
-    MapReader in(node, loading.problems, "range",
-                 "{table: holding-registers, address: 100, count: 10}");
-    if (in.required_text("table")) {
-        const auto table = in.choice<modbus::Table>("table", kTableWords);
-        const auto address = in.required_integer("address", 0, modbus::kTableItems - 1);
-        const auto count = in.integer("count", 1, modbus::kTableItems);
-        if (table && address) {
-            Span items{*table, static_cast<std::uint32_t>(*address),
-                       static_cast<std::uint32_t>(count.value_or(1))};
-            items.count = std::min(items.count, modbus::kTableItems - items.first);
-            add_everywhere(loading.config, items, rule);
-        }
-    }
-    in.about("table", "", "Table of the items.", "");
-    in.about("address", "", "Address of the first, from 0.", "");
-    in.about("count", "1", "How many.", "");
-    in.finish();
+/// `range` as a map.
+struct TableRange {
+    std::optional<modbus::Table> table;
+    std::int64_t address = 0;
+    std::int64_t count = 1;
+};
+
+const Keys<TableRange>& table_range_keys() {
+    static const auto kKeys =
+        Keys<TableRange>()
+            .value(words_shape("table", names_of(kTableWords), "Table of the items."),
+                   [](Reader& in, TableRange& range) {
+                       range.table = in.choice<modbus::Table>("table", kTableWords);
+                       return range.table.has_value();
+                   },
+                   {})
+            .required()
+            .example("holding-registers")
+            .integer("address", &TableRange::address, 0, modbus::kTableItems - 1,
+                     "Address of the first, from 0.")
+            .required()
+            .example("0")
+            .integer("count", &TableRange::count, 1, modbus::kTableItems, "How many.")
+            .example("500");
+    return kKeys;
 }
 
 }  // namespace
 
-void load_range(Loading& loading, MapReader& in, Rule& rule) {
-    yaml::KeyShape& schema = in.schema("range");
-    schema.may_be_text = true;
-    schema.may_be_null = false;
+const Table& table_range_table() { return table_range_keys(); }
+
+bool read_range(Reader& in, Rule& rule) {
     const Node* node = in.child("range");
-    if (node != nullptr && node->kind == Node::Kind::map) {
-        if (const Node* map = in.map("range")) load_table_range(loading, *map, rule);
-        return;
+    if (node == nullptr || node->kind != Node::Kind::map) {
+        const auto text = in.text("range");
+        if (!text) return false;
+        rule.range = *text;
+        find_items(in, *text, rule);
+        return true;
     }
-    const auto text = in.text("range");
-    if (!text) return;
-    rule.range = *text;
-    load_notation(loading, in, *text, rule);
+    Reader own(in.loading, *node, "range");
+    TableRange range;
+    const Given given = table_range_keys().read(own, range);
+    own.finish();
+    if (!given.has("address") || !range.table) return false;
+    Span items{*range.table, static_cast<std::uint32_t>(range.address),
+               static_cast<std::uint32_t>(range.count)};
+    items.count = std::min(items.count, modbus::kTableItems - items.first);
+    add_everywhere(in.loading.config, items, rule);
+    return true;
 }
 
 }  // namespace panelgate::config

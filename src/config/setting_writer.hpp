@@ -2,11 +2,13 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "panelgate/config/describe.hpp"
 #include "panelgate/config/setting.hpp"
 
 namespace panelgate::config {
@@ -17,20 +19,21 @@ class SettingWriter {
     explicit SettingWriter(std::vector<Setting>& settings)
         : settings_(&settings), map_(std::make_shared<const SettingMap>()) {}
 
-    /// `initial`: Row::initial.
-    void put(std::string_view key, std::string value,
-             std::optional<std::string_view> initial = {}) const {
-        add(key, std::move(value)).initial = initial;
+    /// `owner`: the map whose key of the same name counts where this one is left out, or null.
+    void put(const KeyShape& key, std::string value, const SettingWriter* owner) const {
+        Setting& made = add(key.path, std::move(value));
+        made.initial = key.initial;
+        if (owner != nullptr) made.otherwise = joined(owner->map_->path, key.path);
     }
-    /// Inherited from the same key of `owner` unless given itself.
-    void put(std::string_view key, std::string value, const SettingWriter& owner,
-             std::optional<std::string_view> initial = {}) const {
-        Setting& made = add(key, std::move(value));
-        made.initial = initial;
-        made.otherwise = joined(owner.map_->path, key);
-    }
+    /// A key that is not one of the table's.
+    void put(std::string_view key, std::string value) const { add(key, std::move(value)); }
     void put_secret(std::string_view key, std::string value) const {
         add(key, std::move(value)).secret = true;
+    }
+
+    std::size_t size() const { return settings_->size(); }
+    std::span<Setting> since(std::size_t first) const {
+        return std::span(*settings_).subspan(first);
     }
 
     /// A writer for a map of keys; the map itself is no setting.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -34,6 +35,16 @@ Findings find_traps(std::string_view text, const Lines& lines);
 /// Finds probable causes of a parser's error at the offset `error`, at the mistake: a parser often
 /// stops lines below. Empty: no cause is known.
 Findings find_causes(std::string_view text, const Lines& lines, std::size_t error);
+
+/// On which lines a slip is looked for.
+enum class On : std::uint8_t {
+    any,      ///< also of a text that the parser takes
+    refused,  ///< of a refused text
+    odd,      ///< of a refused text, where the line is neither a key nor an item
+};
+
+/// Returns the finding of the first slip of such lines that fits the text at `at`.
+std::optional<Finding> slip_of(std::string_view line, std::size_t at, On on);
 
 /// Returns `bytes`, which have the offsets of the text, with blanks for the tabs on empty lines and
 /// on lines with only a comment.

@@ -98,7 +98,6 @@ const Node* MapReader::find(std::string_view key) {
 bool MapReader::has(std::string_view key) { return find(key) != nullptr; }
 
 bool MapReader::require(std::string_view key) {
-    describe(key, [](KeyShape& shape) { shape.required = true; });
     if (has(key)) return true;
     if (is_mistyped(key)) {
         excused_.emplace_back(key);
@@ -121,18 +120,7 @@ const Node* MapReader::scalar(std::string_view key, std::string_view wanted) {
     return nullptr;
 }
 
-void MapReader::tell(std::string_view key, KeyShape shape) {
-    problems_->description()->tell(*node_, key, std::move(shape));
-}
-
-const Node* MapReader::below(std::string_view key, const Node* node) {
-    Description* description = problems_->description();
-    if (description != nullptr && node != nullptr) description->add_nested(*node_, key, *node);
-    return node;
-}
-
 std::optional<std::string> MapReader::text(std::string_view key) {
-    describe(key, KeyShape::Kind::text);
     const Node* node = scalar(key, "a text");
     if (node == nullptr) return std::nullopt;
     if (node->scalar.empty() || node->comma) {
@@ -149,11 +137,6 @@ std::optional<std::string> MapReader::required_text(std::string_view key) {
 
 std::optional<std::int64_t> MapReader::integer(std::string_view key, std::int64_t min,
                                                std::int64_t max) {
-    describe(key, [=](KeyShape& shape) {
-        shape.kind = KeyShape::Kind::integer;
-        shape.min = min;
-        shape.max = max;
-    });
     if (!has(key)) return std::nullopt;
     const std::string wanted =
         "a whole number from " + std::to_string(min) + " to " + std::to_string(max);
@@ -177,7 +160,6 @@ std::optional<std::int64_t> MapReader::required_integer(std::string_view key, st
 }
 
 std::optional<double> MapReader::number(std::string_view key) {
-    describe(key, KeyShape::Kind::number);
     const Node* node = scalar(key, "a number");
     if (node == nullptr) return std::nullopt;
     const std::string_view typed = without_plus(node->scalar);
@@ -193,8 +175,14 @@ std::optional<double> MapReader::number(std::string_view key) {
     return std::nullopt;
 }
 
+std::optional<double> MapReader::share(std::string_view key) {
+    const auto value = number(key);
+    if (!value || (*value >= 0 && *value <= 1)) return value;
+    problem(key, std::string(key) + " must be a share from 0 to 1, such as 0.1 for 10 %");
+    return std::nullopt;
+}
+
 std::optional<bool> MapReader::boolean(std::string_view key) {
-    describe(key, KeyShape::Kind::boolean);
     const Node* node = scalar(key, "true or false");
     if (node == nullptr) return std::nullopt;
     constexpr std::array<std::string_view, 3> kTrue{"true", "True", "TRUE"};
@@ -207,11 +195,6 @@ std::optional<bool> MapReader::boolean(std::string_view key) {
 }
 
 std::optional<Duration> MapReader::duration(std::string_view key, Duration min, Duration max) {
-    describe(key, [=](KeyShape& shape) {
-        shape.kind = KeyShape::Kind::duration;
-        shape.shortest = min;
-        shape.longest = max;
-    });
     const Node* node = scalar(key, "a duration such as 300ms");
     if (node == nullptr) return std::nullopt;
     const auto value = parse_duration(node->scalar);
@@ -228,10 +211,6 @@ std::optional<Duration> MapReader::duration(std::string_view key, Duration min, 
 std::optional<std::size_t> MapReader::choice_index(std::string_view key,
                                                    std::span<const std::string_view> words,
                                                    const Hint& hint) {
-    describe(key, [words](KeyShape& shape) {
-        shape.kind = KeyShape::Kind::word;
-        shape.words.assign(words.begin(), words.end());
-    });
     if (!has(key)) return std::nullopt;
     const Node* node = scalar(key, join(words));
     if (node == nullptr) return std::nullopt;
@@ -246,7 +225,6 @@ std::optional<std::size_t> MapReader::choice_index(std::string_view key,
 }
 
 bool MapReader::is_word(std::string_view key, std::string_view word) {
-    describe(key, [word](KeyShape& shape) { shape.words.emplace_back(word); });
     const Node* node = find(key);
     return node != nullptr && node->kind == Node::Kind::scalar && node->scalar == word;
 }
@@ -257,10 +235,9 @@ const Node* MapReader::child(std::string_view key) {
 }
 
 const Node* MapReader::map(std::string_view key, std::string_view example) {
-    describe(key, KeyShape::Kind::map);
     const Node* node = child(key);
     parents_.emplace_back(key);
-    if (node == nullptr || node->kind == Node::Kind::map) return below(key, node);
+    if (node == nullptr || node->kind == Node::Kind::map) return node;
     const std::string text = text_hint(*node, '{') + none_hint(key, example, *node);
     const bool is_list = node->kind == Node::Kind::sequence && !node->items.empty() &&
                          std::ranges::all_of(node->items, [](const Node& item) {
@@ -273,24 +250,27 @@ const Node* MapReader::map(std::string_view key, std::string_view example) {
 }
 
 const Node* MapReader::sequence(std::string_view key, std::string_view example) {
-    describe(key, KeyShape::Kind::list);
     const Node* node = child(key);
     parents_.emplace_back(key);
-    if (node == nullptr || node->kind == Node::Kind::sequence) return below(key, node);
+    if (node == nullptr || node->kind == Node::Kind::sequence) return node;
     problem(key, wrong(key, "a list" + such_as(example), *node) + list_hint(*node, example));
     return nullptr;
 }
 
-std::vector<const Node*> MapReader::items(std::string_view key, std::string_view example,
-                                          std::string_view any) {
+std::span<const Node> MapReader::entries(std::string_view key, std::string_view example,
+                                         std::size_t most) {
+    const Node* list = sequence(key, example);
+    if (list == nullptr) return {};
+    if (most == kAnyNumber || list->items.size() <= most) return list->items;
+    problem(key, "at most " + std::to_string(most) + ' ' + std::string(key) + ", not " +
+                     std::to_string(list->items.size()));
+    return {};
+}
+
+std::vector<const Node*> MapReader::scalars(std::string_view key, std::string_view example) {
     std::vector<const Node*> all;
     const Node* list = sequence(key);
-    schema(key).fewest = 1;
-    refuse_empty(key, "list at least one, or leave it out for " + std::string(any));
     if (list == nullptr) return all;
-    if (list->items.empty())
-        problem(key,
-                std::string(key) + " must list at least one; leave it out for " + std::string(any));
     for (const Node& item : list->items) {
         if (item.kind == Node::Kind::scalar) {
             all.push_back(&item);
@@ -302,8 +282,17 @@ std::vector<const Node*> MapReader::items(std::string_view key, std::string_view
     return all;
 }
 
+std::vector<const Node*> MapReader::items(std::string_view key, std::string_view example,
+                                          std::string_view any) {
+    refuse_empty(key, "list at least one, or leave it out for " + std::string(any));
+    const Node* list = child(key);
+    if (list != nullptr && list->kind == Node::Kind::sequence && list->items.empty())
+        problem(key,
+                std::string(key) + " must list at least one; leave it out for " + std::string(any));
+    return scalars(key, example);
+}
+
 void MapReader::refuse_empty(std::string_view key, std::string_view instead) {
-    schema(key).may_be_null = false;
     not_empty_.emplace_back(key, instead);
 }
 
@@ -315,111 +304,6 @@ Mark MapReader::mark(std::string_view key) const {
 void MapReader::problem(std::string_view key, std::string message) {
     if (const Node* value = node_->find(key)) message += origin_hint(*value, message);
     problems_->add(mark(key), std::move(message));
-}
-
-namespace {
-
-struct Unit {
-    std::string_view name;
-    Duration length;
-};
-constexpr std::array<Unit, 4> kUnits{{{"min", 60s}, {"s", 1s}, {"ms", 1ms}, {"us", 1us}}};
-constexpr std::int64_t kMostOfUnit = 1'000'000'000;
-
-/// Pattern of the digits from `low` to `high`.
-std::string digit(char low, char high) {
-    if (low == high) return std::string(1, low);
-    return std::string("[") + low + '-' + high + ']';
-}
-
-std::string any_digits(std::size_t count) {
-    if (count == 0) return "";
-    return count == 1 ? "[0-9]" : "[0-9]{" + std::to_string(count) + '}';
-}
-
-/// Pattern of the numbers from `low` to `high`, which have the same length.
-std::string same_length(std::string_view low, std::string_view high) {
-    if (low.empty()) return "";
-    const std::size_t rest = low.size() - 1;
-    const bool from_all = low.substr(1).find_first_not_of('0') == low.npos;
-    const bool to_all = high.substr(1).find_first_not_of('9') == high.npos;
-    if (from_all && to_all) return digit(low[0], high[0]) + any_digits(rest);
-    if (low[0] == high[0]) return low[0] + ("(" + same_length(low.substr(1), high.substr(1)) + ')');
-    const std::string nines(rest, '9');
-    const std::string zeros(rest, '0');
-    const char first = static_cast<char>(low[0] + (from_all ? 0 : 1));
-    const char last = static_cast<char>(high[0] - (to_all ? 0 : 1));
-    std::string pattern;
-    if (!from_all) pattern = low[0] + ("(" + same_length(low.substr(1), nines) + ')');
-    if (first <= last)
-        pattern += (pattern.empty() ? "" : "|") + digit(first, last) + any_digits(rest);
-    if (!to_all) pattern += "|" + (high[0] + ("(" + same_length(zeros, high.substr(1)) + ')'));
-    return pattern;
-}
-
-/// Pattern without anchors.
-std::string integers(std::int64_t min, std::int64_t max) {
-    std::string pattern;
-    while (min <= max) {
-        const std::string low = std::to_string(min);
-        const std::string high = std::to_string(max);
-        const bool longer = high.size() > low.size();
-        const std::string end = longer ? std::string(low.size(), '9') : high;
-        pattern += (pattern.empty() ? "" : "|") + same_length(low, end);
-        min = *parse_integer(end) + 1;
-    }
-    return pattern;
-}
-
-}  // namespace
-
-std::optional<std::int64_t> parse_integer(std::string_view text) {
-    const std::string_view digits = !text.empty() && text[0] == '-' ? text.substr(1) : text;
-    if (digits.empty() || (text.size() > 1 && digits[0] == '0')) return std::nullopt;
-    std::int64_t value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-    return value;
-}
-
-std::optional<Duration> parse_duration(std::string_view text) {
-    const std::size_t letters = text.find_first_not_of("0123456789");
-    if (letters == std::string_view::npos) return std::nullopt;
-    const auto count = parse_integer(text.substr(0, letters));
-    const auto unit = std::find_if(kUnits.begin(), kUnits.end(),
-                                   [&](const Unit& u) { return u.name == text.substr(letters); });
-    if (!count || unit == kUnits.end() || *count > kMostOfUnit) return std::nullopt;
-    if (*count > Duration::max() / unit->length) return std::nullopt;
-    return *count * unit->length;
-}
-
-std::string integer_pattern(std::int64_t min, std::int64_t max) {
-    return '(' + integers(min, max) + ')';
-}
-
-std::string duration_pattern(Duration min, Duration max) {
-    std::string pattern;
-    for (const Unit& unit : kUnits) {
-        const std::int64_t least = (min + unit.length - Duration(1)) / unit.length;
-        const std::int64_t most = std::min<std::int64_t>(max / unit.length, kMostOfUnit);
-        if (least > most) continue;
-        pattern +=
-            (pattern.empty() ? "(" : "|(") + integers(least, most) + ')' + std::string(unit.name);
-    }
-    return "^(" + pattern + ")$";
-}
-
-std::string format_duration(Duration duration) {
-    if (duration == Duration::zero()) return "0ms";
-    for (const Unit& unit : kUnits) {
-        if (duration % unit.length == Duration::zero())
-            return std::to_string(duration / unit.length) + std::string(unit.name);
-    }
-    return std::to_string(duration.count()) + "ns";
-}
-
-std::string format_milliseconds(Duration duration) {
-    return format_duration(std::chrono::ceil<std::chrono::milliseconds>(duration));
 }
 
 }  // namespace panelgate::yaml

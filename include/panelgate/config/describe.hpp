@@ -1,18 +1,66 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "panelgate/yaml/description.hpp"
+#include "panelgate/base/time.hpp"
 
 namespace panelgate::config {
 
 struct Setting;
+
+/// What values a key accepts, and what its documentation says.
+struct KeyShape {
+    enum class Kind : std::uint8_t { text, integer, number, boolean, duration, word, map, list };
+    /// Keys from the top, without list indexes: "lines/stations/id". In a row the key alone.
+    std::string path;
+    Kind kind = Kind::text;
+    bool required = false;
+    std::vector<std::string> words = {};  ///< of Kind::word; of other kinds, words besides
+    std::int64_t min = 0;  ///< of Kind::integer, and of holds_integers unless both are 0
+    std::int64_t max = 0;
+    Duration shortest{};  ///< of Kind::duration
+    Duration longest{};
+    std::optional<double> least{};  ///< of Kind::number
+    std::optional<double> most{};
+    std::optional<double> never{};
+
+    /// Whether the key may have no value; if not set, maps and lists may, as if they were absent.
+    std::optional<bool> may_be_null{};
+    std::size_t fewest = 0;        ///< entries of a list or map
+    std::size_t most_entries = 0;  ///< 0: no limit
+    /// Regular expression (ECMA 262) that a text, or those in a list or map, must match; "" none.
+    std::string pattern = {};
+    std::size_t longest_text = 0;  ///< characters; 0: no limit
+    bool may_be_number = true;     ///< the text may look like a number to YAML
+    bool holds_integers = false;   ///< a list of raw numbers
+    std::string keys = {};         ///< pattern for the keys of a map with free keys
+    std::string text = {};         ///< what it is for; one sentence
+    std::string initial = {};      ///< what leaving it out means, in the file's notation; or ""
+    std::string example = {};      ///< a value in the file's notation; or ""
+    std::string change = {};       ///< what a change of it needs beside a reload; or ""
+    int order = 0;                 ///< among the keys of its map
+    bool may_be_text = false;      ///< of Kind::map: a text says the same
+};
+
+/// A dependency between two keys of a map; a merge may supply the other.
+struct KeyRule {
+    std::string map;  ///< its path
+    std::string key;
+    std::string other;
+    /// With `needs`: if `key` has one of them, `other` must be present. Otherwise `key` may be
+    /// present only if `other` has one of them, or is absent and `absent_will_do`.
+    std::vector<std::string> words;
+    bool needs = false;
+    bool absent_will_do = false;
+};
 
 /// What changes of some keys need beside a reload.
 inline constexpr std::string_view kOpensPort = "the port is opened anew";
@@ -24,16 +72,15 @@ inline constexpr std::string_view kTlsRenewed = "for connections to come";
 /// The change of a key that a reload cannot take over (KeyShape::change).
 inline constexpr std::string_view kNextStart = "takes effect at the next start";
 
-/// Every key that load() reads, in that order: what a configuration may have. Without what is
-/// resolved earlier: templates, a station's `template`, `x-` keys, merges, variables.
+/// Every key of a configuration, as the rows of the tables say, each map before its keys.
 struct Described {
-    std::vector<yaml::KeyShape> keys;
-    std::vector<yaml::KeyRule> rules;
+    std::vector<KeyShape> keys;
+    std::vector<KeyRule> rules;
 
     /// nullptr: there is none at this path.
-    const yaml::KeyShape* find(std::string_view path) const;
+    const KeyShape* find(std::string_view path) const;
     /// The key of a setting, or the map or list that it is in; nullptr: none.
-    const yaml::KeyShape* of(const Setting& setting) const;
+    const KeyShape* of(const Setting& setting) const;
     /// "only with mode: kernel or rts", "not with type: bool", of a key whose presence depends on a
     /// neighbour; "" none.
     std::string condition_of(std::string_view key) const;

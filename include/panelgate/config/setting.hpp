@@ -15,7 +15,7 @@ namespace panelgate::config {
 /// A map of settings, or an entry of a list: where its settings belong in the file.
 struct SettingMap {
     std::string path;                         ///< as Setting::path
-    std::string keys;                         ///< yaml::KeyShape::path of the map, or of the list
+    std::string keys;                         ///< KeyShape::path of the map, or of the list
     std::shared_ptr<const SettingMap> above;  ///< null: the whole file
     bool in_list = false;                     ///< an entry of the list `keys`
 };
@@ -31,8 +31,9 @@ struct Setting {
     std::string otherwise = {};
     /// False: a file cannot have it beside the value of a neighbour; it has its default then.
     bool applies = true;
-    std::shared_ptr<const SettingMap> map = {};    ///< that it is in; of an entry, the entry itself
-    std::optional<std::string_view> initial = {};  ///< Row::initial; nothing of what has no row
+    std::shared_ptr<const SettingMap> map = {};  ///< that it is in; of an entry, the entry itself
+    std::optional<std::string_view> initial =
+        {};  ///< KeyShape::initial; nothing of what has no row
 
     bool is_entry() const { return path == map->path; }
     /// The last part of its path; "" of an entry.

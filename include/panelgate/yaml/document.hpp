@@ -14,8 +14,6 @@ std::string quote(std::string_view text);
 /// Returns text as it is typed for the value of a key: in quotes only where it needs them.
 std::string written(std::string_view text);
 
-class Description;
-
 /// A place in a file, 1-based, in characters, as editors count.
 struct Mark {
     int line = 1;
@@ -56,17 +54,12 @@ class Problems {
     /// the first kMaxShown, and how many others there are as the last one.
     std::vector<Problem> shown() const;
     const std::string& file() const { return file_; }
-    /// Sets where readers record the keys that they ask for; nullptr (the default): nowhere. Must
-    /// outlive this.
-    void describe(Description* description) { description_ = description; }
-    Description* description() const { return description_; }
     /// Returns shown(), one line each followed by its excerpt.
     std::string text() const;
 
   private:
     std::string file_;
     std::vector<Problem> list_;
-    Description* description_ = nullptr;
 };
 
 struct Entry;

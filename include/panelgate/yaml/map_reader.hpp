@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "panelgate/base/time.hpp"
-#include "panelgate/yaml/description.hpp"
 #include "panelgate/yaml/document.hpp"
 
 namespace panelgate::yaml {
@@ -39,11 +38,13 @@ class MapReader {
     MapReader(const MapReader&) = delete;
     MapReader& operator=(const MapReader&) = delete;
 
-    static constexpr std::size_t kAnyNumber = 0;
+    static constexpr std::size_t kAnyNumber = 0;  ///< of entries
     /// Returns more about a wrong value, for the end of the message.
     using Hint = std::function<std::string(std::string_view typed)>;
 
     bool has(std::string_view key);
+    /// Like has(), and absence is a problem.
+    bool require(std::string_view key);
     /// True if finish() will report a key that is probably this one, or belongs below it, which
     /// says more than that this key is missing.
     bool is_mistyped(std::string_view key) const;
@@ -90,35 +91,16 @@ class MapReader {
     const Node* sequence(std::string_view key, std::string_view example = {});
     /// The entries of a list, at most so many: "at most 64 relays, not 65". None if it is absent.
     std::span<const Node> entries(std::string_view key, std::string_view example,
-                                  std::size_t most = kAnyNumber, std::string_view what = {});
-    /// The scalars of a list that has one at least, as an empty one could mean all or none; `any`
-    /// says what leaving it out means.
+                                  std::size_t most = kAnyNumber);
+    /// The scalars of a list; other items are problems.
+    std::vector<const Node*> scalars(std::string_view key, std::string_view example);
+    /// The same of a list that has one at least, as an empty one could mean all or none; `any` says
+    /// what leaving it out means.
     std::vector<const Node*> items(std::string_view key, std::string_view example,
                                    std::string_view any);
     /// Lets finish() report a key without a value, or with all of it commented out, as it means
     /// neither "all" nor "none"; the message ends with `instead`.
     void refuse_empty(std::string_view key, std::string_view instead);
-
-    // Checks that the caller makes itself, recorded for a Description. Call them where the value is
-    // checked; all calls for one key add up.
-
-    /// The text, or those in a list or map, must match this regular expression (ECMA 262);
-    /// `number`: it may look like a number to YAML.
-    void looks_like(std::string_view key, std::string_view pattern, bool number = false);
-    /// The same for one of these words.
-    void looks_like_one_of(std::string_view key, std::span<const std::string_view> words);
-    /// What the key is for, what leaving it out means in the file's notation, and what a change of
-    /// it needs. The keys of a map are in the order of these calls.
-    void about(std::string_view key, std::string_view initial, std::string_view text,
-               std::string_view change);
-    /// What a Description records of a key, to be modified at once.
-    KeyShape& schema(std::string_view key);
-    /// True if `key` has this word and `other`, which it then needs, is absent.
-    bool lacks(std::string_view key, std::string_view word, std::string_view other);
-    /// `key` is allowed only if `other` has one of these words, or, with `absent`, is missing. True
-    /// if it is there all the same.
-    bool belongs(std::string_view key, std::string_view other,
-                 std::span<const std::string_view> words, bool absent = false);
 
     /// Adds keys that belong in another map, which finish() then names. Must outlive this.
     void elsewhere(std::span<const Elsewhere> keys) { elsewhere_.push_back(keys); }
@@ -128,6 +110,7 @@ class MapReader {
     Mark mark() const { return node_->mark; }
     void problem(std::string_view key, std::string message);
     Problems& problems() { return *problems_; }
+    const Node& node() const { return *node_; }
 
     /// Reports "KEY why" if a key of other versions is present; it is never suggested. `key` must
     /// outlive this.
@@ -137,22 +120,8 @@ class MapReader {
     void finish();
 
   private:
-    /// A shape is made only where somebody records it: a large file asks for a million keys.
-    template <class Fill>
-    void describe(std::string_view key, const Fill& fill) {
-        if (problems_->description() == nullptr) return;
-        KeyShape shape;
-        fill(shape);
-        tell(key, std::move(shape));
-    }
-    void describe(std::string_view key, KeyShape::Kind kind) {
-        describe(key, [kind](KeyShape& shape) { shape.kind = kind; });
-    }
-    void tell(std::string_view key, KeyShape shape);
-    const Node* below(std::string_view key, const Node* node);
     const Node* find(std::string_view key);
     const Node* scalar(std::string_view key, std::string_view wanted);
-    bool require(std::string_view key);
     std::string needs(std::string_view key) const;
     const Entry* shallow_parent(std::size_t entry) const;
     std::string is_unknown(std::string_view key) const;
@@ -169,7 +138,6 @@ class MapReader {
     std::vector<std::string> parents_;  ///< known keys with a map or a list
     std::vector<std::pair<std::string_view, std::string>> not_empty_;
     std::vector<std::span<const Elsewhere>> elsewhere_;
-    int order_ = 0;  ///< of about()
 };
 
 /// Returns "; did you mean 'x'?" if one of `known` is near, else "; known NOUN are a, b, c".

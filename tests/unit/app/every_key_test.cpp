@@ -181,7 +181,7 @@ std::string look_of(const std::string& text) {
 const std::vector<std::string>& words_of(const std::string& key) {
     static const auto kWordsOf = [] {
         std::map<std::string, std::vector<std::string>> all;
-        for (const yaml::KeyShape& shape : config::describe().keys) all[shape.path] = shape.words;
+        for (const config::KeyShape& shape : config::describe().keys) all[shape.path] = shape.words;
         return all;
     }();
     static const std::vector<std::string> kNone;
@@ -315,13 +315,13 @@ std::optional<config::Config> load_with(const char* base, const std::string& pat
 }
 
 /// Values that the key may have, by what the table says of it.
-std::vector<std::string> values_of(const yaml::KeyShape& key) {
+std::vector<std::string> values_of(const config::KeyShape& key) {
     std::vector<std::string> all = key.words;
-    if (key.kind == yaml::KeyShape::Kind::boolean) return {"true", "false"};
-    if (key.kind == yaml::KeyShape::Kind::integer)
+    if (key.kind == config::KeyShape::Kind::boolean) return {"true", "false"};
+    if (key.kind == config::KeyShape::Kind::integer)
         for (const std::int64_t value : {key.min, key.max, key.min + 1, key.max - 1})
             all.push_back(std::to_string(value));
-    if (key.kind == yaml::KeyShape::Kind::duration)
+    if (key.kind == config::KeyShape::Kind::duration)
         for (const Duration value : {key.shortest, key.longest, Duration(20ms), Duration(2s)})
             all.push_back(yaml::format_duration(value));
     std::istringstream words(kWords);
@@ -331,7 +331,7 @@ std::vector<std::string> values_of(const yaml::KeyShape& key) {
 
 /// True if some value of the key is not what leaving it out, or another value, means: of a key that
 /// none of these texts has.
-bool shows(const yaml::KeyShape& key) {
+bool shows(const config::KeyShape& key) {
     for (const char* base : {kPlain, kFurther}) {
         std::optional<config::Config> first = load_with(base, key.path, "");
         for (const std::string& value : values_of(key)) {
@@ -350,7 +350,7 @@ bool shows(const yaml::KeyShape& key) {
 /// `config get`, `check` as text and as JSON, and `GET /configuration` know it. What the documents
 /// and the schema have of it: test_reference.
 TEST(EveryKey, OfAConfigurationMakesADifference) {
-    using Kind = yaml::KeyShape::Kind;
+    using Kind = config::KeyShape::Kind;
     std::map<std::string, bool> keys;
     const std::string most = text_of(fs::path(TEST_DATA) / "every_key.yaml");
     std::list<Text> texts;  // leaves point into them
@@ -374,7 +374,7 @@ TEST(EveryKey, OfAConfigurationMakesADifference) {
     }
     EXPECT_GE(keys.size(), 120U);
     for (const auto& [key, differs] : keys) EXPECT_TRUE(differs) << key;
-    for (const yaml::KeyShape& key : config::describe().keys) {
+    for (const config::KeyShape& key : config::describe().keys) {
         const bool has_value = key.kind != Kind::map && key.kind != Kind::list;
         const bool is_template = key.path.find("template") != std::string::npos;
         if (has_value && !is_template && !keys.contains(key.path))
@@ -383,7 +383,7 @@ TEST(EveryKey, OfAConfigurationMakesADifference) {
 }
 
 TEST(EveryKey, MeansItsDefaultWhereItIsLeftOut) {
-    for (const yaml::KeyShape& key : config::describe().keys) {
+    for (const config::KeyShape& key : config::describe().keys) {
         if (key.initial.empty()) continue;
         const std::string& path = key.path;
         auto with = load_with(kPlain, path, key.initial);

@@ -12,7 +12,6 @@ namespace panelgate::config::describe_test {
 namespace {
 
 using testing::ElementsAre;
-using yaml::KeyShape;
 
 const KeyShape& shape(const std::string& path) {
     static const std::vector<KeyShape> kKeys = describe().keys;
@@ -56,7 +55,7 @@ TEST(Describe, KnowsWhatTheLoaderLooksAtItself) {
     EXPECT_EQ(shape("modbus_tcp/diagnostics_unit").may_be_null, true);
     EXPECT_NE(shape("serial_masters/units").keys, shape("modbus_tcp/units").keys);
     const auto rules = describe().rules;
-    EXPECT_TRUE(std::ranges::any_of(rules, [](const yaml::KeyRule& rule) {
+    EXPECT_TRUE(std::ranges::any_of(rules, [](const config::KeyRule& rule) {
         return rule.needs && rule.map == "lines/stations/points" && rule.key == "type" &&
                rule.other == "length";
     }));

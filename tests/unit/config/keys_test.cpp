@@ -2,8 +2,12 @@
 
 #include <gmock/gmock.h>
 
+#include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "memory_files.hpp"
+#include "setting_writer.hpp"
 
 namespace panelgate::config::keys_test {
 namespace {
@@ -32,30 +36,31 @@ const Keys<Lamp>& lamp_keys() {
             .share("share", &Lamp::share, "")
             .word("colour", &Lamp::colour, kColours, "")
             .initially("")
-            .other("place", "Where.", [](const Lamp& lamp) { return lamp.place; });
+            .text("place", &Lamp::place, {}, "Where.");
     return kKeys;
 }
 
 struct Reading {
     explicit Reading(const std::string& text) {
         const yaml::Node node = yaml::parse(text, problems);
-        problems.describe(&description);
-        description.begin(node);
-        yaml::MapReader in(node, problems, "a lamp");
+        Config config;
+        Loading loading{files, problems, config};
+        Reader in(loading, node, "a lamp");
         given = lamp_keys().read(in, lamp);
         in.finish();
-        keys = description.keys();
-    }
-    const yaml::KeyShape& shape(std::string_view key) const {
-        return *std::ranges::find(keys, key, &yaml::KeyShape::path);
     }
 
+    MemoryFiles files{{}};
     yaml::Problems problems{"x"};
-    yaml::Description description;
     Lamp lamp;
     Given given;
-    std::vector<yaml::KeyShape> keys;
 };
+
+const KeyShape& shape(std::string_view key) {
+    for (const Row& row : lamp_keys().rows())
+        if (row.shape.path == key) return row.shape;
+    throw std::out_of_range(std::string(key));
+}
 
 std::vector<std::string> shown(const Lamp& lamp) {
     std::vector<Setting> all;
@@ -85,13 +90,12 @@ TEST(Keys, KeepTheirDefaultsWhereTheyAreAbsentOrWrong) {
 }
 
 TEST(Keys, DescribeThemselves) {
-    const Reading read("{}");
-    EXPECT_EQ(read.shape("count").text, "How many.");
-    EXPECT_EQ(read.shape("count").initial, "3") << "of the struct";
-    EXPECT_EQ(read.shape("count").max, 9);
-    EXPECT_EQ(read.shape("every").initial, "2s");
-    EXPECT_EQ(read.shape("colour").initial, "");
-    EXPECT_EQ(read.shape("place").text, "Where.");
+    EXPECT_EQ(shape("count").text, "How many.");
+    EXPECT_EQ(shape("count").initial, "3") << "of the struct";
+    EXPECT_EQ(shape("count").max, 9);
+    EXPECT_EQ(shape("every").initial, "2s");
+    EXPECT_EQ(shape("colour").initial, "");
+    EXPECT_EQ(shape("place").text, "Where.");
     EXPECT_THAT(lamp_keys().names(),
                 ElementsAre("count", "every", "bright", "share", "colour", "place"));
 }
@@ -99,7 +103,7 @@ TEST(Keys, DescribeThemselves) {
 TEST(Keys, AreInheritedFromTheirOwner) {
     std::vector<Setting> all;
     const SettingWriter owner = SettingWriter(all).below("hall");
-    lamp_keys().show(owner.below("lamp"), {}, owner);
+    lamp_keys().show(owner.below("lamp"), {}, &owner);
     EXPECT_EQ(all[0].path, "hall/lamp/count");
     EXPECT_EQ(all[0].otherwise, "hall/count");
 }

@@ -12,12 +12,12 @@
 #include <utility>
 #include <vector>
 
-#include "load.hpp"
 #include "memory_files.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/tls/issue.hpp"
 #include "panelgate/yaml/document.hpp"
+#include "templates.hpp"
 
 namespace panelgate::config::load_test {
 namespace {
@@ -329,7 +329,7 @@ TEST(ConfigPoints, MorePointsThanTheLimitAreRefusedAtOnce) {
         problems_of(kFast + "    stations:\n      - {id: 1, profile: autonics-gplp-s, points: [" +
                     points + "]}\n" + kServe);
     ASSERT_EQ(problems.list().size(), 1U);
-    EXPECT_EQ(problems.list()[0].message, "at most 4096 points of one station, not 4097");
+    EXPECT_EQ(problems.list()[0].message, "at most 4096 points, not 4097");
 }
 
 std::string with_relays(const std::string& relays) {
@@ -397,7 +397,7 @@ Applied apply(const std::string& text) {
     const MemoryFiles files({});
     yaml::Problems problems("f");
     Config config;
-    Loading loading{files, problems, config, {}};
+    Loading loading{files, problems, config};
     yaml::Node tree = yaml::parse(text, problems);
     apply_templates(loading, tree);
     return {std::move(tree), problems.text()};

@@ -1,11 +1,10 @@
-#include "panelgate/yaml/description.hpp"
+// What MapReader says of keys that nobody has asked for.
 
 #include <algorithm>
 #include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "encoding.hpp"
@@ -16,134 +15,6 @@
 #include "panelgate/yaml/settings.hpp"
 
 namespace panelgate::yaml {
-
-namespace {
-
-std::string joined(const std::string& path, std::string_view key) {
-    return path.empty() ? std::string(key) : path + '/' + std::string(key);
-}
-
-}  // namespace
-
-const std::string* Description::path_of(const Node& map) const {
-    const auto found = paths_.find(&map);
-    return found == paths_.end() ? nullptr : &found->second;
-}
-
-KeyShape* Description::shape(const Node& map, std::string_view key) {
-    const std::string* path = path_of(map);
-    if (path == nullptr) return nullptr;
-    const std::string whole = joined(*path, key);
-    const auto found = std::ranges::find(keys_, whole, &KeyShape::path);
-    if (found != keys_.end()) return &*found;
-    keys_.emplace_back().path = whole;
-    return &keys_.back();
-}
-
-void Description::tell(const Node& map, std::string_view key, KeyShape shape) {
-    KeyShape* known = this->shape(map, key);
-    if (known == nullptr) return;
-    known->required = known->required || shape.required;
-    for (std::string& word : shape.words) {
-        if (std::ranges::find(known->words, word) == known->words.end())
-            known->words.push_back(std::move(word));
-    }
-    if (shape.kind == KeyShape::Kind::text) return;  // any scalar is a text
-    known->kind = shape.kind;
-    known->min = shape.min;
-    known->max = shape.max;
-    known->shortest = shape.shortest;
-    known->longest = shape.longest;
-}
-
-void Description::add_rule(const Node& map, KeyRule rule) {
-    const std::string* path = path_of(map);
-    if (path == nullptr) return;
-    rule.map = *path;
-    rules_.push_back(std::move(rule));
-}
-
-void Description::add_nested(const Node& map, std::string_view key, const Node& value) {
-    const std::string* path = path_of(map);
-    if (path == nullptr) return;
-    const std::string below = joined(*path, key);
-    paths_[&value] = below;
-    for (const Node& item : value.items) paths_[&item] = below;
-}
-
-KeyShape& MapReader::schema(std::string_view key) {
-    static thread_local KeyShape unrecorded;
-    Description* description = problems_->description();
-    KeyShape* told = description == nullptr ? nullptr : description->shape(*node_, key);
-    return told == nullptr ? unrecorded : *told;
-}
-
-void MapReader::looks_like(std::string_view key, std::string_view pattern, bool number) {
-    if (problems_->description() == nullptr) return;
-    KeyShape& told = schema(key);
-    told.pattern = pattern;
-    told.may_be_number = number;
-}
-
-void MapReader::looks_like_one_of(std::string_view key, std::span<const std::string_view> words) {
-    std::string pattern;
-    for (const std::string_view word : words)
-        pattern += (pattern.empty() ? "^(" : "|") + std::string(word);
-    looks_like(key, pattern + ")$");
-}
-
-void MapReader::about(std::string_view key, std::string_view initial, std::string_view text,
-                      std::string_view change) {
-    if (problems_->description() == nullptr) return;
-    KeyShape& told = schema(key);
-    told.text = text;
-    told.initial = initial;
-    told.change = change;
-    told.order = ++order_;
-}
-
-std::span<const Node> MapReader::entries(std::string_view key, std::string_view example,
-                                         std::size_t most, std::string_view what) {
-    const Node* list = sequence(key, example);
-    schema(key).most_entries = most;
-    if (list == nullptr) return {};
-    if (most == kAnyNumber || list->items.size() <= most) return list->items;
-    problem(key, "at most " + std::to_string(most) + ' ' + std::string(what) + ", not " +
-                     std::to_string(list->items.size()));
-    return {};
-}
-
-bool MapReader::lacks(std::string_view key, std::string_view word, std::string_view other) {
-    if (Description* description = problems_->description())
-        description->add_rule(
-            *node_, {{}, std::string(key), std::string(other), {std::string(word)}, true, false});
-    const Node* node = find(key);
-    return node != nullptr && node->scalar == word && !has(other);
-}
-
-bool MapReader::belongs(std::string_view key, std::string_view other,
-                        std::span<const std::string_view> words, bool absent) {
-    if (Description* description = problems_->description())
-        description->add_rule(*node_, {{},
-                                       std::string(key),
-                                       std::string(other),
-                                       {words.begin(), words.end()},
-                                       false,
-                                       absent});
-    const Node* value = node_->find(other);
-    const bool fits =
-        value == nullptr ? absent : std::ranges::find(words, value->scalar) != words.end();
-    return has(key) && !fits;
-}
-
-std::optional<double> MapReader::share(std::string_view key) {
-    const auto value = number(key);
-    schema(key).least = 0;
-    schema(key).most = 1;
-    if (!value || (*value >= 0 && *value <= 1)) return value;
-    problem(key, std::string(key) + " must be a share from 0 to 1, such as 0.1 for 10 %");
-    return std::nullopt;
-}
 
 namespace {
 

@@ -1,3 +1,5 @@
+// Relays: their rows, and what may not be copied.
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -8,8 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "load_stations.hpp"
-#include "panelgate/config/config.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/notation.hpp"
@@ -17,6 +17,11 @@
 #include "tables.hpp"
 
 namespace panelgate::config {
+
+namespace {
+
+using points::Relay;
+using yaml::Node;
 
 /// Where items really are, in bits: a panel may show the same memory as words and as bits.
 struct Memory {
@@ -33,12 +38,6 @@ struct Copy {
     Memory from;
     Memory to;
 };
-
-/// Returns the last of `copies` and those that bring an item of its source back to where it was, in
-/// that order; empty if there is no cycle. The others must have no cycle; no two targets overlap.
-std::vector<std::size_t> find_cycle(const std::vector<Copy>& copies);
-
-namespace {
 
 /// One bit of one panel.
 struct Item {
@@ -102,8 +101,8 @@ std::vector<std::size_t> in_order(std::vector<std::size_t> back, std::size_t las
     return once;
 }
 
-}  // namespace
-
+/// Returns the last of `copies` and those that bring an item of its source back to where it was, in
+/// that order; empty if there is no cycle. The others must have no cycle; no two targets overlap.
 std::vector<std::size_t> find_cycle(const std::vector<Copy>& copies) {
     const SourceTrace way(copies);
     const std::size_t last = copies.size() - 1;
@@ -127,15 +126,8 @@ std::vector<std::size_t> find_cycle(const std::vector<Copy>& copies) {
     return {};
 }
 
-namespace {
-
-using points::Relay;
-using points::RelayEnd;
-using yaml::MapReader;
-using yaml::Node;
-
 struct End {
-    RelayEnd end;
+    points::RelayEnd end;
     const Station* station = nullptr;
     const profile::Area* area = nullptr;
 };
@@ -147,70 +139,52 @@ struct Route {
 };
 
 const Station* find_station(const Config& config, std::string_view name) {
-    for (const Line& line : config.lines) {
-        for (const Station& station : line.stations) {
+    for (const Line& line : config.lines)
+        for (const Station& station : line.stations)
             if (station.name == name) return &station;
-        }
-    }
     return nullptr;
 }
 
-/// Suggests press/UW100 for floor1/press/UW100 and press.UW100.
-std::string end_hint(const Config& config, std::string_view typed) {
-    for (std::string_view rest = typed; !rest.empty();) {
-        const std::size_t end = rest.find_first_of("./");
-        if (end == rest.npos || end + 1 == rest.size()) return "";
-        const std::string name(rest.substr(0, end));
-        if (find_station(config, name) != nullptr)
-            return "; write " + name + '/' + std::string(rest.substr(end + 1));
-        rest.remove_prefix(end + 1);
-    }
-    return "";
-}
-
 /// STATION/NOTATION
-std::optional<End> load_end(Loading& loading, MapReader& in, std::string_view key) {
-    const auto text = in.required_text(key);
-    in.looks_like(key, "^[^/]+/.");
-    if (!text) return std::nullopt;
+bool read_end(Reader& in, std::string_view key, points::RelayEnd& end) {
+    const auto text = in.text(key);
+    if (!text) return false;
     const std::size_t slash = text->find('/');
     if (slash == text->npos || slash == 0 || slash + 1 == text->size()) {
         in.problem(key, std::string(key) + " must be STATION/NOTATION such as press/UW100, not " +
-                            yaml::quote(*text) + end_hint(loading.config, *text));
-        return std::nullopt;
+                            yaml::quote(*text));
+        return false;
     }
-    End end;
-    end.end.station = text->substr(0, slash);
-    end.end.at = text->substr(slash + 1);
-    end.station = find_station(loading.config, end.end.station);
-    if (end.station == nullptr && loading.names_missing) return std::nullopt;
+    end.station = text->substr(0, slash);
+    end.at = text->substr(slash + 1);
+    return true;
+}
+
+/// What an end names.
+std::optional<End> find_end(Reader& in, std::string_view key, const points::RelayEnd& named) {
+    const Loading& loading = in.loading;
+    End end{named, find_station(loading.config, named.station)};
     if (end.station == nullptr) {
-        std::vector<std::string_view> names(loading.station_names.begin(),
-                                            loading.station_names.end());
-        const std::string hint = end_hint(loading.config, *text);
-        in.problem(key, hint.empty()
-                            ? yaml::no_such("station", end.end.station, names)
-                            : "there is no station " + yaml::quote(end.end.station) + hint);
+        const std::vector<std::string_view> names(loading.station_names.begin(),
+                                                  loading.station_names.end());
+        if (!loading.names_missing) in.problem(key, yaml::no_such("station", named.station, names));
         return std::nullopt;
     }
     if (end.station->listens) {
-        in.problem(key, "station '" + end.end.station +
+        in.problem(key, "station '" + named.station +
                             "' is on a line that is only listened to (mode: listen): a relay can "
                             "neither read nor write there");
         return std::nullopt;
     }
-    const auto item = profile::parse_notation(*end.station->profile, end.end.at);
-    if (!item) {
-        in.problem(key, item.error().message);
-        return std::nullopt;
-    }
+    const auto item = find_item(in, key, named.at, *end.station->profile);
+    if (!item) return std::nullopt;
     end.area = item->area;
     end.end.table = item->area->table;
     end.end.address = item->address;
     return end;
 }
 
-void check_source(MapReader& in, const End& from, std::uint32_t count) {
+void check_source(Reader& in, const End& from, std::uint32_t count) {
     if (!from.area->readable.contains(from.end.address, count)) {
         in.problem("from", std::to_string(count) + " from " + from.end.at +
                                " reach beyond the end of " + from.area->name);
@@ -219,7 +193,7 @@ void check_source(MapReader& in, const End& from, std::uint32_t count) {
     check_read_count(in, "count", *from.station->profile, from.end.table, count);
 }
 
-void check_target(MapReader& in, const End& to, std::uint32_t count) {
+void check_target(Reader& in, const End& to, std::uint32_t count) {
     const bool bits = modbus::is_bit_table(to.end.table);
     if (!to.area->writable || !to.area->writable->contains(to.end.address, count)) {
         in.problem("to", std::to_string(count) + " from " + to.end.at + " cannot be written (" +
@@ -253,7 +227,7 @@ Memory memory_of(const End& end, std::uint32_t count) {
 
 /// Returns false and adds a problem if two relays write the same items: their value would be
 /// undefined.
-bool check_overlap(MapReader& in, const Route& route, const std::vector<Route>& others) {
+bool check_overlap(Reader& in, const Route& route, const std::vector<Route>& others) {
     for (const Route& other : others) {
         if (!route.to.overlaps(other.to)) continue;
         in.problem("to", "overlaps what the relay " + other.relay.name() + " writes");
@@ -263,7 +237,7 @@ bool check_overlap(MapReader& in, const Route& route, const std::vector<Route>& 
 }
 
 /// Returns false and adds a problem if it closes a cycle.
-bool check_loop(MapReader& in, const Route& route, const std::vector<Route>& others) {
+bool check_loop(Reader& in, const Route& route, const std::vector<Route>& others) {
     if (route.from.overlaps(route.to)) {
         in.problem("to", route.relay.to.at + " overlaps what the relay itself reads, " +
                              route.relay.from.at + ": its values would wander");
@@ -284,17 +258,16 @@ bool check_loop(MapReader& in, const Route& route, const std::vector<Route>& oth
     return false;
 }
 
-void load_relay(Loading& loading, const Node& node, std::vector<Route>& routes) {
-    MapReader in(node, loading.problems, "a relay", "{from: press/UW100, to: oven/GDT200}");
-    const auto from = load_end(loading, in, "from");
-    const auto to = load_end(loading, in, "to");
+void load_relay(Reader& root, const Node& node, Config& config, std::vector<Route>& routes) {
+    Reader in(root.loading, node, "a relay", "{from: press/UW100, to: oven/GDT200}");
     Relay relay;
-    relay_keys().read(in, relay);
-    if (in.has("refresh") && !relay.on_change) {
-        loading.warn(in.mark("refresh"),
-                     "refresh has no effect without on_change: true: this relay writes every turn");
-    }
+    const Given given = relay_keys().read(in, relay);
+    if (in.has("refresh") && !relay.on_change)
+        in.warn("refresh",
+                "refresh has no effect without on_change: true: this relay writes every turn");
     in.finish();
+    const auto from = given.has("from") ? find_end(in, "from", relay.from) : std::nullopt;
+    const auto to = given.has("to") ? find_end(in, "to", relay.to) : std::nullopt;
     if (!from || !to) return;
     relay.from = from->end;
     relay.to = to->end;
@@ -307,16 +280,47 @@ void load_relay(Loading& loading, const Node& node, std::vector<Route>& routes) 
     check_target(in, *to, relay.count);
     const Route route{relay, memory_of(*from, relay.count), memory_of(*to, relay.count)};
     if (check_overlap(in, route, routes) && check_loop(in, route, routes)) routes.push_back(route);
-    loading.config.relays.push_back(std::move(relay));
+    config.relays.push_back(std::move(relay));
 }
 
 }  // namespace
 
-void load_relays(Loading& loading, MapReader& root) {
+const Keys<Relay>& relay_keys() {
+    const auto text = [](const points::RelayEnd& end) {
+        return end.station.empty() ? "" : end.station + '/' + end.at;
+    };
+    const Form form{"^[^/]+/."};
+    static const auto kKeys =
+        Keys<Relay>()
+            .value(
+                text_shape("from", form, "Source: STATION/NOTATION, such as press/UW100."),
+                [](Reader& in, Relay& relay) { return read_end(in, "from", relay.from); },
+                [=](const Relay& relay) { return text(relay.from); })
+            .required()
+            .example("press/UW100")
+            .value(
+                text_shape("to", form, "Target: STATION/NOTATION."),
+                [](Reader& in, Relay& relay) { return read_end(in, "to", relay.to); },
+                [=](const Relay& relay) { return text(relay.to); })
+            .required()
+            .example("press/UW200")
+            .integer("count", &Relay::count, 1, 2040, "Number of registers or bits.")
+            .example("8")
+            .duration("every", &Relay::every, 1ms, points::kSlowest, "Interval between two reads.")
+            .example("1s")
+            .boolean("on_change", &Relay::on_change, "Writes only what has changed.")
+            .duration("refresh", &Relay::refresh, 1s, points::kSlowest,
+                      "With on_change: writes all again that often; what other clients write "
+                      "there is overwritten within a second.");
+    return kKeys;
+}
+
+bool load_relays(Reader& root, Config& config) {
     std::vector<Route> routes;
-    for (const Node& node : root.entries("relays", "[{from: press/UW100, to: oven/GDT200}]",
-                                         points::kMaxRelays, "relays"))
-        load_relay(loading, node, routes);
+    for (const Node& node :
+         root.entries("relays", "[{from: press/UW100, to: oven/GDT200}]", points::kMaxRelays))
+        load_relay(root, node, config, routes);
+    return !routes.empty();
 }
 
 }  // namespace panelgate::config
