@@ -105,7 +105,7 @@ must "build release" build release $units ON
 if [ $mode != quick ]; then
     long=ON
     # Optimization takes longer than it saves where no test waits for the code.
-    cold=-DPANELGATE_O0="panelgate;pg_app;pg_cli;pg_config;pg_doctor;pg_mbusd;pg_metrics;pg_mqtt;pg_plan;pg_points;pg_profile;pg_rt;pg_scan;pg_sim;pg_web_api;pg_web_http;pg_yaml"
+    cold=-DPANELGATE_O0="panelgate;pg_commands;pg_config;pg_doctor;pg_explain;pg_gateway;pg_mbusd;pg_metrics;pg_mqtt;pg_plan;pg_points;pg_profile;pg_rt;pg_scan;pg_sim;pg_web_api;pg_web_http;pg_yaml"
     [ $mode = nightly ] || long=OFF
     build_asan_meanwhile ON $long "$cold" -DPANELGATE_TEST_UBSAN=$long
 fi

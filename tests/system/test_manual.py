@@ -53,7 +53,7 @@ class Manual(unittest.TestCase):
 
     def test_each_exit_code_is_in_the_page(self):
         page = self.page("panelgate.1")
-        codes = (ROOT / "src/app/commands.hpp").read_text()
+        codes = (ROOT / "include/panelgate/explain/load.hpp").read_text()
         for code in re.findall(r"\bk\w+ = (\d+)", codes):
             self.assertIn(f"\n.It {code}\n", page)
 

@@ -1,4 +1,4 @@
-// What the keys of a file come to. Defaults of single keys: unit/app/every_key_test; faults:
+// What the keys of a file come to. Defaults of single keys: unit/explain/every_key_test; faults:
 // golden_test.
 #include <gmock/gmock.h>
 

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "panelgate/config/config.hpp"
+
+namespace panelgate::explain {
+
+/// Who may write where, a row for each way in; "" without rules.
+std::string rights_matrix(const config::Config& config);
+/// Warns of ways in by which somebody may write although rules deny it to others: no rule is about
+/// them.
+std::vector<std::string> open_doors(const config::Config& config);
+
+/// What decides on a request that is described in words.
+struct Explanation {
+    bool allowed = false;
+    std::string text;   ///< the rule with file and line, or what else decides
+    std::string wrong;  ///< what cannot be understood; then there is nothing else
+};
+/// `question`: "from=10.0.0.7 role=operator write press/UW102". `file` is named in the text.
+Explanation explain(const config::Config& config, const std::string& file,
+                    const std::string& question);
+
+}  // namespace panelgate::explain

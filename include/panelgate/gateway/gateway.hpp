@@ -1,0 +1,125 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "panelgate/base/time.hpp"
+#include "panelgate/bus/bus.hpp"
+#include "panelgate/config/config.hpp"
+#include "panelgate/explain/doors.hpp"
+#include "panelgate/gateway/audit_book.hpp"
+#include "panelgate/gateway/certificates.hpp"
+#include "panelgate/gateway/discoveries.hpp"
+#include "panelgate/gateway/northbound.hpp"
+#include "panelgate/gateway/running_line.hpp"
+#include "panelgate/gateway/scrapes.hpp"
+#include "panelgate/gateway/servers.hpp"
+#include "panelgate/gateway/snapshot.hpp"
+#include "panelgate/metrics/exposition.hpp"
+#include "panelgate/points/relays.hpp"
+#include "panelgate/rt/asio_clock.hpp"
+#include "panelgate/rt/process.hpp"
+#include "panelgate/web/api/server.hpp"
+#include "panelgate/web/http/event_hub.hpp"
+
+namespace panelgate::gateway {
+
+class Reloader;
+
+/// The composition root: builds the gateway from a configuration, and changes it when a reload
+/// brings a new one. One thread.
+class Gateway {
+  public:
+    /// `reloads` serves the reload requests of REST and outlives this.
+    Gateway(boost::asio::any_io_executor executor, std::shared_ptr<const config::Config> config,
+            bool simulate, Reloader* reloads);
+    Gateway(const Gateway&) = delete;
+    Gateway& operator=(const Gateway&) = delete;
+
+    /// Opens lines and listeners. Throws CannotListen if a listener cannot be opened; one whose
+    /// address does not exist yet is opened later.
+    void start();
+    /// Serves this configuration from now on; unchanged lines, listeners, clients and points are
+    /// not disturbed. Throws CannotListen, or std::system_error without a pty for a simulated line;
+    /// then nothing has changed. `shown`: its text for REST. Unchanged stations share their profile
+    /// with the running ones (config::share_profiles()).
+    void apply(std::shared_ptr<const config::Config> config, web::SharedText shown);
+    /// Records a reload, whatever became of it, and keeps the audit as it now is configured.
+    void record(const web::ReloadVerdict& verdict);
+    const std::shared_ptr<const config::Config>& config() const { return snapshot_->config; }
+    /// The certificates in use, which may be newer than the configuration's.
+    std::vector<ServedCertificate> certificates() const;
+    /// A reload has refused these files and says why: they are not logged again.
+    void refused_certificates(const std::vector<ServedCertificate>& files);
+    /// Stops accepting; accepted requests are answered within their deadline.
+    void stop_accepting();
+    /// True when no client's answer is outstanding and the broker knows of the end.
+    bool drained();
+    /// Connections with outstanding answers, once nothing more is accepted.
+    std::size_t pending_connections() const { return servers_.pending_connections(); }
+    /// The longest time that an accepted request may take to its answer.
+    Duration longest_answer() const;
+    /// The status text for the service manager.
+    std::string status() const;
+    /// Closes everything.
+    void stop();
+
+    std::uint16_t http_port() const { return servers_.http_port(); }
+    std::uint16_t modbus_port() const { return servers_.modbus_port(); }
+
+  private:
+    using Lines = std::vector<std::shared_ptr<RunningLine>>;
+
+    LineWatch watch();
+    void on_event(const std::string& line, const bus::BusEvent& event);
+    void on_points(const std::string& line, std::uint8_t station,
+                   const std::vector<std::size_t>& wants);
+    Lines lines_of(const config::Config& config);
+    void apply_lines(const config::Config& config, const Lines& lines);
+    void rest_wires(const config::Config& config, const Lines& lines);
+    void retire_lines(const Lines& lines);
+    void show(const std::shared_ptr<Snapshot>& snapshot);
+    web::Providers providers();
+    void watch_certificates();
+    void watch_tokens();
+    void judge_waiting();
+    bool copy_figures(metrics::Snapshot& figures, PointCopy& points,
+                      const Snapshot& snapshot) const;
+
+    boost::asio::any_io_executor executor_;
+    rt::AsioClock clock_;
+    rt::LoopLag lag_{clock_};
+    AuditBook audit_{executor_, clock_};  ///< lines record in it until they are destroyed
+    explain::Doors doors_;                ///< lines ask it until they are destroyed
+    bool simulate_;
+    Reloader* reloads_;
+    web::EventHub events_;  ///< buses publish to it until they are destroyed
+    /// The current snapshot, never null.
+    std::shared_ptr<Snapshot> snapshot_;
+    std::function<void(const std::string&, const bus::WriteEvent&)> relay_listener_;
+    /// Lines of earlier configurations too, closed: a client that still refers to one gets an
+    /// answer, and a line of the same name and mode reuses it. Requests that were cut off may keep
+    /// a snapshot, and so its lines, alive for longer than this.
+    struct KnownLines {
+        ~KnownLines();
+        std::map<std::pair<std::string, bool>, std::shared_ptr<RunningLine>> lines;
+    } known_;
+    std::unique_ptr<Discoveries> discoveries_;       ///< null until `http:` is configured
+    std::unique_ptr<LineHistories> line_histories_;  ///< the same
+    std::unique_ptr<points::Relays> relays_;
+    std::unique_ptr<Scrapes> scrapes_;  ///< null until `http:` is configured
+    Servers servers_;
+    Northbound northbound_;
+    std::unique_ptr<CertificateWatch> certificates_;           ///< null until a listener has `tls`
+    std::unique_ptr<rt::Alarm> expiry_ = clock_.make_alarm();  ///< of a token
+    WallTime expired_until_{};                                 ///< looked at for expiry so far
+    bool ready_ = false;
+};
+
+}  // namespace panelgate::gateway

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panelgate/bus/bus_client.hpp"
+#include "panelgate/config/config.hpp"
+#include "panelgate/explain/unit_map.hpp"
+#include "panelgate/points/station_points.hpp"
+#include "panelgate/sim/simulated_bus.hpp"
+#include "panelgate/tcp_server/unit_map.hpp"
+
+namespace panelgate::bus {
+class BusClient;
+}
+
+namespace panelgate::gateway {
+
+/// The device name of a simulated line.
+inline constexpr const char* kSimulatedDevice = "sim";
+
+/// A line of the plant. What it refers to outlives the plant.
+struct Line {
+    const config::Line* configured = nullptr;  ///< never null
+    std::string device;                        ///< as configured, or kSimulatedDevice
+    bus::BusClient* bus = nullptr;             ///< never null
+};
+
+/// A station that the configuration lists. What it refers to outlives the plant.
+struct Station : bus::StationRef {
+    const config::Station* configured = nullptr;  ///< never null
+    /// The bus that simulates its panel; null for a real one.
+    std::shared_ptr<sim::SimulatedBus> simulated;
+    std::optional<points::StationPoints> points;    ///< the values of its polls, if it has points
+    std::optional<points::StationHistory> history;  ///< their history, if REST is served
+    /// The unit id by which Modbus/TCP clients reach it: that of the first listener that has one.
+    std::optional<int> unit;
+};
+
+/// The lines and their stations, looked up by REST, /metrics, events and MQTT. Filled at load, then
+/// constant; its stations do not move.
+class Plant {
+  public:
+    /// Adds a line with all its stations. `simulated`: null for a real line.
+    void add(const config::Line& line, bus::BusClient& bus,
+             const std::shared_ptr<sim::SimulatedBus>& simulated);
+    /// Sets the unit ids of this listener for the stations that no earlier listener has reached.
+    void add_units(const tcp_server::UnitMap& units);
+
+    /// In the order of the configuration.
+    const std::deque<Line>& lines() const { return lines_; }
+    const std::deque<Station>& stations() const { return stations_; }
+
+    const Station* find(std::string_view name) const;
+    const Station* find(std::string_view line, std::uint8_t id) const;
+    /// Finds a station by Station::unit; if several have the same, the first one.
+    const Station* find_unit(int unit) const;
+    /// The station, which add() must have added; throws std::logic_error otherwise.
+    Station& at(std::string_view line, std::uint8_t id);
+    std::deque<Station>& stations() { return stations_; }
+    /// The station's name, or its id if it is not listed; "" for a broadcast (station 0).
+    std::string name_of(std::string_view line, std::uint8_t id) const;
+
+    /// The lines as listeners see them.
+    std::vector<tcp_server::LineInfo> listener_lines(
+        explain::Unlisted unlisted = explain::Unlisted::as_the_line) const;
+
+  private:
+    std::deque<Line> lines_;
+    std::deque<Station> stations_;
+};
+
+}  // namespace panelgate::gateway

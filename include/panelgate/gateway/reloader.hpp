@@ -1,0 +1,98 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "panelgate/base/time.hpp"
+#include "panelgate/config/config.hpp"
+#include "panelgate/config/counters.hpp"
+#include "panelgate/rt/clock.hpp"
+#include "panelgate/rt/process.hpp"
+#include "panelgate/web/api/sources.hpp"
+
+namespace panelgate::gateway {
+
+/// Reports that a file was replaced or changed, through all links: editors replace the file,
+/// Kubernetes redirects a link of a folder above. Polls it in a worker, because not every file
+/// system notifies; reports when two polls agree, so that the writer has finished. A file that has
+/// vanished is reported only when it is back. One thread; the clock outlives it.
+class FileWatch {
+  public:
+    static constexpr Duration kEvery = 1s;
+
+    FileWatch(boost::asio::any_io_executor executor, rt::Clock& clock, std::string path,
+              std::function<void()> changed);
+
+  private:
+    /// Device, inode, size and time of the last change in ns.
+    using Stamp =
+        std::optional<std::tuple<std::uint64_t, std::uint64_t, std::int64_t, std::int64_t>>;
+    static Stamp stamp_of(const std::string& path);
+    void later();
+    void look();
+    void judge(const Stamp& seen);
+
+    std::string path_;
+    std::function<void()> changed_;
+    rt::Clock& clock_;
+    std::unique_ptr<rt::Alarm> alarm_;
+    Stamp known_;  ///< last reported, or found at the start
+    Stamp seen_;   ///< of the last poll
+    rt::Worker worker_;
+    std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+};
+
+class Gateway;
+
+/// Reloads the file: reads, checks and compares it in a worker, applies it in one turn of the loop.
+/// A configuration that cannot be applied changes nothing. One reload at a time; requests that come
+/// meanwhile get the result of the next one. One thread.
+class Reloader final : public web::ReloadSource {
+  public:
+    /// `file`: the file read at the start; empty or `-`: it cannot be read again.
+    Reloader(boost::asio::any_io_executor executor, std::string file);
+    /// Call before any other function. The gateway lives as long as the loop runs.
+    void serve(Gateway& gateway);
+    /// `step` is called at the beginning of each reload, and at its end.
+    void on_step(std::function<void(bool begins)> step) { step_ = std::move(step); }
+
+    /// The program ends: a running reload is not applied, and no other one starts.
+    void stop() { stopping_ = true; }
+
+    std::string barred(bool rollback) const override;
+    void reload(web::ReloadWish wish, std::string cause, Handler handler) override;
+    std::shared_ptr<const web::ReloadVerdict> last() const override { return last_; }
+    const config::ReloadCounters& counters() const { return counters_; }
+    const std::string& file() const { return file_; }
+
+  private:
+    struct Job;
+    struct Waiting {
+        web::ReloadWish wish;
+        std::string cause;
+        Handler handler;
+    };
+
+    void begin();
+    void apply(const std::shared_ptr<Job>& job);
+    void end(const std::shared_ptr<Job>& job);
+
+    std::string file_;
+    Gateway* gateway_ = nullptr;
+    std::shared_ptr<const config::Config> before_;  ///< the previous one; null: none
+    std::vector<Waiting> waiting_;
+    std::vector<Waiting> served_;  ///< by the running reload
+    std::function<void(bool)> step_;
+    bool stopping_ = false;
+    std::shared_ptr<const web::ReloadVerdict> last_;
+    config::ReloadCounters counters_;
+    rt::Worker worker_;
+};
+
+}  // namespace panelgate::gateway

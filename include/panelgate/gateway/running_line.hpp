@@ -1,0 +1,109 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "panelgate/bus/bus.hpp"
+#include "panelgate/bus/bus_client.hpp"
+#include "panelgate/config/config.hpp"
+#include "panelgate/explain/translations.hpp"
+#include "panelgate/gateway/plant.hpp"
+#include "panelgate/points/poller.hpp"
+#include "panelgate/points/relays.hpp"
+#include "panelgate/points/settings.hpp"
+#include "panelgate/points/station_points.hpp"
+#include "panelgate/rt/clock.hpp"
+#include "panelgate/sim/simulated_bus.hpp"
+#include "panelgate/web/api/directory.hpp"
+
+namespace panelgate::gateway {
+
+/// The route of a relay whose stations the plant has; the configuration was checked.
+points::RelayRoute route_of(const Plant& plant, const points::Relay& relay);
+
+/// A simulated bus with the configured stations of a line.
+std::shared_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor executor,
+                                                 rt::Clock& clock, const config::Line& line);
+
+/// REST's access to the faults of a simulated panel; null for a real one (no bus).
+std::shared_ptr<const web::SimulatedPanel> simulated_panel(
+    const std::shared_ptr<sim::SimulatedBus>& bus, std::uint8_t station);
+
+/// Callbacks for what happens on a line, named by the line.
+struct LineWatch {
+    std::function<void(const std::string& line, const bus::BusEvent& event)> event;
+    /// These wants of a station's points have new values: indices of wants_of() in StationPoints.
+    std::function<void(const std::string& line, std::uint8_t station,
+                       const std::vector<std::size_t>& wants)>
+        points;
+    /// A write has ended; for an audit. May be empty.
+    std::function<void(const std::string& line, const bus::WriteEnd& end)> write{};
+    /// True while no write may be sent. May be empty.
+    std::function<bool()> refuses_writes{};
+    /// What doors say now. May be empty.
+    std::function<std::optional<bus::Admission>(const WhoRef& who, const std::string& line,
+                                                std::uint8_t station)>
+        admit{};
+};
+
+/// A running line: its bus, its simulated panels, and what is polled or heard on it. Its bus stays
+/// the same object through all reloads, so that its clients may keep a reference; the bus of a
+/// removed line is closed and stays. One thread.
+class RunningLine {
+  public:
+    /// `simulate`: simulate it whatever its device is. The clock outlives it. Throws
+    /// std::system_error if no pty is available.
+    RunningLine(boost::asio::any_io_executor executor, rt::Clock& clock, const config::Line& line,
+                bool simulate, LineWatch watch);
+    RunningLine(const RunningLine&) = delete;
+    RunningLine& operator=(const RunningLine&) = delete;
+
+    void start();
+    void stop();
+    /// Destroys its bus, poller and panels. Nothing else may be called after that.
+    void dispose();
+    /// Applies a new configuration; `before` is the running one. Opens the line again after stop().
+    void apply(const config::Line& before, const config::Line& now);
+
+    bus::LineBus& bus() { return *bus_; }
+    const bus::LineBus& bus() const { return *bus_; }
+    const std::shared_ptr<sim::SimulatedBus>& simulated() const { return simulated_; }
+    bool listens() const { return listens_; }
+    /// Its device, and former ones on which replies may still be outstanding; links resolved.
+    const std::set<std::string>& wires() const { return wires_; }
+    /// The values of a station's points; nothing without any. The configuration outlives them, this
+    /// object need not.
+    std::optional<points::StationPoints> points_of(const config::Station& station) const;
+
+  private:
+    bus::Settings settings_of(const config::Line& line);
+    std::unique_ptr<line::Line> make_wire(const config::Line& line);
+    void apply_points(const config::Line& line);
+    void forget_points();
+    void on_event(const std::string& line, const bus::BusEvent& event);
+    void hear(const std::string& line, const tap::Transaction& heard);
+
+    boost::asio::any_io_executor executor_;
+    rt::Clock& clock_;
+    bool simulate_;
+    bool listens_;
+    LineWatch watch_;
+    /// For a line that is only listened to, by station.
+    std::map<std::uint8_t, std::shared_ptr<points::HeardValues>> heard_;
+    std::function<void(const bus::WriteEvent&)> write_listener_;  ///< the poller's
+    std::shared_ptr<sim::SimulatedBus> simulated_;                ///< null for a real device
+    std::unique_ptr<bus::LineBus> bus_;       ///< calls the members above until it is destroyed
+    std::unique_ptr<points::Poller> poller_;  ///< null if nothing was ever polled
+    std::set<std::string> wires_;
+    bool running_ = false;
+};
+
+}  // namespace panelgate::gateway

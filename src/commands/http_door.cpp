@@ -1,0 +1,378 @@
+#include "http_door.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/connect.hpp>
+#include <boost/asio/error.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/write.hpp>
+#include <cstddef>
+#include <exception>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "commands.hpp"
+#include "panelgate/base/network.hpp"
+#include "panelgate/base/text.hpp"
+#include "panelgate/config/endpoint.hpp"
+#include "panelgate/config/real_files.hpp"
+#include "panelgate/explain/load.hpp"
+#include "panelgate/line/settings.hpp"
+#include "panelgate/metrics/process.hpp"
+#include "panelgate/tls/stream.hpp"
+#include "panelgate/web/http/gzip.hpp"
+#include "panelgate/yaml/document.hpp"
+#include "panelgate/yaml/map_reader.hpp"
+
+namespace panelgate::commands {
+
+namespace {
+
+constexpr std::string_view kHttp = "http:";
+constexpr std::string_view kListen = "listen:";
+constexpr std::string_view kBlank = " \t";
+
+bool is_one_of(std::string_view set, char c) { return set.find(c) != std::string_view::npos; }
+
+std::string_view without_indent(std::string_view text) {
+    return text.substr(std::min(text.find_first_not_of(kBlank), text.size()));
+}
+
+std::string_view without_comment(std::string_view line) {
+    if (without_indent(line).starts_with('#')) return {};
+    return line.substr(0, line.find(" #"));
+}
+
+std::vector<std::string_view> lines_of(std::string_view text) {
+    std::vector<std::string_view> lines;
+    while (!text.empty()) {
+        const std::size_t end = text.find_first_of("\r\n");
+        lines.push_back(without_comment(text.substr(0, end)));
+        text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    }
+    return lines;
+}
+
+/// The value after a key, without quotes.
+std::string value_in(std::string_view text) {
+    text = without_indent(text);
+    const bool quoted = text.starts_with('"') || text.starts_with('\'');
+    const std::string_view ends = quoted ? text.substr(0, 1) : std::string_view(" \t,}");
+    if (quoted) text.remove_prefix(1);
+    return std::string(text.substr(0, text.find_first_of(ends)));
+}
+
+/// The value of `listen:` directly inside the outermost braces of a line.
+std::optional<std::string> in_braces(std::string_view line) {
+    int depth = 0;
+    for (std::size_t at = 0; at < line.size(); ++at) {
+        if (is_one_of("{[", line[at])) ++depth;
+        if (is_one_of("}]", line[at])) --depth;
+        const bool begins = at > 0 && is_one_of(" \t{,", line[at - 1]);
+        if (depth == 1 && begins && line.substr(at).starts_with(kListen))
+            return value_in(line.substr(at + kListen.size()));
+    }
+    return std::nullopt;
+}
+
+/// The value of `listen:` with the indentation of the block's first key.
+std::optional<std::string> in_block(const std::vector<std::string_view>& lines, std::size_t first) {
+    std::optional<std::size_t> indent;
+    for (std::size_t i = first; i < lines.size(); ++i) {
+        const std::string_view key = without_indent(lines[i]);
+        if (key.empty()) continue;
+        const std::size_t here = lines[i].size() - key.size();
+        if (here == 0) break;
+        if (!indent) indent = here;
+        if (here == *indent && key.starts_with(kListen))
+            return value_in(key.substr(kListen.size()));
+    }
+    return std::nullopt;
+}
+
+}  // namespace
+
+std::string http_listen_in(std::string_view text) {
+    text.remove_prefix(byte_order_mark(text));
+    const std::vector<std::string_view> lines = lines_of(text);
+    std::set<std::string> found;
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+        if (!lines[i].starts_with(kHttp)) continue;
+        const std::string_view rest = without_indent(lines[i].substr(kHttp.size()));
+        found.insert((rest.empty() ? in_block(lines, i + 1) : in_braces(rest)).value_or(""));
+    }
+    return found.size() == 1 ? *found.begin() : "";
+}
+
+namespace {
+
+config::Endpoint usual() {
+    const web::Settings settings;
+    return {settings.address, settings.port};
+}
+
+/// What a file says of `http`.
+struct Known {
+    std::optional<config::Endpoint> endpoint;
+    NoHttpDoor why{};  ///< there is none
+    std::optional<tls::Trust> trust{};
+};
+
+Known nowhere(const std::string& why, ExitCode code = kNotReady) {
+    return {std::nullopt, {why + "; --http HOST:PORT says where", code}};
+}
+
+/// Where `http` has `tls`, nothing is asked in plain.
+std::optional<tls::Trust> trust_in(const std::string& file, const yaml::Node* http) {
+    const yaml::Node* secure = http == nullptr ? nullptr : http->find("tls");
+    if (secure == nullptr) return std::nullopt;
+    const auto content = [&](std::string_view key) {
+        const yaml::Node* path = secure->find(key);
+        if (path == nullptr) return std::string();
+        return config::RealFiles::read_any(config::beside(explain::path_of(file), path->scalar))
+            .value_or("");
+    };
+    return tls::Trust{content("certificate"), content("ca")};
+}
+
+/// From a file with faults, such as a key that only the gateway may read. No endpoint is guessed:
+/// it might be another program's.
+Known known_despite_faults(const std::string& file) {
+    const auto text = config::RealFiles::read_any(explain::path_of(file));
+    if (!text && file == kDefaultConfig) return {usual()};  // `panelgate demo` has none
+    if (!text) return nowhere("cannot read " + file, kNoInput);
+    yaml::Problems faults(file);
+    const yaml::Node tree = yaml::parse(*text, faults);
+    std::string listen = http_listen_in(*text);
+    std::optional<tls::Trust> trust;
+    if (faults.empty()) {
+        const yaml::Node* http = tree.find("http");
+        const yaml::Node* at = http == nullptr ? nullptr : http->find("listen");
+        listen = at == nullptr ? "" : at->scalar;
+        trust = trust_in(file, http);
+    } else if (text->find("tls:") != std::string::npos) {
+        trust.emplace();
+    }
+    Known known = nowhere(
+        file + " has faults (`panelgate check` names them) and does not say where http listens",
+        kBadConfig);
+    const auto found = config::parse_endpoint(listen);
+    if (found && found->port != 0) known.endpoint = *found;
+    known.trust = std::move(trust);
+    return known;
+}
+
+Known known_by(const std::string& file) {
+    const std::optional<config::Config> config = explain::read_quietly(file);
+    if (!config) return known_despite_faults(file);
+    if (!config->http) return nowhere(file + " has no http, so the gateway cannot be asked");
+    Known known = nowhere(file + " lets http listen on any free port");
+    if (config->http->port != 0)
+        known.endpoint = config::Endpoint{config->http->address, config->http->port};
+    if (config->http->tls) {
+        const tls::Material& files = config->http->tls->material;
+        known.trust = tls::Trust{files.certificate, files.ca};
+    }
+    return known;
+}
+
+constexpr std::string_view kPlainScheme = "http://";
+constexpr std::string_view kSecureScheme = "https://";
+
+/// HOST:PORT of http://HOST:PORT/, as it is copied from a browser.
+std::string without_scheme(std::string http) {
+    for (const std::string_view scheme : {kPlainScheme, kSecureScheme})
+        if (http.starts_with(scheme)) http.erase(0, scheme.size());
+    if (http.ends_with('/')) http.pop_back();
+    return http;
+}
+
+/// An address, or a name that is looked up when it is asked.
+std::optional<config::Endpoint> door_typed(const std::string& http) {
+    const std::string typed = without_scheme(http);
+    auto found = config::parse_endpoint(typed);
+    const auto named = line::parse_tcp_device("tcp://" + typed);
+    if (!found && named)
+        found = {named->host, static_cast<std::uint16_t>(*yaml::parse_integer(named->port))};
+    return found && found->port != 0 ? found : std::nullopt;
+}
+
+}  // namespace
+
+std::string HttpDoor::url() const {
+    return std::string(trust ? kSecureScheme : kPlainScheme) +
+           endpoint_text(endpoint.address, endpoint.port);
+}
+
+std::variant<HttpDoor, NoHttpDoor> http_door(const GatewayOptions& options) {
+    const std::string& http = options.http;
+    Known known = known_by(options.file);
+    if (!http.empty()) {
+        known.endpoint = door_typed(http);
+        if (!known.endpoint)
+            return NoHttpDoor{
+                "--http '" + http +
+                    "' is not HOST:PORT, such as 127.0.0.1:8080 or gateway.plant:8080",
+                kUsage};
+    }
+    if (!known.endpoint) return known.why;
+    HttpDoor door{{config::reachable(known.endpoint->address), known.endpoint->port}, known.trust};
+    if (http.starts_with(kPlainScheme)) {
+        door.trust.reset();
+    } else if (!door.trust && (http.starts_with(kSecureScheme) || !options.ca.empty())) {
+        door.trust.emplace();
+    }
+    if (door.trust && http.empty() && config::is_loopback(door.endpoint.address)) {
+        // It may still have a former certificate, of other names.
+        door.trust->any_name = true;
+        door.is_local = true;
+    }
+    if (options.ca.empty()) return door;
+    const auto ca = config::RealFiles::read_any(options.ca);
+    if (!ca || !door.trust)
+        return NoHttpDoor{ca ? "--ca is for https://" : "cannot read --ca " + options.ca,
+                          ca ? kUsage : kNoInput};
+    door.trust->ca += *ca;
+    return door;
+}
+
+namespace {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+constexpr std::size_t kShown = 200;  // bytes of a line that is shown
+constexpr std::string_view kEndOfHead = "\r\n\r\n";
+
+class Question {
+  public:
+    Question(const std::string& request, std::size_t most,
+             const std::function<bool(const HttpReply&)>& enough,
+             const std::optional<tls::Trust>& trust)
+        : request_(request), most_(most), enough_(enough), trust_(trust) {}
+
+    HttpReply put(const config::Endpoint& target, Duration patience) {
+        using asio::ip::tcp;
+        resolver_.async_resolve(
+            target.address, std::to_string(target.port), tcp::resolver::numeric_service,
+            [&](const error_code& error, const tcp::resolver::results_type& found) {
+                if (error) return end(error);
+                asio::async_connect(stream_.socket(), found,
+                                    [&](const error_code& failed, const tcp::endpoint&) {
+                                        failed ? end(failed) : greet(target.address);
+                                    });
+            });
+        io_.run_for(patience);
+        return reply_;
+    }
+
+  private:
+    void greet(const std::string& server) {
+        if (!trust_) return send_request();
+        tls::connect(stream_, *trust_, server, [this](const std::string& why) {
+            reply_.secure = why.empty();
+            reply_.refused = why;
+            if (why.empty()) send_request();
+        });
+    }
+    void send_request() {
+        asio::async_write(stream_, asio::buffer(request_),
+                          [this](const error_code& error, std::size_t) {
+                              if (error) return end(error);
+                              listen();
+                          });
+    }
+    void listen() {
+        stream_.async_read_some(asio::buffer(buffer_),
+                                [this](const error_code& error, std::size_t size) {
+                                    reply_.text.append(buffer_, size);
+                                    if (error) return end(error);
+                                    if (!enough_(reply_) && reply_.text.size() < most_) listen();
+                                });
+    }
+    void end(const error_code& error) { reply_.error = error; }
+
+    const std::string& request_;
+    std::size_t most_;
+    const std::function<bool(const HttpReply&)>& enough_;
+    asio::io_context io_{1};
+    asio::ip::tcp::resolver resolver_{io_};
+    const std::optional<tls::Trust>& trust_;
+    tls::Stream stream_{asio::ip::tcp::socket(io_)};
+    char buffer_[4096]{};
+    HttpReply reply_;
+};
+
+}  // namespace
+
+std::string first_line(std::string_view text) {
+    const std::string_view line = text.substr(0, text.find_first_of("\r\n")).substr(0, kShown);
+    std::string shown = as_utf8(line);
+    std::ranges::replace_if(
+        shown, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+    return shown;
+}
+
+std::string HttpReply::status() const {
+    const std::string line = first_line(text);
+    return line.substr(std::min(line.find(' ') + 1, line.size()));
+}
+
+std::string_view HttpReply::body() const {
+    const std::size_t head = text.find(kEndOfHead);
+    if (head == std::string::npos) return {};
+    return std::string_view(text).substr(head + kEndOfHead.size());
+}
+
+/// A server refuses a client either by closing or by resetting the connection.
+std::string HttpReply::failure() const {
+    if (!refused.empty()) return refused;
+    if (!error) return "no answer in time";
+    const bool shut_out = error == asio::error::eof || error == asio::error::connection_reset;
+    if (!shut_out) return error.message();
+    if (secure)
+        return "closed without an answer: by TLS it got in, so ask its log (`tls handshake "
+               "failed`): does it want a client's certificate (`tls: client: required`)?";
+    return "closed without an answer (does its `allow` let this machine in, and does it have "
+           "`tls`, "
+           "so that it is asked by https://?)";
+}
+
+HttpReply ask(const HttpDoor& door, const std::string& request, Duration patience, std::size_t most,
+              const std::function<bool(const HttpReply&)>& enough) {
+    return Question(request, most, enough, door.trust).put(door.endpoint, patience);
+}
+
+namespace {
+
+constexpr std::size_t kMost = 4096;  // maximum bytes of the answer
+
+bool is_ready(const HttpReply& reply) {
+    const bool whole = reply.text.find("\r\n") != std::string::npos;
+    return whole && reply.is_http() && (reply.status() + ' ').starts_with("200 ");
+}
+
+}  // namespace
+
+std::string ask_whether_ready(const HttpDoor& door, Duration patience) {
+    const std::string request = "GET /readyz HTTP/1.1\r\nHost: " +
+                                endpoint_text(door.endpoint.address, door.endpoint.port) +
+                                "\r\nConnection: close\r\n\r\n";
+    HttpDoor asked = door;
+    if (asked.trust && asked.is_local) asked.trust->anybody = true;
+    const HttpReply reply = ask(asked, request, patience, kMost, is_ready);
+    if (is_ready(reply)) return {};
+    if (reply.text.empty()) return reply.failure();
+    if (!reply.is_http()) return "an answer that is no HTTP: " + first_line(reply.text);
+    const std::string why = first_line(reply.body());
+    return reply.status() + (why.empty() ? "" : ": " + why);
+}
+
+}  // namespace panelgate::commands

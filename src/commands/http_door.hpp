@@ -1,0 +1,74 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/system/error_code.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "commands.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/config/endpoint.hpp"
+#include "panelgate/tls/client.hpp"
+
+namespace panelgate::commands {
+
+/// The value of `listen:` of the top-level `http:` in a text that is not valid YAML, such as a file
+/// being edited; "" if it is found not once. Works line by line: braces over several lines, anchors
+/// and the like are not understood. Pure.
+std::string http_listen_in(std::string_view text);
+
+/// Why it is unknown where a gateway is asked.
+struct NoHttpDoor {
+    std::string why;
+    ExitCode code;  ///< kUsage: wrong command line; else kNoInput, kBadConfig, kNotReady
+};
+/// Where a gateway is asked, and by whose certificate it is known.
+struct HttpDoor {
+    config::Endpoint endpoint;        ///< with an address that can be connected to, or a name
+    std::optional<tls::Trust> trust;  ///< nothing: it is asked by plain HTTP
+    bool is_local = false;            ///< the file says so: on loopback
+
+    std::string url() const;  ///< "https://127.0.0.1:8443"
+};
+/// The door that `options.http` names (HOST:PORT, also with http:// or https://), or, if that is
+/// "", the one in the file, even if the file has faults. Whom to trust is what the file says, and
+/// `options.ca`. If the default file does not exist, the default door, which `panelgate demo` has.
+std::variant<HttpDoor, NoHttpDoor> http_door(const GatewayOptions& options);
+
+/// A gateway's reply to an HTTP request: the raw text including its head.
+struct HttpReply {
+    std::string text;
+    boost::system::error_code error;  ///< why reading ended; no error also after a timeout
+    std::string refused{};            ///< why there is no TLS, in words
+    bool secure = false;              ///< the handshake of TLS was done
+
+    bool is_http() const { return text.starts_with("HTTP/1."); }
+    /// "200 OK" of the status line (RFC 9112, 4); safe for a terminal.
+    std::string status() const;
+    /// The body; empty before the head is complete.
+    std::string_view body() const;
+    /// Why there was no reply at all, in words.
+    std::string failure() const;
+};
+/// The first line of `text`, safe for a terminal.
+std::string first_line(std::string_view text);
+
+/// Sends a request over a new connection and reads until `enough`, `most` bytes, the end of the
+/// connection, or `patience` is over.
+HttpReply ask(const HttpDoor& door, const std::string& request, Duration patience, std::size_t most,
+              const std::function<bool(const HttpReply&)>& enough);
+
+/// Requests /readyz and waits for at most `patience`. A local gateway is believed whatever its
+/// certificate: where a new one is kept back, it is ready with the former one, and the question
+/// holds no secret. Empty if the answer is 200; else the answer
+/// or the error in one printable line.
+std::string ask_whether_ready(const HttpDoor& door, Duration patience);
+
+}  // namespace panelgate::commands

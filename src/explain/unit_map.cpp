@@ -1,0 +1,20 @@
+#include "panelgate/explain/unit_map.hpp"
+
+namespace panelgate::explain {
+
+tcp_server::LineInfo line_info(const config::Line& line, Unlisted unlisted) {
+    tcp_server::LineInfo info;
+    info.name = line.name;
+    info.pass_unlisted = unlisted == Unlisted::as_the_line && !line.refuse_unlisted;
+    for (const config::Station& station : line.stations) info.stations.push_back(station.id);
+    return info;
+}
+
+tcp_server::UnitMap unit_map(const tcp_server::Settings& listener, const config::Config& config,
+                             Unlisted unlisted) {
+    std::vector<tcp_server::LineInfo> lines;
+    for (const config::Line& line : config.lines) lines.push_back(line_info(line, unlisted));
+    return {listener, lines};
+}
+
+}  // namespace panelgate::explain

@@ -1,0 +1,301 @@
+#include "panelgate/gateway/reloader.hpp"
+
+#include <malloc.h>
+#include <sys/stat.h>
+#include <algorithm>
+#include <ranges>
+#include <system_error>
+#include <utility>
+
+#include "panelgate/config/describe.hpp"
+#include "panelgate/config/weaker.hpp"
+#include "panelgate/explain/difference.hpp"
+#include "panelgate/explain/load.hpp"
+#include "panelgate/gateway/certificates.hpp"
+#include "panelgate/gateway/gateway.hpp"
+#include "panelgate/gateway/prepare.hpp"
+#include "panelgate/gateway/servers.hpp"
+#include "panelgate/rt/log.hpp"
+
+namespace panelgate::gateway {
+
+FileWatch::FileWatch(boost::asio::any_io_executor executor, rt::Clock& clock, std::string path,
+                     std::function<void()> changed)
+    : path_(std::move(path)),
+      changed_(std::move(changed)),
+      clock_(clock),
+      alarm_(clock.make_alarm()),
+      known_(stamp_of(path_)),
+      seen_(known_),
+      worker_(std::move(executor)) {
+    later();
+}
+
+FileWatch::Stamp FileWatch::stamp_of(const std::string& path) {
+    struct stat facts{};
+    if (::stat(path.c_str(), &facts) != 0) return std::nullopt;
+    const std::int64_t changed = facts.st_mtim.tv_sec * 1'000'000'000 + facts.st_mtim.tv_nsec;
+    return std::tuple(std::uint64_t{facts.st_dev}, std::uint64_t{facts.st_ino},
+                      std::int64_t{facts.st_size}, changed);
+}
+
+void FileWatch::later() {
+    alarm_->arm(clock_.now() + kEvery, [this] { look(); });
+}
+
+void FileWatch::look() {
+    auto stamp = std::make_shared<Stamp>();
+    worker_.run([stamp, path = path_] { *stamp = stamp_of(path); },
+                [this, stamp, alive = std::weak_ptr(alive_)] {
+                    if (!alive.expired()) judge(*stamp);
+                });
+}
+
+void FileWatch::judge(const Stamp& seen) {
+    const bool rests = seen == std::exchange(seen_, seen);
+    if (rests && seen && seen != known_) {
+        known_ = seen;
+        changed_();
+    }
+    later();
+}
+
+namespace {
+
+using rt::LogLevel;
+
+constexpr const char* kStopping = "the gateway is stopping";
+constexpr std::size_t kLogged = 100;   ///< of each list; the verdict has all of them
+constexpr std::size_t kWaiting = 256;  ///< requests that may wait for a reload
+
+double unix_now() {
+    return std::chrono::duration<double>(rt::wall_now().time_since_epoch()).count();
+}
+
+web::ReloadVerdict::Fault fault_of(const yaml::Problem& problem) {
+    return {problem.file, problem.mark.line, problem.mark.column, problem.message};
+}
+
+void log_verdict(const web::ReloadVerdict& verdict) {
+    const std::string outcome(label(verdict.outcome));
+    for (const web::ReloadVerdict::Fault& fault : verdict.faults) {
+        rt::log(LogLevel::error, "configuration",
+                {{"error", yaml::format({fault.file, {fault.line, fault.column}, fault.text})}});
+    }
+    for (const std::string& change : verdict.changes | std::views::take(kLogged))
+        rt::log(LogLevel::info, "configuration changed", {{"change", change}});
+    for (const std::string& warning : verdict.warnings | std::views::take(kLogged))
+        rt::log(LogLevel::warn, "configuration", {{"warning", warning}});
+    for (const std::string& weaker : verdict.weaker | std::views::take(kLogged))
+        rt::log(LogLevel::warn, "configuration weaker", {{"what", weaker}});
+    for (const std::string& later : verdict.later)
+        rt::log(LogLevel::warn, "restart needed", {{"for", later}});
+    const bool good =
+        verdict.outcome == ReloadOutcome::applied || verdict.outcome == ReloadOutcome::unchanged;
+    rt::log(good ? LogLevel::info : LogLevel::error, "reload",
+            {{"outcome", outcome},
+             {"cause", verdict.cause},
+             {"rollback", verdict.rollback ? "true" : "false"},
+             {"changes", std::to_string(verdict.changes.size())},
+             {"why", verdict.why}});
+}
+
+/// The configuration without the lines that are equal in the other one: in a large plant most are,
+/// and listing all their settings takes more memory than they do.
+config::Config but_equal_lines(const config::Config& config, const config::Config& other) {
+    config::Config made = config;
+    std::erase_if(made.lines, [&](const config::Line& line) {
+        return std::ranges::find(other.lines, line) != other.lines.end();
+    });
+    return made;
+}
+
+}  // namespace
+
+/// One reload. Owned by the loop, then by the worker, then by the loop again.
+struct Reloader::Job {
+    std::string file;
+    std::shared_ptr<const config::Config> running;
+    std::shared_ptr<const config::Config> rollback;  ///< null: read the file
+    bool may_be_weaker = false;                      ///< for a rollback
+    std::vector<ServedCertificate> certificates;     ///< in use
+    std::vector<ServedCertificate> refused{};        ///< files that do not replace them
+    std::shared_ptr<const config::Config> next;      ///< null: there is none
+    web::SharedText shown;
+    web::ReloadVerdict verdict;
+
+    void read();
+    void keep_certificates(config::Config& made);
+    void compare();
+    void refuse_tokens();
+};
+
+bool allows_more(const web::Token& token, const web::Token& than) {
+    const bool longer = than.expires && (!token.expires || *token.expires > *than.expires);
+    return longer || token.standing.exceeds(than.standing);
+}
+
+/// A rollback brings back no token that was removed, and none that allows more than now.
+config::Config with_tokens_of(const config::Config& config, const config::Config& running) {
+    config::Config made = config;
+    if (made.http && running.http) {
+        made.http->tokens = running.http->tokens;
+        for (web::Token& token : made.http->tokens) {
+            const auto was = std::ranges::find(config.http->tokens, token.hash, &web::Token::hash);
+            if (was != config.http->tokens.end() && !allows_more(*was, token)) token = *was;
+        }
+        if (made.http->anonymous.exceeds(running.http->anonymous))
+            made.http->anonymous = running.http->anonymous;
+    }
+    return made;
+}
+
+void Reloader::Job::keep_certificates(config::Config& made) {
+    refused = keep_good_certificates(made, certificates, seconds_since_1970(), rollback != nullptr,
+                                     verdict.warnings);
+}
+
+/// Runs in the worker: all that takes long.
+void Reloader::Job::read() try {
+    if (rollback) {
+        config::Config made = may_be_weaker ? *rollback : with_tokens_of(*rollback, *running);
+        keep_certificates(made);
+        next = std::make_shared<const config::Config>(std::move(made));
+        verdict.weaker = config::weaker(*running, *next);
+        if (!verdict.weaker.empty() && !may_be_weaker) {
+            next = nullptr;
+            verdict.outcome = ReloadOutcome::refused;
+            verdict.why =
+                "what ran before protects less than what runs now; ask with weaker where "
+                "that is meant";
+            return;
+        }
+    } else {
+        explain::Loaded loaded = explain::read_file(file);
+        for (const yaml::Problem& problem : loaded.problems)
+            verdict.faults.push_back(fault_of(problem));
+        if (!loaded.config) {
+            verdict.outcome = ReloadOutcome::invalid;
+            return;
+        }
+        config::share_profiles(*loaded.config, *running);
+        keep_certificates(*loaded.config);
+        for (const StartMessage& message : prepare(*loaded.config))
+            verdict.warnings.push_back(message.event == "configuration"
+                                           ? message.text
+                                           : message.event + ": " + message.text);
+        next = std::make_shared<const config::Config>(std::move(*loaded.config));
+    }
+    compare();
+    if (rollback && verdict.outcome == ReloadOutcome::unchanged) refuse_tokens();
+} catch (const std::exception& error) {
+    next = nullptr;
+    verdict.outcome = ReloadOutcome::failed;
+    verdict.why = error.what();
+}
+
+/// Nothing but tokens has changed since, and those that were would allow more.
+void Reloader::Job::refuse_tokens() {
+    verdict.weaker = config::weaker(*running, *rollback);
+    if (verdict.weaker.empty()) return;
+    next = nullptr;
+    verdict.outcome = ReloadOutcome::refused;
+    verdict.why =
+        "only tokens, or who comes in without one, have changed since, and what ran before allows "
+        "more; ask with weaker where that is meant";
+}
+
+void Reloader::Job::compare() {
+    for (const explain::Change& change :
+         explain::differences(but_equal_lines(*running, *next), but_equal_lines(*next, *running))) {
+        verdict.changes.push_back(to_string(change));
+        const std::string map = change.path.substr(0, change.path.find('/'));
+        if (change.needs == config::kNextStart && !std::ranges::count(verdict.later, map))
+            verdict.later.push_back(map);
+    }
+    for (std::string& moved : explain::moved_units(*running, *next))
+        verdict.warnings.push_back(std::move(moved));
+    verdict.outcome = verdict.changes.empty() ? ReloadOutcome::unchanged : ReloadOutcome::applied;
+    shown = shown_text(*next);
+}
+
+Reloader::Reloader(boost::asio::any_io_executor executor, std::string file)
+    : file_(std::move(file)), worker_(std::move(executor)) {
+    counters_.last_success_unix = unix_now();
+}
+
+void Reloader::serve(Gateway& gateway) { gateway_ = &gateway; }
+
+std::string Reloader::barred(bool rollback) const {
+    if (stopping_) return kStopping;
+    if (waiting_.size() >= kWaiting) return "too many wait for a reload; try again";
+    if (rollback)
+        return before_ ? "" : "nothing else has run since the start, so there is no way back";
+    if (file_.empty()) return "this gateway runs the built-in demo, which is no file";
+    if (file_ == "-")
+        return "the configuration was read from standard input, which is read only once";
+    return {};
+}
+
+void Reloader::reload(web::ReloadWish wish, std::string cause, Handler handler) {
+    waiting_.push_back({wish, std::move(cause), std::move(handler)});
+    if (served_.empty()) begin();
+}
+
+/// Serves all waiting requests of the same kind with one reload.
+void Reloader::begin() {
+    const web::ReloadWish wish = waiting_.front().wish;
+    std::vector<Waiting> others;
+    for (Waiting& one : std::exchange(waiting_, {}))
+        (one.wish == wish ? served_ : others).push_back(std::move(one));
+    waiting_ = std::move(others);
+    if (step_) step_(true);
+    auto job = std::make_shared<Job>();
+    job->file = file_;
+    job->running = gateway_->config();
+    if (wish.rollback) job->rollback = before_;
+    job->may_be_weaker = wish.weaker;
+    job->certificates = gateway_->certificates();
+    job->verdict.rollback = wish.rollback;
+    job->verdict.cause = served_.front().cause;
+    worker_.run([job] { job->read(); }, [this, job] { apply(job); });
+}
+
+/// Runs in one turn of the loop.
+void Reloader::apply(const std::shared_ptr<Job>& job) {
+    if (stopping_) {
+        job->verdict.outcome = ReloadOutcome::failed;
+        job->verdict.why = kStopping;
+    } else if (job->next && job->verdict.outcome == ReloadOutcome::applied) {
+        try {
+            gateway_->apply(job->next, job->shown);
+            before_ = job->running;
+            if (job->next->log != job->running->log) rt::set_up_log(job->next->log);
+        } catch (const std::runtime_error& error) {  // a listener, a pty
+            job->verdict.outcome = ReloadOutcome::failed;
+            job->verdict.why = error.what();
+        }
+    }
+    gateway_->refused_certificates(job->refused);
+    end(job);
+}
+
+void Reloader::end(const std::shared_ptr<Job>& job) {
+    web::ReloadVerdict& verdict = job->verdict;
+    verdict.at = rt::wall_now();
+    const bool good =
+        verdict.outcome == ReloadOutcome::applied || verdict.outcome == ReloadOutcome::unchanged;
+    if (verdict.outcome != ReloadOutcome::refused) counters_.last_succeeded = good;
+    ++counters_.reloads[static_cast<std::size_t>(verdict.outcome)];
+    if (good) counters_.last_success_unix = unix_now();
+    log_verdict(verdict);
+    gateway_->record(verdict);
+    last_ = std::make_shared<const web::ReloadVerdict>(std::move(verdict));
+    if (step_) step_(false);
+    for (Waiting& one : std::exchange(served_, {})) one.handler(last_);
+    // Reading takes far more memory than is kept, and malloc would not return it to the system.
+    worker_.run([] { ::malloc_trim(0); }, [] {});
+    if (!waiting_.empty()) begin();
+}
+
+}  // namespace panelgate::gateway

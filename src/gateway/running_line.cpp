@@ -1,0 +1,245 @@
+#include "panelgate/gateway/running_line.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "panelgate/bus/listening_bus.hpp"
+#include "panelgate/gateway/plant.hpp"
+#include "panelgate/line/tcp_line.hpp"
+#include "panelgate/line/tty_line.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/profile/judge.hpp"
+#include "panelgate/rt/log.hpp"
+#include "panelgate/sim/misbehaviour.hpp"
+#include "panelgate/sim/station.hpp"
+
+namespace panelgate::gateway {
+
+points::RelayRoute route_of(const Plant& plant, const points::Relay& relay) {
+    const Station& from = *plant.find(relay.from.station);
+    const Station& to = *plant.find(relay.to.station);
+    points::RelayRoute route;
+    route.relay = relay;
+    route.from = from.bus;
+    route.from_station = from.id;
+    route.to = to.bus;
+    route.to_station = to.id;
+    route.to_line = to.line;
+    route.to_memory = explain::memory_of(to.configured->profile);
+    route.to_has_multiple = explain::takes_multiple(*to.configured->profile, relay.to.table);
+    return route;
+}
+
+namespace {
+
+struct Played {
+    std::vector<profile::ProfileRef> panels;  ///< referenced by the bus's stations
+    std::unique_ptr<sim::SimulatedBus> bus;
+};
+
+}  // namespace
+
+std::shared_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor executor,
+                                                 rt::Clock& clock, const config::Line& line) {
+    auto played = std::make_shared<Played>();
+    std::vector<sim::Station> stations;
+    for (const config::Station& station : line.stations) {
+        stations.emplace_back(*station.profile, station.id);
+        played->panels.push_back(station.profile);
+    }
+    sim::Settings settings;
+    settings.serial = line.device.serial;
+    settings.echo = line.simulated_echo;
+    settings.crc_orders = arbiter::crc_orders(line.arbiter);
+    for (const config::Station& station : line.stations)
+        settings.faults[station.id] = station.faults;
+    played->bus = std::make_unique<sim::SimulatedBus>(std::move(executor), clock, settings,
+                                                      std::move(stations));
+    sim::SimulatedBus* bus = played->bus.get();
+    rt::log(rt::LogLevel::info, "simulating", {{"line", line.name}, {"device", bus->device()}});
+    return {std::move(played), bus};
+}
+
+std::shared_ptr<const web::SimulatedPanel> simulated_panel(
+    const std::shared_ptr<sim::SimulatedBus>& bus, std::uint8_t station) {
+    if (bus == nullptr || !bus->has(station)) return nullptr;
+    web::SimulatedPanel panel;
+    panel.faults = [bus, station] { return sim::to_numbers(bus->faults(station)); };
+    panel.set_faults = [bus, station](const sim::FaultNumbers& numbers) {
+        sim::Misbehaviour faults;
+        auto wrong = sim::from_numbers(numbers, faults);
+        if (!wrong) bus->set_faults(station, faults);
+        return wrong;
+    };
+    return std::make_shared<const web::SimulatedPanel>(std::move(panel));
+}
+
+namespace {
+
+bool is_remote(const config::Line& line, bool simulate) {
+    return line.kind == config::Line::Kind::tcp && !simulate;
+}
+
+constexpr std::size_t kWires = 64;
+
+}  // namespace
+
+RunningLine::RunningLine(boost::asio::any_io_executor executor, rt::Clock& clock,
+                         const config::Line& line, bool simulate, LineWatch watch)
+    : executor_(std::move(executor)),
+      clock_(clock),
+      simulate_(simulate),
+      listens_(line.listens),
+      watch_(std::move(watch)) {
+    auto wire = make_wire(line);
+    bus::Settings settings = settings_of(line);
+    if (listens_) {
+        bus_ = std::make_unique<bus::ListeningBus>(executor_, clock_, std::move(settings),
+                                                   std::move(wire));
+    } else {
+        bus_ = std::make_unique<bus::Bus>(executor_, clock_, std::move(settings), std::move(wire));
+    }
+    apply_points(line);
+}
+
+bus::Settings RunningLine::settings_of(const config::Line& line) {
+    bus::Settings settings = explain::bus_settings(line);
+    if (simulated_) settings.device = kSimulatedDevice;
+    settings.arbiter.may_stall = is_remote(line, simulate_);
+    settings.observe = [this, name = line.name](const bus::BusEvent& event) {
+        on_event(name, event);
+    };
+    if (watch_.write) {
+        settings.record_write = [this, name = line.name](const bus::WriteEnd& end) {
+            watch_.write(name, end);
+        };
+    }
+    settings.refuses_writes = watch_.refuses_writes;
+    if (watch_.admit) {
+        settings.admit = [this, name = line.name](const WhoRef& who, std::uint8_t station) {
+            return watch_.admit(who, name, station);
+        };
+    }
+    return settings;
+}
+
+/// Opens the line, and its simulated panels if it has any.
+std::unique_ptr<line::Line> RunningLine::make_wire(const config::Line& line) {
+    line::Settings device = line.device;
+    device.owner = "line '" + line.name + '\'';
+    if (wires_.size() >= kWires)
+        wires_.clear();  // no reply is outstanding on the earlier ones any more
+    if (!explain::is_simulated(line, simulate_)) wires_.insert(explain::wire_of(line));
+    simulated_.reset();
+    if (explain::is_simulated(line, simulate_)) {
+        simulated_ = simulate_line(executor_, clock_, line);
+        device.device = simulated_->device();
+        device.rs485 = {};
+        device.simulated = true;
+    }
+    return is_remote(line, simulate_) ? line::make_tcp_line(executor_, clock_, std::move(device))
+                                      : line::make_tty_line(executor_, clock_, std::move(device));
+}
+
+void RunningLine::start() {
+    running_ = true;
+    if (simulated_) simulated_->start();
+    bus_->start();
+    if (poller_) poller_->start();
+}
+
+void RunningLine::stop() {
+    running_ = false;
+    if (poller_) poller_->stop();
+    bus_->stop();
+    if (simulated_) simulated_->stop();
+}
+
+void RunningLine::dispose() {
+    poller_.reset();
+    bus_.reset();
+    simulated_.reset();
+}
+
+/// The polls change after the bus, so that nothing is sent with the old settings.
+void RunningLine::apply(const config::Line& before, const config::Line& now) {
+    if (running_ && explain::is_same_wire(before, now, simulate_)) {
+        bus_->apply(settings_of(now), nullptr, nullptr);
+    } else {
+        std::shared_ptr<sim::SimulatedBus> far_end = simulated_;
+        auto wire = make_wire(now);
+        if (simulated_) simulated_->start();
+        bus_->apply(settings_of(now), std::move(wire), std::move(far_end));
+        if (explain::wire_of(before) != explain::wire_of(now)) forget_points();
+    }
+    apply_points(now);
+    if (!std::exchange(running_, true) && poller_) poller_->start();
+}
+
+/// Drops all values: they were those of other panels.
+void RunningLine::forget_points() {
+    if (poller_) poller_->apply({});
+    heard_.clear();
+}
+
+/// One poller per line. What it reads also answers clients where a station's max_age allows it.
+void RunningLine::apply_points(const config::Line& line) {
+    std::vector<points::PolledStation> wanted = explain::polled_stations(line);
+    if (listens_) {
+        const auto before = std::exchange(heard_, {});
+        for (points::PolledStation& one : wanted) {
+            const auto made =
+                std::make_shared<points::HeardValues>(one.wants, std::move(one.memory));
+            const auto known = before.find(one.id);
+            if (known != before.end()) made->adopt(*known->second);
+            heard_.emplace(one.id, made);
+        }
+        return;
+    }
+    if (poller_) return poller_->apply(std::move(wanted));
+    if (wanted.empty()) return;
+    poller_ = std::make_unique<points::Poller>(clock_, *bus_, std::move(wanted));
+    poller_->on_update([this, name = line.name](std::uint8_t station, const auto& wants) {
+        watch_.points(name, station, wants);
+    });
+    write_listener_ = poller_->write_listener();
+    if (running_) poller_->start();
+}
+
+std::optional<points::StationPoints> RunningLine::points_of(const config::Station& station) const {
+    if (listens_) {
+        const auto found = heard_.find(station.id);
+        if (found == heard_.end()) return std::nullopt;
+        return points::StationPoints(station.points, station.polls,
+                                     std::shared_ptr<const points::HeardValues>(found->second));
+    }
+    const auto polls = poller_ ? poller_->find(station.id) : nullptr;
+    if (!polls) return std::nullopt;
+    return points::StationPoints(station.points, station.polls, polls);
+}
+
+void RunningLine::on_event(const std::string& line, const bus::BusEvent& event) {
+    if (const auto* heard = std::get_if<tap::Transaction>(&event)) hear(line, *heard);
+    const auto* write = std::get_if<bus::WriteEvent>(&event);
+    if (write != nullptr && write_listener_) write_listener_(*write);
+    watch_.event(line, event);
+}
+
+/// Passes a heard transaction to its station, a broadcast to all stations.
+void RunningLine::hear(const std::string& line, const tap::Transaction& heard) {
+    for (const auto& [station, values] : heard_) {
+        if (heard.station != 0 && heard.station != station) continue;
+        const auto wants = values->on_heard(heard);
+        if (!wants.empty()) watch_.points(line, station, wants);
+    }
+}
+
+}  // namespace panelgate::gateway
