@@ -93,6 +93,7 @@ const Keys<OwnRole>& own_role_keys() {
                         if (role.rights.has(right)) all.push_back(right);
                     return as_written(all);
                 })
+            .weaker(By::more)
             .example("[read, write]");
     return kKeys;
 }
@@ -215,6 +216,7 @@ const Keys<Rule>& rule_keys() {
                               "Items: FIRST-LAST in the panel's notation, such as UW100-UW199, "
                               "TABLE/FIRST-LAST, or a map. Functions without items are among them "
                               "only where `functions` names them.");
+    range.weaker.by = By::any;
     range.may_be_text = true;
     range.may_be_null = false;
     static const auto kKeys =
@@ -229,35 +231,44 @@ const Keys<Rule>& rule_keys() {
                            "(also a read or a write)."),
                 [](Reader& in, Rule& rule) { return read_acts(in, "allow", true, rule); },
                 [](const Rule& rule) { return acts_text(rule, true); })
+            .weaker(By::any)
             .example("[read, write]")
             .value(
                 acts_shape("deny", "What it denies; a rule has allow or deny."),
                 [](Reader& in, Rule& rule) { return read_acts(in, "deny", false, rule); },
                 [](const Rule& rule) { return acts_text(rule, false); })
+            .weaker(By::any)
             .example("[write, broadcast, raw]")
             .networks("from", &Rule::from, kAny,
                       "Networks of the clients that it is about. Without it any.")
+            .weaker(By::any)
             .example("[192.168.10.0/24]")
             .list("roles", &Rule::roles, {"[viewer, operator]", kAny}, read_rule_role,
                   "Roles that it is about: viewer, operator, engineer, admin, one of access.roles, "
                   "or a role of a client's certificate. Modbus clients without one are operators.")
+            .weaker(By::any)
             .example("[operator]")
             .list("tokens", &Rule::tokens, {"[ops]", kAny}, named("token", token_names),
                   "Tokens that it is about, by name.")
+            .weaker(By::any)
             .example("[ops]")
             .words("faces", &Rule::faces, {"[modbus_tcp]", kAny}, kFaces, "face",
                    "Ways in: modbus_tcp (UDP, too), http, mqtt, serial_master.")
+            .weaker(By::any)
             .example("[http]")
             .list("listeners", &Rule::listeners, {"[\"0.0.0.0:502\"]", kAny},
                   named("listener", listener_names),
                   "Listeners by their address, or serial masters by name.")
+            .weaker(By::any)
             .example("[127.0.0.1:8080]")
             .list("stations", &Rule::stations, {"[press]", kAny}, read_place,
                   "Stations by name, or LINE/ID. Without it all.")
+            .weaker(By::any)
             .example("[press]")
             .list("functions", &Rule::functions,
                   {"[16, 23]", kAny, {}, false, {1, kLastFunction}, true}, read_function,
                   "Function codes. Without it all.")
+            .weaker(By::any)
             .example("[16]")
             .below(range, []() -> const Table& { return table_range_table(); }, read_range, {})
             .shown_as([](const Rule& rule) { return rule.range; });
@@ -310,12 +321,14 @@ const Keys<access::Settings>& access_keys() {
         Keys<Settings>()
             .word("default", &Settings::allow_by_default, kDefaults,
                   "What is done where no rule matches: allow or deny.")
+            .weaker(By::coming, "allow")
             .example("allow")
             .maps(
                 "roles", &Settings::roles, own_role_keys, "[{name: setter, rights: [read, write]}]",
                 Settings::kMaxRoles,
                 [](Reader&, const Node&) { return std::optional<OwnRole>(); },  // load_own_roles()
                 &OwnRole::name, "Roles besides viewer, operator, engineer and admin.")
+            .weaker(By::added)
             .not_empty("give at least one role, or leave it out")
             .maps("rules", &Settings::rules, rule_keys,
                   "[{name: no-writes, deny: [write], from: [192.168.10.0/24]}]",

@@ -67,15 +67,19 @@ const Keys<audit::Settings>& audit_keys() {
         Keys<Settings>()
             .text("file", &Settings::file, {"^/.*[^/]$", false, 0, file_fault},
                   "File that is written; full ones beside it have a number behind the name.")
+            .weaker(By::any)
             .required()
             .example("/var/log/panelgate/audit.jsonl")
             .value(text_shape("rotate", {"^[1-9][0-9]*(KiB|MiB|GiB)$"},
                               "Size of a file, such as 50MiB; then the next one begins."),
                    read_size, [](const Settings& of) { return size_text(of.rotate); })
+            .weaker(By::falling)
             .integer("keep", &Settings::keep, 1, 10'000, "Full files that are kept.")
+            .weaker(By::falling)
             .word("on_failure", &Settings::on_failure, kFailures,
                   "What happens while the disk takes nothing: continue, which may lose records, or "
                   "refuse_writes (exception 06).")
+            .weaker(By::leaving, "refuse_writes")
             .boolean("syslog", &Settings::syslog,
                      "Each record goes to the machine's syslog as well (/dev/log, RFC 5424).");
     return kKeys;

@@ -194,7 +194,9 @@ bool read_expiry(Reader& in, Token& token) {
 
 /// A schema knows no file, so it takes any name for a role.
 KeyShape role_shape(std::string_view key, std::string_view text) {
-    return text_shape(key, {"^[a-z0-9-]+$"}, text);
+    KeyShape shape = text_shape(key, {"^[a-z0-9-]+$"}, text);
+    shape.weaker = {By::growing, {}, {"none", "viewer", "operator", "engineer", "admin"}};
+    return shape;
 }
 
 bool read_role(Reader& in, std::string_view key, bool none, Standing& standing) {
@@ -231,9 +233,11 @@ const Keys<Token>& token_keys() {
                               {"^[0-9]{4}-[0-9]{2}-[0-9]{2}(T[0-9]{2}:[0-9]{2}:[0-9]{2}Z)?$"},
                               "Last day of the token, such as 2027-12-31, or an instant, "
                               "2027-12-31T18:00:00Z; in UTC. Without it none."),
-                   read_expiry, [](const Token& token) {
+                   read_expiry,
+                   [](const Token& token) {
                        return token.expires ? web::expiry_text(*token.expires) : std::string();
-                   });
+                   })
+            .weaker(By::growing);
     return kKeys;
 }
 
@@ -267,6 +271,7 @@ const Keys<web::Settings>& http_keys() {
         Keys<Settings>()
             .value(text_shape("listen", {endpoint_pattern(false)}, "ADDR:PORT or [ADDR]:PORT."),
                    read_listen<Settings>, &Settings::name)
+            .weaker(By::any)
             .example("127.0.0.1:8080")
             .change_needs(kListensAnew)
             .value(
@@ -283,6 +288,7 @@ const Keys<web::Settings>& http_keys() {
                   read_host,
                   "Its names in URLs, besides its addresses and localhost; another name is "
                   "answered 421. Without it the machine's name.")
+            .weaker(By::more)
             .example("[gateway.plant.example]")
             .list("cors", &Settings::cors,
                   {"[https://scada.plant.example]",
@@ -291,9 +297,11 @@ const Keys<web::Settings>& http_keys() {
                   read_origin,
                   "Origins of other sites whose pages may read, such as "
                   "https://scada.plant.example.")
+            .weaker(By::more)
             .example("[https://scada.plant.example]")
             .networks("allow", &Settings::allow, "all",
                       "Networks whose clients may connect, such as 192.168.1.0/24. Without it any.")
+            .weaker(By::wider)
             .example("[127.0.0.0/8]")
             .change_needs(kAllowCloses)
             .below(
@@ -306,6 +314,7 @@ const Keys<web::Settings>& http_keys() {
                         one.put_secret("secret", token.hash);
                     }
                 })
+            .weaker(By::added)
             .not_empty("give at least one token, or leave it out")
             .below(
                 tls_shape("HTTPS: only clients that speak TLS are served."),
@@ -403,31 +412,40 @@ const Keys<tls::Settings>& tls_keys() {
                             "PEM file of the CA that signs the certificates of clients."),
                    pem_file("ca", &Settings::ca, &Material::ca),
                    [](const Settings& tls) { return tls.ca; })
+            .weaker(By::any)
             .example("/etc/panelgate/tls/ca.crt")
             .change_needs(kTlsCloses)
             .word("client", &Settings::client, kClients,
                   "Whether clients show a certificate: none, optional, required.")
+            .weaker(By::falling, {}, {"none", "optional", "required"})
             .example("required")
             .change_needs(kTlsCloses)
             .value(shape_of("crl", Kind::text,
                             "PEM file of the certificates that the CA has revoked."),
                    pem_file("crl", &Settings::crl, &Material::crl),
                    [](const Settings& tls) { return tls.crl; })
+            .weaker(By::any)
             .example("/etc/panelgate/tls/crl.pem")
             .change_needs(kTlsCloses)
             .word("role_from", &Settings::role_from_certificate, kRoles,
                   "certificate: the role in a client's certificate decides what it may; without "
                   "one it only reads.")
+            .weaker(By::leaving, "certificate")
             .initially("")
             .example("certificate")
             .change_needs(kTlsCloses)
             .word("min_version", &Settings::lowest, kVersions,
                   "Oldest version that is spoken: TLSv1.2 or TLSv1.3.")
+            .weaker(By::leaving, "TLSv1.3")
             .change_needs(kTlsCloses);
     return kKeys;
 }
 
-KeyShape tls_shape(std::string_view text) { return shape_of("tls", Kind::map, text); }
+KeyShape tls_shape(std::string_view text) {
+    KeyShape shape = shape_of("tls", Kind::map, text);
+    shape.weaker.by = By::removed;
+    return shape;
+}
 
 bool load_tls(Reader& in, std::optional<tls::Settings>& settings) {
     const Node* node = in.map("tls", kTlsExample);
@@ -456,7 +474,8 @@ void show_tls(const SettingWriter& out, const std::optional<tls::Settings>& sett
     const SettingWriter section = out.item("tls");
     tls_keys().show(section, *settings);
     const tls::Material& files = settings->material;
-    section.put_secret("files", files.certificate + files.key + files.ca + files.crl);
+    section.put_secret("files", files.certificate + files.key);
+    section.put_secret("trusted", files.ca + files.crl);
 }
 
 }  // namespace panelgate::config

@@ -70,6 +70,8 @@ std::string as_written(const std::vector<Value>& list) {
     return list_text(std::move(words));
 }
 
+using By = Weaker::By;
+
 /// The keys that a map has set.
 struct Given {
     std::vector<std::string_view> keys;
@@ -367,6 +369,11 @@ class Keys : public Table {
     /// What a change of it needs beside a reload; a key below it needs the same.
     Keys change_needs(std::string_view what) && {
         rows_.back().shape.change = what;
+        return std::move(*this);
+    }
+    /// Which change of it protects the panels less.
+    Keys weaker(Weaker::By by, std::string_view word = {}, std::vector<std::string> ranks = {}) && {
+        rows_.back().shape.weaker = {by, std::string(word), std::move(ranks)};
         return std::move(*this);
     }
     /// Keys below it that are left out are those of the map's owner.

@@ -132,6 +132,7 @@ const Keys<Line>& line_keys() {
                   "listen: another master asks on this line, nothing is ever sent, and points show "
                   "what passes by.",
                   mode_hint)
+            .weaker(By::leaving, "listen")
             .change_needs(kOpensPort)
             .below(
                 shape_of("serial", Kind::map, "Character format and framing."),
@@ -173,6 +174,7 @@ const Keys<Line>& line_keys() {
             .integer(
                 "retries", [](auto& line) -> auto& { return line.arbiter.unlisted.retries; }, 0, 10,
                 "Retries of a read; a write is never repeated on its own.")
+            .weaker(By::growing)
             .map(
                 "queue", [](auto& line) -> auto& { return line.arbiter.queue; }, queue_keys,
                 "{limit: 256}", "Limits of the requests that wait for this line.",
@@ -206,6 +208,7 @@ const Keys<Line>& line_keys() {
                 "line only where replies have been late.")
             .word("unlisted_stations", &Line::refuse_unlisted, kUnlisted,
                   "Stations that are not in the list below: pass, or refuse with exception 0A.")
+            .weaker(By::leaving, "refuse")
             .map(
                 "simulate", [](auto& line) -> auto& { return line; }, fault_keys, "{echo: true}",
                 "Of a simulated line: what its adapter does wrong.")

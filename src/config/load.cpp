@@ -221,15 +221,18 @@ const Keys<Config>& root_keys() {
             .maps("modbus_tcp", &Config::modbus_tcp, listener_keys, "[{listen: 127.0.0.1:502}]",
                   yaml::MapReader::kAnyNumber, load_listener, &tcp_server::Settings::name,
                   "Listeners for Modbus/TCP.")
+            .weaker(By::added)
             .maps("serial_masters", &Config::serial_masters, master_keys,
                   "[{name: plc, device: /dev/ttyUSB1, lines: [floor1]}]",
                   yaml::MapReader::kAnyNumber, load_master, &serial_server::Settings::name,
                   "Masters that ask on serial ports of their own, such as a PLC.")
+            .weaker(By::added)
             .below(
                 shape_of("http", Kind::map, "REST API, dashboard and metrics."),
                 []() -> const Table& { return http_keys(); },
                 optional_section("http", "{listen: 127.0.0.1:8080}", &Config::http, http_keys),
                 shown_section("http", &Config::http, http_keys))
+            .weaker(By::added)
             .below(
                 shape_of("mqtt", Kind::map, "Values published at an MQTT broker."),
                 []() -> const Table& { return mqtt_keys(); }, load_mqtt,
@@ -252,6 +255,7 @@ const Keys<Config>& root_keys() {
                         relay_keys().show(out.item("relays", relay.name()), relay);
                 })
             .in_schema([](KeyShape& shape) { shape.most_entries = points::kMaxRelays; })
+            .weaker(By::added)
             .map("log", &Config::log, log_keys, "{level: info}", "Log on stderr.")
             .map("realtime", &Config::realtime, realtime_keys, "{priority: 20, lock_memory: true}",
                  "Priority over other programs, so that frames are on time.")
@@ -263,6 +267,7 @@ const Keys<Config>& root_keys() {
                 optional_section("audit", "{file: /var/log/panelgate/audit.jsonl}", &Config::audit,
                                  audit_keys),
                 shown_section("audit", &Config::audit, audit_keys))
+            .weaker(By::removed)
             .not_empty("give file, or leave it out");
     return kKeys;
 }

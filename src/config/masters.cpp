@@ -137,6 +137,7 @@ const Keys<Master>& master_keys() {
                 kBroadcasts,
                 "Broadcasts of the master: silent sends them on, deny does not. They "
                 "have no answer in either case.")
+            .weaker(By::leaving, "deny")
             .initially("silent")
             .word("on_failure", &Master::on_failure, kFailures,
                   "What the master gets where a panel does not answer.")

@@ -233,6 +233,7 @@ const Keys<Settings>& mqtt_keys() {
                      "Changes that are kept while the broker is away.")
             .word("write", &Settings::write, kWrites,
                   "points: who may publish TOPIC/+/+/set, or DCMD, writes points.")
+            .weaker(By::coming, "points")
             .below(
                 shape_of("tls", Kind::map,
                          "TLS at the broker, with mqtts://. Without it the system's CAs count."),

@@ -305,6 +305,7 @@ const Keys<Relay>& relay_keys() {
             .required()
             .example("press/UW200")
             .integer("count", &Relay::count, 1, 2040, "Number of registers or bits.")
+            .weaker(By::growing)
             .example("8")
             .duration("every", &Relay::every, 1ms, points::kSlowest, "Interval between two reads.")
             .example("1s")

@@ -139,6 +139,7 @@ KeyShape units_shape(std::int64_t first, std::int64_t last) {
                               "Further unit ids (0 to 255, of a serial master 1 to 247), each to "
                               "LINE/STATION; needed where two lines have the same station id.");
     shape.keys = '^' + yaml::integer_pattern(first, last) + '$';
+    shape.weaker.by = By::any;
     shape.pattern = "^[^/]+/.";
     shape.may_be_number = false;
     return shape;
@@ -227,6 +228,7 @@ Keys<Settings> make_reach_keys(std::int64_t first, std::int64_t last) {
                            "Lines that are served; of a serial master those whose listed stations "
                            "it may ask. Without it all."),
                read_lines, [](const Settings& settings) { return as_written(settings.lines); })
+        .weaker(By::more)
         .example("[floor1]")
         .below(units_shape(first, last), {}, read_units,
                [](const SettingWriter& out, const Settings& settings, const SettingWriter*) {
@@ -236,7 +238,8 @@ Keys<Settings> make_reach_keys(std::int64_t first, std::int64_t last) {
                })
         .not_empty("write such as {101: floor1/31}, or leave it out")
         .example("{101: floor1/31}")
-        .word("access", &Settings::read_only, kAccess, "read_only refuses every write.");
+        .word("access", &Settings::read_only, kAccess, "read_only refuses every write.")
+        .weaker(By::leaving, "read_only");
 }
 
 namespace {
@@ -295,6 +298,7 @@ const Keys<Settings>& listener_keys() {
     KeyShape diagnostics =
         integers("diagnostics_unit", 1, 255, "Unit id of the gateway's own registers; null: none.");
     diagnostics.may_be_null = true;
+    diagnostics.weaker = {By::leaving, "null", {}};
     static const auto kKeys =
         Keys<Settings>()
             .value(text_shape("listen", {endpoint_pattern(true)},
@@ -311,6 +315,7 @@ const Keys<Settings>& listener_keys() {
             .change_needs(kListensAnew)
             .boolean("udp", &Settings::udp,
                      "Takes datagrams on the same port as well, with framing tcp.")
+            .weaker(By::coming, "true")
             .change_needs(kListensAnew)
             .word("ascii_lower_case", &Settings::ascii_digits, kLowerCase,
                   "Whether hex digits a-f are taken.")
@@ -320,6 +325,7 @@ const Keys<Settings>& listener_keys() {
             .word("broadcast", &Settings::broadcast, kBroadcasts,
                   "Answer to a write to unit 0: reply (once it is sent; with framing tcp), "
                   "silent, or deny (exception 01). Without it reply with framing tcp, else silent.")
+            .weaker(By::leaving, "deny")
             .initially("")
             .shown_if([](const Settings& settings) {
                 return settings.framing == Framing::tcp ||
@@ -338,6 +344,7 @@ const Keys<Settings>& listener_keys() {
             .example("255")
             .networks("allow", &Settings::allow, "all",
                       "Networks whose clients may connect, such as 192.168.1.0/24. Without it any.")
+            .weaker(By::wider)
             .example("[127.0.0.0/8]")
             .change_needs(kAllowCloses)
             .integer("max_connections", &Settings::max_connections, 1, 65535,

@@ -156,11 +156,13 @@ const Keys<StationBody, StationView>& station_keys() {
             .value(
                 shape_of("profile", Kind::text, "Panel profile; `panelgate profiles` lists them."),
                 own(read_profile), [](const StationView& of) { return of.station.profile->name; })
+            .weaker(By::any)
             .initially("generic")
             .example("autonics-gplp-s")
             .word(
                 "access", [](auto& of) -> auto& { return of.station.read_only; }, kAccess,
                 "read_only refuses every write.")
+            .weaker(By::leaving, "read_only")
             .initially("read_write")
             .below(
                 shape_of("timing", Kind::map, "Times of this station, in place of the line's."),
@@ -176,9 +178,11 @@ const Keys<StationBody, StationView>& station_keys() {
             .integer(
                 "retries", [](auto& of) -> auto& { return of.settings.retries; }, 0, 10,
                 "Retries of a read. Without it the line's.")
+            .weaker(By::growing)
             .boolean(
                 "retry_writes", [](auto& of) -> auto& { return of.settings.retry_writes; },
                 "Sends a write again that was not answered.")
+            .weaker(By::coming, "true")
             .initially("false")
             .word(
                 "crc_order", [](auto& of) -> auto& { return of.settings.crc_order; },
@@ -195,6 +199,7 @@ const Keys<StationBody, StationView>& station_keys() {
             .boolean(
                 "guard", [](auto& of) -> auto& { return of.station.guard; },
                 "Refuses requests that the profile rules out, before they reach the bus.")
+            .weaker(By::leaving, "true")
             .initially("false")
             .word(
                 "translate", [](auto& of) -> auto& { return of.station.translate; }, kTranslate,
@@ -218,7 +223,8 @@ const Keys<StationBody, StationView>& station_keys() {
             .maps(
                 "points", [](auto& of) -> auto& { return of.station.points; }, point_keys,
                 "[{name: temperature, at: UW100}]", points::kMaxPoints, load_point,
-                &points::Point::name, "Values by name.");
+                &points::Point::name, "Values by name.")
+            .weaker(By::added);
     return kKeys;
 }
 

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <boost/json/object.hpp>
+#include <charconv>
 #include <cstdint>
+#include <cstdlib>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -11,6 +14,8 @@
 #include <tuple>
 #include <utility>
 
+#include "panelgate/base/text.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/config/describe.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/config/setting.hpp"
@@ -18,6 +23,8 @@
 #include "panelgate/explain/unit_map.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/tls/settings.hpp"
+#include "panelgate/yaml/document.hpp"
+#include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::explain {
 
@@ -81,6 +88,138 @@ bool follows(const Differences& all, const Difference& difference) {
         return false;
     return owner->second.before->value == difference.before->value &&
            owner->second.after->value == difference.after->value;
+}
+
+// Whether a change protects less
+
+using config::Weaker;
+using By = Weaker::By;
+
+/// The place among the ranks, or the number; nothing of a text that is neither.
+std::optional<double> size_of(const std::string& text, const Weaker& how) {
+    const auto rank = std::ranges::find(how.ranks, text);
+    if (rank != how.ranks.end()) return static_cast<double>(rank - how.ranks.begin());
+    if (const auto duration = yaml::parse_duration(text)) return to_seconds(*duration);
+    double number = 0;
+    const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (wrong != std::errc{}) return std::nullopt;
+    return number;
+}
+
+/// True if the second is larger, or may be; no text is larger than all.
+bool is_larger(const std::string& before, const std::string& after, const Weaker& how) {
+    if (before.empty() || after.empty()) return after.empty();
+    const auto was = size_of(before, how);
+    const auto is = size_of(after, how);
+    return was && is ? *is > *was : true;
+}
+
+std::vector<std::string> items_of(const std::string& list) {
+    yaml::Problems problems("");
+    std::vector<std::string> items;
+    for (const yaml::Node& item : yaml::parse(list, problems).items) items.push_back(item.scalar);
+    return items;
+}
+
+/// True if the second list has an item that no item of the first one covers.
+template <class Covers>
+bool has_more(const std::string& before, const std::string& after, const Covers& covers) {
+    if (before.empty() || after.empty()) return after.empty();
+    const auto known = items_of(before);
+    return std::ranges::any_of(items_of(after), [&](const std::string& item) {
+        return std::ranges::none_of(known,
+                                    [&](const std::string& one) { return covers(one, item); });
+    });
+}
+
+bool covers_network(const std::string& wide, const std::string& narrow) {
+    const auto one = config::parse_cidr(wide);
+    const auto other = config::parse_cidr(narrow);
+    return one && other && config::covers(*one, *other);
+}
+
+bool weakens(const Weaker& how, const Change& change) {
+    switch (how.by) {
+        case By::nothing:
+            return false;
+        case By::added:
+            return change.kind == Kind::added;
+        case By::removed:
+            return change.kind == Kind::removed;
+        case By::any:
+            return true;
+        case By::leaving:
+            return change.before == how.word;
+        case By::coming:
+            return change.after == how.word;
+        case By::growing:
+            return is_larger(change.before, change.after, how);
+        case By::falling:
+            return !change.before.empty() &&
+                   (change.after.empty() || is_larger(change.after, change.before, how));
+        case By::more:
+            return has_more(change.before, change.after, std::equal_to<>());
+        case By::wider:
+            return has_more(change.before, change.after, covers_network);
+    }
+    std::abort();
+}
+
+/// The settings of both sides, for rules of two keys.
+struct Sides {
+    const Settings& before;
+    const Settings& after;
+
+    static bool has(const Settings& side, const std::string& path, std::string_view value) {
+        const auto found = side.find(path);
+        return found != side.end() && found->second.applies && found->second.value == value;
+    }
+};
+
+/// Changes that depend on a neighbour: limits of a point that is not writable, retries where writes
+/// are not repeated, a profile without a guard.
+bool is_harmless(const Change& change, const config::KeyShape& key, const Sides& sides) {
+    const std::string map = change.path.substr(0, change.path.rfind('/'));
+    const std::string& entry = change.kind == Kind::added ? change.path : map;
+    if (key.path.starts_with("lines/stations/points"))
+        return !Sides::has(sides.after, entry + "/writable", "true");
+    if (key.path == "lines/stations/retry_writes")
+        return Sides::has(sides.after, map + "/retries", "0");
+    if (key.path == "lines/retries" || key.path == "lines/stations/retries")
+        return !Sides::has(sides.after, map + "/retry_writes", "true");
+    return key.path == "lines/stations/profile" && !Sides::has(sides.after, map + "/guard", "true");
+}
+
+/// A station that was protected is not listed any more, on a line that passes such stations.
+bool is_unprotected(const Change& change, const Sides& sides) {
+    const std::string line = change.path.substr(0, change.path.find("/stations/"));
+    const bool passes = Sides::has(sides.after, line + "/unlisted_stations", "pass") &&
+                        !Sides::has(sides.after, line + "/mode", "listen");
+    return passes && (Sides::has(sides.before, change.path + "/access", "read_only") ||
+                      Sides::has(sides.before, change.path + "/guard", "true"));
+}
+
+/// `setting`: of one of the sides.
+bool is_weaker(const Change& change, const Setting& setting, const Sides& sides) {
+    const config::KeyShape* key = config::describe().of(setting);
+    if (setting.secret) return !change.path.ends_with("/files");
+    if (key == nullptr) return false;
+    if (key->path == "lines/stations")
+        return change.kind == Kind::removed
+                   ? is_unprotected(change, sides)
+                   : Sides::has(sides.after, change.path + "/retry_writes", "true");
+    if (key->path == "access/rules") {
+        const bool was_added = change.kind == Kind::added;
+        const Settings& side = was_added ? sides.after : sides.before;
+        return !Sides::has(side, change.path + (was_added ? "/allow" : "/deny"), "");
+    }
+    // Only the alias of unit 0 keeps broadcasts from all stations.
+    if (key->path.ends_with("/units") && change.kind == Kind::removed)
+        return change.path.ends_with("/units/0") &&
+               !Sides::has(sides.after,
+                           change.path.substr(0, change.path.find("/units/")) + "/broadcast",
+                           "deny");
+    return weakens(key->weaker, change) && !is_harmless(change, *key, sides);
 }
 
 Change change_of(const std::string& path, const Difference& difference) {
@@ -240,6 +379,9 @@ std::vector<Change> differences(const config::Config& before, const config::Conf
     for (const auto& [path, difference] : all) {
         if (is_within(all, path) || follows(all, difference)) continue;
         changes.push_back(change_of(path, difference));
+        changes.back().weaker = is_weaker(
+            changes.back(), difference.after == nullptr ? *difference.before : *difference.after,
+            {old_settings, new_settings});
         if (is_one_sided(difference)) continue;
         const config::KeyShape* key = keys.of(*difference.after);
         if (key != nullptr && !is_taken_over(before, after, path))
@@ -249,9 +391,16 @@ std::vector<Change> differences(const config::Config& before, const config::Conf
     // Settings have names, not places.
     if (order_of_rules(before, after) != order_of_rules(after, before))
         changes.push_back({"access/rules", Kind::changed, order_of_rules(before, after),
-                           order_of_rules(after, before)});
+                           order_of_rules(after, before), "", true});
     std::ranges::sort(changes, {}, &Change::path);
     return changes;
+}
+
+std::vector<std::string> weaker(const config::Config& before, const config::Config& after) {
+    std::vector<std::string> all;
+    for (const Change& change : differences(before, after))
+        if (change.weaker) all.push_back(to_string(change));
+    return all;
 }
 
 std::string to_string(const Change& change) {

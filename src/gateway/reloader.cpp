@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "panelgate/config/describe.hpp"
-#include "panelgate/config/weaker.hpp"
 #include "panelgate/explain/difference.hpp"
 #include "panelgate/explain/load.hpp"
 #include "panelgate/gateway/certificates.hpp"
@@ -161,7 +160,7 @@ void Reloader::Job::read() try {
         config::Config made = may_be_weaker ? *rollback : with_tokens_of(*rollback, *running);
         keep_certificates(made);
         next = std::make_shared<const config::Config>(std::move(made));
-        verdict.weaker = config::weaker(*running, *next);
+        verdict.weaker = explain::weaker(*running, *next);
         if (!verdict.weaker.empty() && !may_be_weaker) {
             next = nullptr;
             verdict.outcome = ReloadOutcome::refused;
@@ -196,7 +195,7 @@ void Reloader::Job::read() try {
 
 /// Nothing but tokens has changed since, and those that were would allow more.
 void Reloader::Job::refuse_tokens() {
-    verdict.weaker = config::weaker(*running, *rollback);
+    verdict.weaker = explain::weaker(*running, *rollback);
     if (verdict.weaker.empty()) return;
     next = nullptr;
     verdict.outcome = ReloadOutcome::refused;

@@ -24,79 +24,6 @@ struct Change {
     Line line;
 };
 
-/// A higher rate: the lowest that is enough, else the highest that all panels support.
-std::optional<Change> higher_baud(const Line& line);
-/// A longer interval for the costliest read only, if that is enough with less than ten times the
-/// interval. Applies to everything asked of this station from the read's first item to its last.
-std::optional<Change> slow_costliest_read(const Line& line, const LinePlan& plan);
-/// One factor on all intervals; a relay's refresh stays.
-std::optional<Change> slow_all_intervals(const Line& line, const LinePlan& plan);
-/// One relay instead of several. Points and poll blocks are joined anyway.
-std::optional<Change> merge_relays(const Line& line);
-
-namespace {
-
-/// True if the panel supports this read in one request, within one area.
-bool can_read(const Line& line, const Relay::End& end) {
-    const Station& station = line.stations[end.station];
-    const profile::Area* area = station.profile->find_area(end.span.table, end.span.first);
-    return area != nullptr && area->readable.contains(end.span.first, end.span.count) &&
-           end.span.count <= limits_of(line, station).of(end.span.table).max_items;
-}
-
-bool can_write(const Line& line, const Relay::End& end) {
-    const profile::PanelProfile& panel = *line.stations[end.station].profile;
-    const profile::Area* area = panel.find_area(end.span.table, end.span.first);
-    const auto function = modbus::is_bit_table(end.span.table) ? modbus::kWriteMultipleCoils
-                                                               : modbus::kWriteMultipleRegisters;
-    return area != nullptr && area->writable &&
-           area->writable->contains(end.span.first, end.span.count) &&
-           end.span.count <= panel.max_count(function);
-}
-
-/// True if a relay reads from this station: joining relays that write to it could close a circle.
-bool is_relay_source(const Line& line, std::size_t station) {
-    return std::ranges::any_of(line.relays, [&](const Relay& relay) {
-        return relay.from && relay.from->station == station;
-    });
-}
-
-/// Returns one relay instead of both, if possible.
-std::optional<Relay> merged(const Line& line, const Relay& a, const Relay& b) {
-    if (!a.continues_in(b) || is_relay_source(line, a.to->station)) return std::nullopt;
-    Relay both = a;
-    both.from->span.count += b.from->span.count;
-    both.to->span.count += b.to->span.count;
-    if (!can_read(line, *both.from) || !can_write(line, *both.to)) return std::nullopt;
-    return both;
-}
-
-/// Merges the first two relays that can be merged; returns false if there are none.
-bool merge_first_pair(Line& line, std::string& which) {
-    for (Relay& first : line.relays) {
-        for (auto next = line.relays.begin(); next != line.relays.end(); ++next) {
-            const auto both = merged(line, first, *next);
-            if (!both) continue;
-            which += (which.empty() ? "" : ", ") + first.name + " and " + next->name;
-            first = *both;
-            line.relays.erase(next);
-            return true;
-        }
-    }
-    return false;
-}
-
-}  // namespace
-
-std::optional<Change> merge_relays(const Line& line) {
-    Line made = line;
-    std::string which;
-    while (merge_first_pair(made, which)) {
-    }
-    if (which.empty()) return std::nullopt;
-    return Change{"one relay instead of " + which, std::move(made)};
-}
-
 namespace {
 
 constexpr std::array kRates{2400, 4800, 9600, 19200, 38400, 57600, 115200};
@@ -107,8 +34,7 @@ bool all_have(const Line& line, int baud) {
     });
 }
 
-}  // namespace
-
+/// The lowest higher rate that is enough, else the highest that all panels support.
 std::optional<Change> higher_baud(const Line& line) {
     std::optional<Change> found;
     for (const int baud : kRates) {
@@ -120,92 +46,11 @@ std::optional<Change> higher_baud(const Line& line) {
     return found;
 }
 
-namespace {
-
 using yaml::format_duration;
 
-constexpr int kMaxReadFactor = 10;  // factor, for one read alone
 constexpr int kMaxTenths = 10'000;  // factor for all intervals, in tenths
 
 bool is_enough(const Line& line) { return verdict(make_plan(line)) == Verdict::fine; }
-
-/// Reads with the same wants: several if a block is cut.
-struct CostliestRead {
-    const Poll* first = nullptr;
-    Duration wire{};
-    double load = 0;
-};
-
-CostliestRead costliest_read_of(const LinePlan& plan) {
-    std::map<std::pair<std::string, std::vector<std::size_t>>, CostliestRead> reads;
-    for (const Poll& poll : plan.polls) {
-        CostliestRead& sum = reads[{poll.station, poll.asked}];
-        if (sum.first == nullptr) sum.first = &poll;
-        sum.wire += poll.wire;
-        sum.load += poll.load;
-    }
-    const auto costliest =
-        std::ranges::max_element(reads, {}, [](const auto& entry) { return entry.second.load; });
-    return costliest == reads.end() ? CostliestRead() : costliest->second;
-}
-
-/// What a read serves, as a range of one station's items.
-struct Scope {
-    std::size_t station = 0;
-    const PolledItem* first = nullptr;
-    const PolledItem* last = nullptr;
-
-    bool contains(const PolledItem& asked) const {
-        const modbus::Span& span = asked.want.span;
-        return span.table == first->want.span.table && span.first >= first->want.span.first &&
-               span.first <= last->want.span.first;
-    }
-};
-
-Scope scope_of(const Line& line, const Poll& poll) {
-    const auto station = std::ranges::find(line.stations, poll.station, &Station::name);
-    Scope scope{static_cast<std::size_t>(station - line.stations.begin()), nullptr, nullptr};
-    for (const std::size_t index : poll.asked) {
-        const PolledItem& asked = station->asked[index];
-        const std::uint32_t at = asked.want.span.first;
-        if (scope.first == nullptr || at < scope.first->want.span.first) scope.first = &asked;
-        if (scope.last == nullptr || at > scope.last->want.span.first) scope.last = &asked;
-    }
-    return scope;
-}
-
-Line with(const Line& line, const Scope& scope, Duration every) {
-    Line made = line;
-    for (PolledItem& asked : made.stations[scope.station].asked) {
-        if (scope.contains(asked)) asked.want.every = std::max(asked.want.every, every);
-    }
-    return made;
-}
-
-/// "100ms", or "100ms to 130ms": the current intervals shorter than `every`.
-std::string intervals_of(const Line& line, const Scope& scope, Duration every) {
-    Duration shortest = every;
-    Duration longest{};
-    for (const PolledItem& asked : line.stations[scope.station].asked) {
-        if (!scope.contains(asked) || asked.want.every >= every) continue;
-        shortest = std::min(shortest, asked.want.every);
-        longest = std::max(longest, asked.want.every);
-    }
-    const std::string text = format_duration(shortest);
-    return longest > shortest ? text + " to " + format_duration(longest) : text;
-}
-
-std::string text_of(const Poll& poll, const Scope& scope) {
-    const std::string text = "read " + poll.station + ' ' + scope.first->notation;
-    if (scope.first->want.span.first != scope.last->want.span.first)
-        return text + " to " + scope.last->notation;
-    return text + " (" + std::to_string(scope.first->want.span.count) + ')';
-}
-
-/// Returns the load that the costliest read may have at most.
-double budget_for(const CostliestRead& costliest, const LinePlan& plan) {
-    return std::min(kHigh - plan.load, kFull - plan.most) + costliest.load;
-}
 
 /// Returns the least sufficient factor, in tenths and at least `first`; 0: none.
 int least_tenths(const Line& line, int first) {
@@ -244,29 +89,7 @@ std::string remarks_of(const Line& line) {
     return text.empty() ? text : " (" + text + ')';
 }
 
-}  // namespace
-
-std::optional<Change> slow_costliest_read(const Line& line, const LinePlan& plan) {
-    const CostliestRead costliest = costliest_read_of(plan);
-    if (costliest.load <= 0) return std::nullopt;
-    const Duration now = costliest.first->every;
-    const Duration max_every = std::min<Duration>(kMaxReadFactor * now, points::kSlowest);
-    const double left = budget_for(costliest, plan);
-    if (left * kMaxReadFactor < costliest.load) return std::nullopt;
-    const Scope scope = scope_of(line, *costliest.first);
-    Duration every = rounded_up(std::chrono::duration_cast<Duration>(
-        std::chrono::duration<double>(to_seconds(costliest.wire) / left)));
-    for (; every <= max_every; every = rounded_up(every + every / 20)) {
-        if (every <= now) continue;
-        Line made = with(line, scope, every);
-        if (!is_enough(made)) continue;
-        return Change{text_of(*costliest.first, scope) + " every " + format_duration(every) +
-                          " instead of " + intervals_of(line, scope, every),
-                      std::move(made)};
-    }
-    return std::nullopt;
-}
-
+/// One factor on all intervals; a relay's refresh stays.
 std::optional<Change> slow_all_intervals(const Line& line, const LinePlan& plan) {
     const double least = std::max(plan.load / kHigh, plan.most / kFull);  // no load shrinks faster
     if (least * 10 > kMaxTenths) return std::nullopt;
@@ -278,14 +101,15 @@ std::optional<Change> slow_all_intervals(const Line& line, const LinePlan& plan)
                   std::move(made)};
 }
 
+}  // namespace
+
 std::vector<Advice> advise(const Line& line, const LinePlan& plan) {
     std::vector<Advice> all;
     if (verdict(plan) == Verdict::fine) return all;
     const bool changing = is_high_by_changes(plan);
     const auto judged = [&](const auto& one) { return changing ? one.most : one.load; };
-    const auto changes = {higher_baud(line), slow_costliest_read(line, plan),
-                          slow_all_intervals(line, plan), merge_relays(line)};
-    for (const std::optional<Change>& change : changes) {
+    for (const std::optional<Change>& change :
+         {higher_baud(line), slow_all_intervals(line, plan)}) {
         if (!change) continue;
         const LinePlan then = make_plan(change->line);
         if (judged(plan) - judged(then) >= kMinGain)

@@ -107,8 +107,8 @@ std::optional<Finding> slip_of(std::string_view line, std::size_t at, On on) {
         for (const Slip& slip : kSlips) all.emplace_back(slip.pattern, std::regex::optimize);
         return all;
     }();
-    constexpr std::size_t kLongest = 200;  // of a typed line
-    if (line.empty() || line.size() > kLongest) return std::nullopt;
+    constexpr std::size_t kLongestLine = 200;  // of a typed line
+    if (line.empty() || line.size() > kLongestLine) return std::nullopt;
     for (std::size_t row = 0; row < kSlips.size(); ++row) {
         Match match;
         if (kSlips[row].on != on ||

@@ -257,7 +257,7 @@ class OwnRoles(unittest.TestCase):
             self.assertEqual(ask(program, "POST", "/api/v1/reload")[0], 200)
             status, said = ask(program, "POST", "/api/v1/reload", None, {"rollback": True})
             self.assertEqual((status, sorted(json.loads(said)["weaker"])),
-                             (409, ["access: role caller has more rights", "access: role keeper has more rights"]))
+                             (409, ["access/roles/caller: rights [read] -> [raw, read]", "access/roles/keeper: rights [read] -> [reload]"]))
 
     def test_check_names_what_is_wrong_and_explains(self):
         with tempfile.TemporaryDirectory() as folder:

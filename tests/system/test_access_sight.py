@@ -187,7 +187,7 @@ class Viewer(unittest.TestCase):
             self.assertEqual(ask(program, "POST", "/api/v1/reload")[0], 200)
             self.assertEqual(ask(program, "GET", "/api/v1/stations/oven", "eye")[0], 200)
             status, text = ask(program, "POST", "/api/v1/reload", None, {"rollback": True})
-            self.assertEqual((status, json.loads(text)["weaker"]), (409, ["access: rule eye-sees-press is another"]))
+            self.assertEqual((status, json.loads(text)["weaker"]), (409, ["access/rules/eye-sees-press: stations not set -> [floor1/31]"]))
             self.assertEqual(ask(program, "POST", "/api/v1/reload", None, {"rollback": True, "weaker": True})[0], 200)
             self.assertEqual(ask(program, "GET", "/api/v1/stations/oven", "eye")[0], 403)
 
@@ -199,7 +199,7 @@ class Viewer(unittest.TestCase):
             self.assertEqual(ask(program, "POST", "/api/v1/reload")[0], 200)
             self.assertEqual(ask(program, "GET", "/api/v1/lines", "eye")[0], 401)
             status, text = ask(program, "POST", "/api/v1/reload", None, {"rollback": True})
-            self.assertEqual((status, json.loads(text)["weaker"]), (409, ["http: token eye: expires later"]))
+            self.assertEqual((status, json.loads(text)["weaker"]), (409, ["http/tokens/eye: expires 2020-01-01 -> not set"]))
             self.assertEqual(ask(program, "POST", "/api/v1/reload", None, {"rollback": True, "weaker": True})[0], 200)
             self.assertEqual(ask(program, "GET", "/api/v1/lines", "eye")[0], 200)
 

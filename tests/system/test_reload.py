@@ -148,7 +148,7 @@ class Reload(unittest.TestCase):
             client = harness.Client(running.program.modbus_port())
             status, problem = running.reload(path="/api/v1/reload?rollback=true")
             self.assertEqual((status, problem["outcome"], problem["weaker"]),
-                             (409, "refused", ["station mixer: access read_only -> read_write"]))
+                             (409, "refused", ["lines/other/stations/mixer: access read_only -> read_write"]))
             self.assertEqual(client.ask(5, bytes.fromhex("0600000001")), b"\x86\x01")
             self.assertEqual(running.metric("panelgate_config_last_reload_successful"), ["1"])
             self.assertEqual(running.reload(path="/api/v1/reload?weaker=true")[0], 400)
@@ -157,12 +157,12 @@ class Reload(unittest.TestCase):
                 [harness.PANELGATE, "reload", "--rollback", "--http", place],
                 capture_output=True, text=True, timeout=harness.PATIENCE)
             self.assertEqual(done.returncode, 1)
-            self.assertIn("  station mixer: access read_only -> read_write", done.stderr)
+            self.assertIn("  lines/other/stations/mixer: access read_only -> read_write", done.stderr)
             done = subprocess.run(
                 [harness.PANELGATE, "reload", "--rollback", "--weaker", "--http", place],
                 capture_output=True, text=True, timeout=harness.PATIENCE)
             self.assertEqual((done.returncode, done.stdout.split()[0]), (0, "applied"))
-            running.program.log.wait_for("warn configuration weaker what=.station mixer: access")
+            running.program.log.wait_for("warn configuration weaker what=.lines/other/stations/mixer: access")
 
     def test_units_that_lead_to_another_panel_are_warned_of_as_check_does(self):
         def served(first, second):

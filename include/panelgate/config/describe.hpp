@@ -16,6 +16,25 @@ namespace panelgate::config {
 
 struct Setting;
 
+/// Which change of a key lets more happen at the panels, or keeps less of what happened.
+struct Weaker {
+    enum class By : std::uint8_t {
+        nothing,
+        any,      ///< each change
+        leaving,  ///< the value is `word` no more
+        coming,   ///< the value becomes `word`
+        growing,  ///< a number, or the place among `ranks`, grows; no value is the highest number
+        falling,  ///< ... shrinks; no value is the lowest number
+        more,     ///< a list has more words; an empty list means all
+        wider,    ///< networks that were not let in; an empty list means all
+        added,    ///< an entry, or the map itself, is new
+        removed   ///< ... is gone
+    };
+    By by = By::nothing;
+    std::string word{};
+    std::vector<std::string> ranks{};
+};
+
 /// What values a key accepts, and what its documentation says.
 struct KeyShape {
     enum class Kind : std::uint8_t { text, integer, number, boolean, duration, word, map, list };
@@ -47,7 +66,8 @@ struct KeyShape {
     std::string example = {};      ///< a value in the file's notation; or ""
     std::string change = {};       ///< what a change of it needs beside a reload; or ""
     int order = 0;                 ///< among the keys of its map
-    bool may_be_text = false;      ///< of Kind::map: a text says the same
+    Weaker weaker = {};
+    bool may_be_text = false;  ///< of Kind::map: a text says the same
 };
 
 /// A dependency between two keys of a map; a merge may supply the other.

@@ -22,6 +22,7 @@ struct Change {
     std::string after;
     /// What a reload does for it beside taking it over: "the port is opened anew"; "" nothing.
     std::string needs = {};
+    bool weaker = false;  ///< it protects the panels less (config::Weaker), or may do so
 };
 std::string_view label(Change::Kind kind);
 
@@ -29,6 +30,11 @@ std::string_view label(Change::Kind kind);
 /// that stations inherit from their line is reported once, for the line. Pure; takes about 0.1 s
 /// for a large plant.
 std::vector<Change> differences(const config::Config& before, const config::Config& after);
+
+/// The changes by which `after` protects less, one line each: who may write, who may connect and
+/// from where, what a guard refuses, roles and tokens, what the gateway writes by itself (repeated
+/// writes, relays), and what the audit keeps. Doubtful cases are listed. Pure.
+std::vector<std::string> weaker(const config::Config& before, const config::Config& after);
 
 /// "lines/floor1/stations/press/poll/UW0: every 1s -> 2s", "lines/floor2: added"; without what it
 /// needs.

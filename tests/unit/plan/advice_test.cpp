@@ -62,37 +62,6 @@ TEST_F(AdviceTest, TheLowestRateThatIsEnoughIsToldIfAllPanelsHaveIt) {
     EXPECT_THAT(find("serial").what, IsEmpty());
 }
 
-TEST_F(AdviceTest, ADearReadIsToldByItsFirstAndItsLastItemWithAnIntervalThatIsEnough) {
-    struct Asked {
-        std::uint32_t first;
-        std::uint32_t count;
-        Duration every;
-    };
-    static const struct {
-        std::vector<Asked> asked;
-        const char* what;
-        const char* every;
-    } kRows[] = {
-        // one of several reads
-        {{{0, 100, 250ms}, {1000, 1, 1s}}, "R0 (100)", "300ms instead of 250ms"},
-        // points of one read
-        {{{8, 2, 40ms}, {0, 2, 40ms}, {4, 2, 40ms}, {2, 1, 10s}}, "R0 to R8", " instead of 40ms"},
-        // with several intervals
-        {{{8, 2, 40ms}, {0, 2, 40ms}, {4, 2, 45ms}}, "R0 to R8", " instead of 40ms to 45ms"},
-        // a block that is cut
-        {{{0, 300, 500ms}}, "R0 (300)", " instead of 500ms"},
-    };
-    for (const auto& row : kRows) {
-        SCOPED_TRACE(row.every);
-        line.stations.clear();
-        Station& press = add("press");
-        for (const Asked& one : row.asked) ask(press, one.first, one.count, one.every);
-        const Advice rarer = find(std::string("read press ") + row.what + " every ");
-        EXPECT_THAT(rarer.what, EndsWith(row.every));
-        EXPECT_LE(rarer.load, kHigh);
-    }
-}
-
 TEST_F(AdviceTest, WhereNoPollAloneIsEnoughAllIntervalsAreUpToADay) {
     for (const char* name : {"a", "b", "c", "d"}) ask(add(name), 0, 100, 600ms);
     EXPECT_THAT(find("read").what, IsEmpty());
@@ -128,47 +97,6 @@ TEST_F(AdviceTest, ARefreshIsNoInterval) {
     line.relays[0].every = std::chrono::round<std::chrono::microseconds>(factor(all) * 100ms);
     EXPECT_NEAR(all.load, make_plan(line).load, 1e-6);
     EXPECT_EQ(verdict(make_plan(line)), Verdict::fine);
-}
-
-TEST_F(AdviceTest, RelaysThatGoOnWhereAnotherEndsCouldBeOne) {
-    add_both();
-    for (const std::uint32_t first : {4u, 0u, 8u}) copy(first, 4, 200ms);
-    const Advice one = find("one relay instead of ");
-    EXPECT_THAT(one.what, HasSubstr("copy4 and copy8"));
-    EXPECT_THAT(one.what, HasSubstr("copy0 and copy4"));
-    line.relays.clear();
-    copy(0, 12, 200ms);
-    EXPECT_NEAR(one.load, make_plan(line).load, 1e-9);
-}
-
-TEST_F(AdviceTest, RelaysThatDifferStayTwo) {
-    add_both();
-    copy(0, 4, 150ms);
-    copy(4, 4, 150ms);
-    EXPECT_THAT(merged_after([] {}), Not(IsEmpty()));
-    EXPECT_THAT(merged_after([&] { ++line.relays[1].to->span.first; }), IsEmpty());
-    EXPECT_THAT(merged_after([&] { line.relays[1].refresh = 60s; }), IsEmpty());
-    const auto read_on = [&] {  // it would be a circle
-        Relay& back = copy(500, 4, 150ms);
-        back.from = Relay::End{1, {kRegisters, 500, 4}};
-        back.to = Relay::End{0, {kRegisters, 4, 4}};
-    };
-    EXPECT_THAT(merged_after(read_on), IsEmpty());
-    const auto too_long = [&] {  // for one write
-        line.relays.clear();
-        copy(0, 100, 300ms);
-        copy(100, 24, 300ms);
-    };
-    EXPECT_THAT(merged_after(too_long), IsEmpty());
-    profile::PanelProfile parts = *shipped.find("generic");  // its areas end between them
-    const profile::Area whole = *parts.find_area(kRegisters, 500);
-    parts.areas.clear();
-    for (const std::uint32_t first : {0u, 504u}) {
-        profile::Area& part = parts.areas.emplace_back(whole);
-        part.readable = {first, first == 0 ? 503u : 9999u};
-        part.writable = part.readable;
-    }
-    EXPECT_THAT(merged_after([&] { line.stations[1].profile = &parts; }), IsEmpty());
 }
 
 TEST_F(AdviceTest, WhatIsTooMuchWhileValuesChangeIsJudgedByThat) {

@@ -1,4 +1,4 @@
-#include "panelgate/config/weaker.hpp"
+#include "panelgate/explain/difference.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,11 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "memory_files.hpp"
 #include "panelgate/config/config.hpp"
+#include "unit/config/memory_files.hpp"
 
-namespace panelgate::config::weaker_test {
+namespace panelgate::explain::weaker_test {
 namespace {
+
+using namespace config;
 
 /// Makes a configuration of the keys that differ.
 using Maker = std::function<std::string(const std::string&)>;
@@ -65,10 +67,11 @@ std::string http(const std::string& keys) {
 
 TEST(Weaker, AccessAndGuardOfAStation) {
     EXPECT_EQ(told(station, ", access: read_only", ""),
-              "station press: access read_only -> read_write");
-    EXPECT_EQ(told(station, ", guard: true", ""), "station press: guard true -> false");
+              "lines/floor1/stations/press: access read_only -> read_write");
+    EXPECT_EQ(told(station, ", guard: true", ""),
+              "lines/floor1/stations/press: guard true -> false");
     EXPECT_EQ(one_way(station(", guard: true, profile: omron-cp2e"), station(", guard: true")),
-              "station press: guard by profile omron-cp2e -> generic")
+              "lines/floor1/stations/press: profile omron-cp2e -> generic")
         << "which refuses something else";
 }
 
@@ -78,25 +81,27 @@ TEST(Weaker, WhatMayBeWrittenToPoints) {
                      ", profile: autonics-gplp-s, points: [{name: set, at: UW100" + keys + "}]",
                      kListener);
     };
-    EXPECT_EQ(told(point, "", ", writable: true"), "point press/set: is writable");
+    EXPECT_EQ(told(point, "", ", writable: true"),
+              "lines/floor1/stations/press/points/set: writable false -> true");
     EXPECT_EQ(told(point, ", writable: true, max: 50", ", writable: true, max: 400"),
-              "point press/set: max 50 -> 400");
+              "lines/floor1/stations/press/points/set: max 50 -> 400");
     EXPECT_EQ(told(point, ", writable: true, min: 5, max: 50", ", writable: true"),
-              "point press/set: max 50 -> none; point press/set: min 5 -> none");
+              "lines/floor1/stations/press/points/set: max 50 -> not set; "
+              "lines/floor1/stations/press/points/set: min 5 -> not set");
     EXPECT_EQ(told(point, ", max: 50", ", max: 400"), "") << "never written";
     EXPECT_EQ(one_way(point(", writable: true"), point(", writable: true, scale: 0.1")),
-              "point press/set: a value is written to another place, or as another number");
+              "lines/floor1/stations/press/points/set: scale 1 -> 0.1");
 }
 
 TEST(Weaker, WritesThatAreRepeated) {
     EXPECT_EQ(told(station, "", ", retry_writes: true"),
-              "station press: retry_writes false -> true");
+              "lines/floor1/stations/press: retry_writes false -> true");
     EXPECT_EQ(told(station, ", retry_writes: true", ", retry_writes: true, retries: 3"),
-              "station press: retries 1 -> 3, of writes too");
+              "lines/floor1/stations/press: retries 1 -> 3");
     EXPECT_EQ(told(station, ", retries: 1", ", retries: 3"), "") << "of reads";
     EXPECT_EQ(told(station, "", ", retry_writes: true, retries: 0"), "");
     EXPECT_EQ(told(station, "", "}, {id: 32, name: oven, retry_writes: true"),
-              "station oven: retry_writes false -> true");
+              "lines/floor1/stations/oven: added");
 }
 
 TEST(Weaker, WhatRelaysWrite) {
@@ -106,11 +111,11 @@ TEST(Weaker, WhatRelaysWrite) {
                kListener + "relays: [" + list + "]\n";
     };
     const std::string one = "{from: one/400001, to: two/400101}";
-    EXPECT_EQ(told(relays, "", one), "relay one/400001 to two/400101: is added");
+    EXPECT_EQ(told(relays, "", one), "relays/one/400001 to two/400101: added");
     EXPECT_EQ(told(relays, one, "{from: one/400001, to: two/400101, count: 4}"),
-              "relay one/400001 to two/400101: count 1 -> 4");
+              "relays/one/400001 to two/400101: count 1 -> 4");
     EXPECT_EQ(one_way(relays(one), relays("{from: one/400002, to: two/400101}")),
-              "relay one/400002 to two/400101: is added")
+              "relays/one/400002 to two/400101: added")
         << "other values";
     EXPECT_EQ(told(relays, one, "{from: one/400001, to: two/400101, every: 5s}"), "");
 }
@@ -119,59 +124,61 @@ TEST(Weaker, AStationThatIsNoLongerListedWhereUnlistedOnesPass) {
     const std::string without =
         "lines: [{name: floor1, device: sim, stations: [{id: 5}]}]\n" + kListener;
     EXPECT_EQ(one_way(station(", access: read_only"), without),
-              "station press: is not listed, so nothing is refused for it");
+              "lines/floor1/stations/press: removed");
     EXPECT_EQ(one_way(station(""), without), "");
 }
 
 TEST(Weaker, UnlistedStationsAndTheModeOfALine) {
     EXPECT_EQ(told(line, "unlisted_stations: refuse, ", ""),
-              "line floor1: unlisted_stations refuse -> pass");
+              "lines/floor1: unlisted_stations refuse -> pass");
     Config listening = loaded(line(""));
     listening.lines[0].listens = true;
-    EXPECT_EQ(joined(weaker(listening, loaded(line("")))), "line floor1: mode listen -> ask");
+    EXPECT_EQ(joined(weaker(listening, loaded(line("")))), "lines/floor1: mode listen -> master");
 }
 
 TEST(Weaker, AccessAndBroadcastsOfAListener) {
     EXPECT_EQ(told(endpoint, ", access: read_only", ""),
-              "modbus_tcp 127.0.0.1:1502: access read_only -> read_write");
+              "modbus_tcp/127.0.0.1:1502: access read_only -> read_write");
     EXPECT_EQ(told(endpoint, ", broadcast: deny", ""),
-              "modbus_tcp 127.0.0.1:1502: broadcast deny -> reply");
-    EXPECT_EQ(told(endpoint, "", ", udp: true"), "modbus_tcp 127.0.0.1:1502: udp false -> true");
+              "modbus_tcp/127.0.0.1:1502: broadcast deny -> reply");
+    EXPECT_EQ(told(endpoint, "", ", udp: true"), "modbus_tcp/127.0.0.1:1502: udp false -> true");
     EXPECT_EQ(told(endpoint, ", diagnostics_unit: null", ""),
-              "modbus_tcp 127.0.0.1:1502: diagnostics_unit null -> 255");
+              "modbus_tcp/127.0.0.1:1502: diagnostics_unit null -> 255");
 }
 
 TEST(Weaker, AListenerOnAWiderAddressOrAnotherPort) {
-    EXPECT_EQ(told(at, "127.0.0.1:1502", "0.0.0.0:1502"), "modbus_tcp 0.0.0.0:1502: is opened");
+    EXPECT_EQ(one_way(at("127.0.0.1:1502"), at("0.0.0.0:1502")), "modbus_tcp/0.0.0.0:1502: added");
     EXPECT_EQ(one_way(at("127.0.0.1:1502"), at("127.0.0.1:1503")),
-              "modbus_tcp 127.0.0.1:1503: is opened");
-    EXPECT_EQ(told(http_at, "127.0.0.1:8080", "0.0.0.0:8080"), "http 0.0.0.0:8080: is opened");
-    EXPECT_EQ(told(station(""), http("")), "http 127.0.0.1:8080: is opened");
+              "modbus_tcp/127.0.0.1:1503: added");
+    EXPECT_EQ(one_way(http_at("127.0.0.1:8080"), http_at("0.0.0.0:8080")),
+              "http: listen 127.0.0.1:8080 -> 0.0.0.0:8080");
+    EXPECT_EQ(told(station(""), http("")), "http: added");
 }
 
 TEST(Weaker, AllowThatLetsMoreIn) {
     const std::string one = ", allow: [127.0.0.1/32]";
     EXPECT_EQ(told(endpoint, one, ", allow: [127.0.0.0/8]"),
-              "modbus_tcp 127.0.0.1:1502: allow lets 127.0.0.0/8 in");
+              "modbus_tcp/127.0.0.1:1502: allow [127.0.0.1/32] -> [127.0.0.0/8]");
     EXPECT_EQ(told(endpoint, one, ", allow: [127.0.0.1/32, 10.0.0.5]"),
-              "modbus_tcp 127.0.0.1:1502: allow lets 10.0.0.5/32 in");
-    EXPECT_EQ(told(endpoint, one, ""), "modbus_tcp 127.0.0.1:1502: allow lets all addresses in");
+              "modbus_tcp/127.0.0.1:1502: allow [127.0.0.1/32] -> [10.0.0.5/32, 127.0.0.1/32]");
+    EXPECT_EQ(told(endpoint, one, ""),
+              "modbus_tcp/127.0.0.1:1502: allow [127.0.0.1/32] -> not set");
     EXPECT_EQ(told(endpoint, ", allow: [10.0.0.0/8]", ", allow: ['::/0']"),
-              "modbus_tcp 127.0.0.1:1502: allow lets ::/0 in");
-    EXPECT_EQ(told(http, one, ""), "http 127.0.0.1:8080: allow lets all addresses in");
+              "modbus_tcp/127.0.0.1:1502: allow [10.0.0.0/8] -> ['::/0']");
+    EXPECT_EQ(told(http, one, ""), "http: allow [127.0.0.1/32] -> not set");
 }
 
 TEST(Weaker, PagesOfMoreSitesThatMayRead) {
     EXPECT_EQ(told(http, ", cors: ['http://a.example']",
                    ", cors: ['http://a.example', 'http://b.example:81']"),
-              "http: cors has http://b.example:81");
+              "http: cors [http://a.example] -> [http://a.example, http://b.example:81]");
 }
 
 TEST(Weaker, HostsThatAreMore) {
     EXPECT_EQ(told(http, ", hosts: [a.example]", ", hosts: [a.example, b.example]"),
-              "http: hosts has b.example");
+              "http: hosts [a.example] -> [a.example, b.example]");
     EXPECT_EQ(one_way(http(", hosts: [a.example]"), http("")),
-              "http: hosts are all names of this machine");
+              "http: hosts [a.example] -> not set");
 }
 
 TEST(Weaker, RolesOfAnonymousClientsAndOfTokens) {
@@ -180,10 +187,10 @@ TEST(Weaker, RolesOfAnonymousClientsAndOfTokens) {
     const Maker tokens = [](const std::string& list) { return http(", tokens: [" + list + "]"); };
     const std::string a = "{name: a, role: viewer, file: /a}";
     EXPECT_EQ(told(tokens, a, "{name: a, role: operator, file: /a}"),
-              "http: token a: role viewer -> operator");
-    EXPECT_EQ(told(tokens, a, a + ", {name: b, role: viewer, file: /b}"), "http: token b is valid");
+              "http/tokens/a: role viewer -> operator");
+    EXPECT_EQ(told(tokens, a, a + ", {name: b, role: viewer, file: /b}"), "http/tokens/b: added");
     EXPECT_EQ(one_way(tokens(a), tokens("{name: a, role: viewer, file: /b}")),
-              "http: token a is valid")
+              "http/tokens/a: secret changed")
         << "another secret";
 }
 
@@ -193,8 +200,7 @@ TEST(Weaker, ARoleOfTheSameNameThatHasMoreRights) {
                "access: {roles: [{name: maint, rights: [" + list + "]}]}\n";
     };
     EXPECT_EQ(told(rights, "read", "read, raw"),
-              "http: anonymous maint has more rights; http: token a: role maint has more rights; "
-              "access: role maint has more rights");
+              "access/roles/maint: rights [read] -> [raw, read]");
 }
 
 TEST(Weaker, AListenerThatReachesMore) {
@@ -204,11 +210,11 @@ TEST(Weaker, AListenerThatReachesMore) {
                keys + "}]\n";
     };
     EXPECT_EQ(told(two, "lines: [a]", "lines: [a, b]"),
-              "modbus_tcp 127.0.0.1:1502: reaches line b");
+              "modbus_tcp/127.0.0.1:1502: lines [a] -> [a, b]");
     EXPECT_EQ(told(two, "lines: [a]", "lines: [a], units: {9: b/2}"),
-              "modbus_tcp 127.0.0.1:1502: unit 9 is station 2 of b");
+              "modbus_tcp/127.0.0.1:1502/units: 9 added, b/2");
     EXPECT_EQ(one_way(two("lines: [a], units: {0: a/1}"), two("lines: [a]")),
-              "modbus_tcp 127.0.0.1:1502: unit 0 is a broadcast to all stations");
+              "modbus_tcp/127.0.0.1:1502/units: 0 removed, was a/1");
     EXPECT_EQ(one_way(two("lines: [a], units: {0: a/1}"), two("lines: [a], broadcast: deny")), "");
 }
 
@@ -216,8 +222,8 @@ TEST(Weaker, WritesOfABroker) {
     const Maker mqtt = [](const std::string& keys) {
         return station("") + "mqtt: {broker: 'mqtt://127.0.0.1', topic: a" + keys + "}\n";
     };
-    EXPECT_EQ(told(mqtt, "", ", write: points"), "mqtt: write false -> true");
+    EXPECT_EQ(told(mqtt, "", ", write: points"), "mqtt: write none -> points");
 }
 
 }  // namespace
-}  // namespace panelgate::config::weaker_test
+}  // namespace panelgate::explain::weaker_test

@@ -9,14 +9,16 @@
 
 #include "panelgate/access/line_rules.hpp"
 #include "panelgate/config/config.hpp"
-#include "panelgate/config/weaker.hpp"
+#include "panelgate/explain/difference.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "support/hex.hpp"
 #include "support/request.hpp"
 #include "support/yaml_text.hpp"
 
-namespace panelgate::config::rules_test {
+namespace panelgate::explain::rules_test {
 namespace {
+
+using namespace config;
 
 struct NoFiles final : Files {
     std::optional<std::string> read(const std::string&) const override { return std::nullopt; }
@@ -97,12 +99,12 @@ TEST(Rules, WhoeverTakesThemAwayOrAllowsMoreProtectsLess) {
     EXPECT_EQ(told(no, no), "");
     EXPECT_EQ(told("\n" + no, no), "") << "in another line of its file";
     EXPECT_EQ(told(no, no + "    - {name: more, deny: [read]}\n"), "");
-    EXPECT_EQ(told(no, "    - {name: other, deny: [read]}\n"), "access: rule no denies no more\n");
-    EXPECT_EQ(told(no, yes + no), "access: rule yes allows\n");
-    EXPECT_EQ(told(no + yes, yes + no), "access: the rules have another order\n");
+    EXPECT_EQ(told(no, "    - {name: other, deny: [read]}\n"), "access/rules/no: removed\n");
+    EXPECT_EQ(told(no, yes + no), "access/rules/yes: added\n");
+    EXPECT_EQ(told(no + yes, yes + no), "access: rules no, yes -> yes, no\n");
     EXPECT_EQ(told(no, "    - {name: no, deny: [write], stations: [press]}\n"),
-              "access: rule no is another\n");
+              "access/rules/no: stations not set -> [floor1/31]\n");
 }
 
 }  // namespace
-}  // namespace panelgate::config::rules_test
+}  // namespace panelgate::explain::rules_test
