@@ -22,7 +22,7 @@ namespace {
 constexpr std::array<std::string_view, 5> kClientKeys{"client", "address", "token", "user",
                                                       "cause"};
 
-/// A member as text, whatever it is; "" if it is not there.
+/// Returns a member of any type as text; "" for a missing member.
 std::string any_text(const json::object& record, std::string_view name) {
     const json::value* value = record.if_contains(name);
     if (value == nullptr) return {};
@@ -85,7 +85,8 @@ std::string rest_text(const json::object& record) {
     return text;
 }
 
-/// By its name in the record, or by its line and id: it may have had another name, or none.
+/// Finds a station by the name in the record, or by line and id, because a station may have been
+/// renamed.
 bool is_about_station(const json::object& record, const AuditFilter& filter) {
     if (filter.station.empty() && filter.line.empty()) return true;
     if (!filter.station.empty() && text_of(record, "station") == filter.station) return true;

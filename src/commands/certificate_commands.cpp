@@ -89,7 +89,7 @@ class Files {
         if (!written) errno = why;
         return written && closed;
     }
-    /// Says what is done, then does it: who cannot be told gets nothing.
+    /// Prints what is written, then writes: no file is written where stdout takes nothing.
     ExitCode keep(const std::string& said) {
         std::signal(SIGPIPE, SIG_IGN);
         if (!(std::cout << said << std::flush)) {
@@ -176,7 +176,7 @@ std::string file_name(std::string name) {
     return name.substr(0, kLongest);
 }
 
-/// Does it, and says what was wrong if it could not be done.
+/// Runs the deed, and prints the fault of a failed deed.
 template <class Make>
 ExitCode explained(const Make& make) try {
     return make();

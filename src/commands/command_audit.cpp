@@ -40,13 +40,13 @@ std::string head_of(const std::string& file) {
     return head;
 }
 
-/// Which files are meant: these, or all of the chain that is written to one.
+/// Returns the named files, or all files of the chain that a named file belongs to.
 struct Named {
     Files files;
     std::string chain{};              ///< the file that is written; empty: `files` were named
     std::vector<Station> stations{};  ///< of the configuration, if that names the files
 
-    /// The files there are now. A rotation while they are read makes others of them.
+    /// The audit's files at this moment. A rotation during reading renames files.
     Files now() const {
         if (chain.empty()) return files;
         Files all = audit::rotated_files(chain);

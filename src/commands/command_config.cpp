@@ -53,7 +53,7 @@ class Walk {
         }
     }
 
-    /// True if it ends in a key, and its entries are there.
+    /// True if the path ends in a key, and the entries of the path exist.
     bool is_key() const { return is_key_ && list_.empty(); }
     /// "; write lines.NAME.retries, NAME being one of a, b"; "" where no name is missing.
     std::string hint() const {

@@ -72,7 +72,7 @@ ExitCode address(const std::string& name, const std::string& what, const std::st
 
 namespace {
 
-/// What a valid file says, so that its writer sees what was understood.
+/// Prints the content of a valid profile file, so that the author sees how the file was understood.
 void print_valid(const std::string& file, const profile::PanelProfile& read) {
     const auto count = [](std::size_t number, const char* what) {
         return std::to_string(number) + ' ' + what + (number == 1 ? "" : "s");

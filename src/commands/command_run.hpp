@@ -24,7 +24,7 @@ struct Ending {
     Duration patience() const { return std::max<Duration>(10s, longest_answer + 2s); }
 };
 
-/// Catches signals from its construction on, so that none ends the program while it starts.
+/// Catches signals from construction on, so that no signal ends the program during the start.
 class SignalLoop {
   public:
     explicit SignalLoop(boost::asio::io_context& io);

@@ -23,7 +23,8 @@ struct CheckOptions {
     bool json = false;
     /// Report a planned overload as a warning, not as kBadConfig.
     bool allow_overload = false;
-    std::string explain{};  ///< a request in words: say which rule decides on it, and nothing else
+    std::string explain{};  ///< a request in words: print only the rule that decides about the
+                            ///< request
 };
 ExitCode check(const std::string& file, const CheckOptions& options);
 /// Prints the setting at a path ("lines.floor1.stations.press.retries"), or all below it; "": all.

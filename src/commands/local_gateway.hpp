@@ -18,8 +18,8 @@ namespace panelgate::commands {
 /// any other address may be another machine's. Pure.
 std::set<std::string> listening_inodes(std::string_view table, const config::Endpoint& endpoint);
 
-/// The panelgate process of this machine that listens at `endpoint`; nothing if there is none, or
-/// if this user may not know. `proc`: where procfs is.
+/// Returns the panelgate process of this machine that listens at `endpoint`; nothing without such a
+/// process, or if the user may not see processes. `proc`: the folder of procfs.
 std::optional<pid_t> process_at(const config::Endpoint& endpoint,
                                 const std::filesystem::path& proc = "/proc");
 

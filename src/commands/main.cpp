@@ -290,7 +290,7 @@ class CommandLine {
         keys->add_option("--format", format_, "text or json")
             ->check(CLI::IsMember({"text", "json"}));
         keys->callback([this] { code_ = config_keys(path_, format_ == "json"); });
-        // Asked for by those who know it of other programs; no part of the help.
+        // Options of other programs that users try here; the help does not list the options.
         CLI::App* set = command->add_subcommand("set", "")->group("")->allow_extras();
         set->callback([this] {
             std::cerr

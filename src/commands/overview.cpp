@@ -56,7 +56,8 @@ Cell errors_of(const Figures& figures) {
             figures.errors > 0 ? Colour::warning : Colour::none};
 }
 
-/// Unknown: nobody has asked it, or its line is down. Heard: it answers another master.
+/// Unknown: the station was not asked, or the line is down. Heard: the station answers another
+/// master.
 bool is_well(std::string_view state) {
     return state == "online" || state == "heard" || state == "unknown";
 }

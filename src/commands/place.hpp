@@ -72,7 +72,8 @@ std::string escaped(std::string_view text);
 /// The JSON of a typed value: a number as its digits are, true and false (also on and off), 0x1F;
 /// anything else, or all if `is_text`, is a string. "" for a number with a decimal comma.
 std::string json_of_value(std::string_view typed, bool is_text);
-/// The same of several: one as it is, more as an array; "" if one has none.
+/// Returns the JSON of several typed values: a single value as a value, more as an array; "" if a
+/// value has no JSON.
 std::string json_of_values(std::span<const std::string> typed, bool is_text);
 
 }  // namespace panelgate::commands

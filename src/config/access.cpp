@@ -24,7 +24,6 @@ using access::Place;
 using access::Rule;
 using modbus::Span;
 using yaml::Node;
-using Kind = KeyShape::Kind;
 
 constexpr std::string_view kAny = "any";
 constexpr std::array<std::string_view, 4> kDefaultRoles{"viewer", "operator", "engineer", "admin"};
@@ -340,7 +339,8 @@ const Keys<access::Settings>& access_keys() {
 
 namespace {
 
-/// True if a condition lets everything through that the other does. An empty one lets all through.
+/// True if the wide condition lets everything through that the narrow condition lets through. An
+/// empty condition lets everything through.
 template <class List>
 bool is_as_wide(const List& wide, const List& narrow) {
     if (wide.empty()) return true;
@@ -361,7 +361,8 @@ bool is_as_wide_network(const std::vector<Network>& wide, const std::vector<Netw
 bool has_items_of(const Rule& wide, const Rule& narrow) {
     if (!wide.has_range()) return true;
     if (!narrow.has_range()) return false;
-    // Of stations that are not listed a rule speaks only if it names none, or one of them.
+    // A rule decides about unlisted stations only if the rule names no station, or an unlisted
+    // station.
     const bool only_listed = !narrow.stations.empty() &&
                              std::ranges::all_of(narrow.stations, [&](const access::Place& place) {
                                  return narrow.items.contains(place);
@@ -399,7 +400,8 @@ bool decides_all_of(const Rule& earlier, const Rule& rule) {
     const bool acts = std::ranges::all_of(kActs, [&](const auto& act) {
         return earlier.acts.has(act.second) || !rule.acts.has(act.second);
     });
-    // A range says nothing of functions without items, so one that names functions is left alone.
+    // A range does not restrict functions without items, so rules that name functions are not
+    // warned of.
     const bool functions = earlier.functions.empty()
                                ? !earlier.has_range() || rule.functions.empty()
                                : is_as_wide(earlier.functions, rule.functions);

@@ -31,7 +31,6 @@ void refuse_listen(Reader& in, std::string_view typed) {
 
 namespace {
 
-using Kind = KeyShape::Kind;
 using web::Token;
 using yaml::Node;
 
@@ -149,7 +148,7 @@ std::string secret_of(Reader& in, const std::string& file) {
     return secret;
 }
 
-/// Also one that was typed in capitals: taken for the token, it would let in whoever reads it.
+/// A hash typed in capitals counts too, because a hash taken for the token would let in its reader.
 bool looks_like_hash(std::string_view secret) {
     constexpr std::string_view kHashOf = "sha256:";
     return secret.size() >= kHashOf.size() &&

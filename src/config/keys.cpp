@@ -9,7 +9,6 @@
 
 namespace panelgate::config {
 
-using Kind = KeyShape::Kind;
 
 std::string list_text(std::vector<std::string> words) {
     std::ranges::sort(words);

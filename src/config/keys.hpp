@@ -71,6 +71,7 @@ std::string as_written(const std::vector<Value>& list) {
 }
 
 using By = Weaker::By;
+using Kind = KeyShape::Kind;
 
 /// The keys that a map has set.
 struct Given {
@@ -78,7 +79,7 @@ struct Given {
     bool has(std::string_view key) const { return std::ranges::find(keys, key) != keys.end(); }
 };
 
-/// Reads a text of this form; nothing, and a problem, of another.
+/// Reads a text of the form; reports a text of another form and returns nothing.
 std::optional<std::string> read_text(Reader& in, std::string_view key, const Form& form);
 /// Reads a number with all its digits.
 std::optional<Decimal> read_number(Reader& in, std::string_view key);
@@ -303,7 +304,7 @@ class Keys : public Table {
                     table().show(out.item(key, names.name(std::invoke(name, one))), one);
             });
     }
-    /// All rows of another table, whose keys are in the same map.
+    /// Adds all rows of another table; the keys of both tables are in the same map.
     template <class Field, class T, class U>
     Keys with(const Keys<T, U>& other, Field field) && {
         rows_.insert(rows_.end(), other.rows_.begin(), other.rows_.end());
@@ -366,7 +367,7 @@ class Keys : public Table {
         rows_.back().shape.example = example;
         return std::move(*this);
     }
-    /// What a change of it needs beside a reload; a key below it needs the same.
+    /// Says what a change of the key needs beside a reload; keys below the key need the same.
     Keys change_needs(std::string_view what) && {
         rows_.back().shape.change = what;
         return std::move(*this);
@@ -376,7 +377,7 @@ class Keys : public Table {
         rows_.back().shape.weaker = {by, std::string(word), std::move(ranks)};
         return std::move(*this);
     }
-    /// Keys below it that are left out are those of the map's owner.
+    /// Missing keys below the map have the values of the owner's map.
     Keys inherited() && {
         rows_.back().inherits = true;
         return std::move(*this);
@@ -392,8 +393,8 @@ class Keys : public Table {
         };
         return std::move(*this);
     }
-    /// It may be there only if `other` has one of these words, or, with `absent`, is missing;
-    /// otherwise "KEY why" is reported.
+    /// The key may be present only if `other` has one of the words, or, with `absent`, if `other`
+    /// is missing; otherwise "KEY why" is reported.
     Keys only_with(std::string_view other, std::vector<std::string> words, std::string_view why,
                    bool absent = false) && {
         conditions_.push_back(
@@ -401,7 +402,7 @@ class Keys : public Table {
              std::string(why)});
         return std::move(*this);
     }
-    /// If it is this word, `other` must be there; otherwise "KEY why" is reported.
+    /// If the value is `word`, the key `other` must be present; otherwise "KEY why" is reported.
     Keys needs(std::string_view word, std::string_view other, std::string_view why) && {
         conditions_.push_back(
             {{"", rows_.back().shape.path, std::string(other), {std::string(word)}, true, false},

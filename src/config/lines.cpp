@@ -16,7 +16,6 @@ namespace panelgate::config {
 
 namespace {
 
-using Kind = KeyShape::Kind;
 using yaml::Node;
 
 const Keys<Line>& line_serial_keys();

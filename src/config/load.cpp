@@ -24,7 +24,6 @@ bool load_mqtt(Reader& root, Config& config);
 
 namespace {
 
-using Kind = KeyShape::Kind;
 using yaml::Entry;
 using yaml::Node;
 
@@ -39,30 +38,30 @@ void drop_extensions(yaml::Node& tree) {
 constexpr std::string_view kHttp = "did you mean 'http'? It serves REST, pages and metrics";
 
 /// Keys that users write at the left margin.
-constexpr std::array<yaml::Elsewhere, 21> kElsewhere{{{"rest", {}, {}, kHttp},
-                                                      {"api", {}, {}, kHttp},
-                                                      {"web", {}, {}, kHttp},
-                                                      {"metrics", {}, {}, kHttp},
-                                                      {"prometheus", {}, {}, kHttp},
-                                                      {"level", "log", {}},
-                                                      {"format", "log", {}},
-                                                      {"listen", {}, "modbus_tcp or http"},
-                                                      {"allow", {}, "modbus_tcp or http"},
-                                                      {"units", {}, "modbus_tcp"},
-                                                      {"tokens", {}, "http"},
-                                                      {"anonymous", {}, "http"},
-                                                      {"stations", {}, "a line, one of 'lines'"},
-                                                      {"device", {}, "a line, one of 'lines'"},
-                                                      {"serial", {}, "a line, one of 'lines'"},
-                                                      {"baud", {}, "a line's serial"},
-                                                      {"retries", {}, "a line or a station"},
-                                                      {"echo", {}, "a line, one of 'lines'"},
-                                                      {"rules", {}, "access"},
-                                                      {"roles", {}, "access"},
-                                                      {"points", {}, "a station"}}};
+constexpr std::array<yaml::Elsewhere, 21> kTopElsewhere{{{"rest", {}, {}, kHttp},
+                                                         {"api", {}, {}, kHttp},
+                                                         {"web", {}, {}, kHttp},
+                                                         {"metrics", {}, {}, kHttp},
+                                                         {"prometheus", {}, {}, kHttp},
+                                                         {"level", "log", {}},
+                                                         {"format", "log", {}},
+                                                         {"listen", {}, "modbus_tcp or http"},
+                                                         {"allow", {}, "modbus_tcp or http"},
+                                                         {"units", {}, "modbus_tcp"},
+                                                         {"tokens", {}, "http"},
+                                                         {"anonymous", {}, "http"},
+                                                         {"stations", {}, "a line, one of 'lines'"},
+                                                         {"device", {}, "a line, one of 'lines'"},
+                                                         {"serial", {}, "a line, one of 'lines'"},
+                                                         {"baud", {}, "a line's serial"},
+                                                         {"retries", {}, "a line or a station"},
+                                                         {"echo", {}, "a line, one of 'lines'"},
+                                                         {"rules", {}, "access"},
+                                                         {"roles", {}, "access"},
+                                                         {"points", {}, "a station"}}};
 
 bool is_http(std::string_view key) {
-    return std::ranges::any_of(kElsewhere, [key](const yaml::Elsewhere& place) {
+    return std::ranges::any_of(kTopElsewhere, [key](const yaml::Elsewhere& place) {
         return place.key == key && place.instead == kHttp;
     });
 }
@@ -289,7 +288,7 @@ void load_tree(Loading& loading, Node& tree) {
     for (const Node& body : unused) check_template(loading, body);
     check_http(root, loading.config);
     check_servers(root, tree);
-    root.elsewhere(kElsewhere);
+    root.elsewhere(kTopElsewhere);
     root.finish();
     if (!loading.problems.empty()) return;
     if (loading.config.lines.empty()) return refuse_no_lines(root);

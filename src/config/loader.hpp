@@ -23,7 +23,7 @@ struct LineContext;
 /// Where what may be there once was written first.
 class Firsts {
   public:
-    /// "; the first one is in line 5" where it has been there before, else "".
+    /// Returns "; the first one is in line 5" for a repeated name, else "".
     std::string again(const std::string& name, yaml::Mark mark) {
         const auto [first, added] = lines_.emplace(name, mark.line);
         return added ? "" : "; the first one is in line " + std::to_string(first->second);
@@ -57,7 +57,8 @@ struct Loading {
     /// The file that a text of the configuration names.
     std::string path_of(const std::string& typed) const { return beside(problems.file(), typed); }
 
-    /// The content of a regular file; nothing if it cannot be read. Another one might never end.
+    /// Returns the content of a regular file; nothing for unreadable files, and for devices and
+    /// pipes, whose content may never end.
     std::optional<std::string> content_of(const std::string& path) const {
         return files.is_special(path) ? std::nullopt : files.read(path);
     }

@@ -1,4 +1,4 @@
-// Serial masters: their rows, and what their ports and panels say to them.
+// Serial masters: rows of the table, and checks of a master's port against lines and panels.
 
 #include <algorithm>
 #include <array>
@@ -152,12 +152,12 @@ const Keys<Master>& master_keys() {
 }
 
 std::optional<Master> load_master(Reader& root, const Node& node) {
-    static constexpr std::array<yaml::Elsewhere, 2> kElsewhere{
+    static constexpr std::array<yaml::Elsewhere, 2> kKeysElsewhere{
         {{"mode", {}, {}, "its mode is its framing: write framing: ascii, or leave it out for RTU"},
          {"baud", "serial", {}}}};
     Reader in(root.loading, node, "a serial master",
               "{name: plc, device: /dev/ttyUSB1, lines: [floor1]}");
-    in.elsewhere(kElsewhere);
+    in.elsewhere(kKeysElsewhere);
     Master settings;
     settings.access.diagnostics_unit.reset();
     settings.access.framing = Framing::rtu;

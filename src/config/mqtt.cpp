@@ -14,7 +14,6 @@
 namespace panelgate::config {
 namespace {
 
-using Kind = KeyShape::Kind;
 using mqtt::Settings;
 
 constexpr std::string_view kBroker = "write it into the broker, such as broker: mqtt://HOST:1883";

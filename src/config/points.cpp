@@ -1,4 +1,4 @@
-// Points and polls: their rows, and what the panel's memory says to them.
+// Points and polls: rows of the table, and checks against the memory of the panel.
 
 #include <algorithm>
 #include <array>
@@ -23,7 +23,6 @@ namespace panelgate::config {
 
 namespace {
 
-using Kind = KeyShape::Kind;
 using points::Point;
 using points::Type;
 using yaml::Node;

@@ -13,7 +13,6 @@ namespace panelgate::config {
 
 using points::Poll;
 using yaml::Node;
-using Kind = KeyShape::Kind;
 
 bool read_place(Reader& in, std::string_view key, std::string& text, modbus::Table& table,
                 std::uint16_t& address) {

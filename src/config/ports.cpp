@@ -13,7 +13,6 @@ namespace panelgate::config {
 
 namespace {
 
-using Kind = KeyShape::Kind;
 using yaml::Node;
 
 /// RTU has 8, ASCII normally 7, and 8 on some panels (serial line V1.02, 2.5.1, 2.5.2).

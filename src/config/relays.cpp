@@ -48,8 +48,7 @@ struct Item {
     friend bool operator==(const Item&, const Item&) = default;
 };
 
-/// Follows items back to their sources; each item is written by one copy at most, so there is one
-/// path.
+/// Follows items back to their sources. One relay at most writes an item, so an item has one path.
 class SourceTrace {
   public:
     explicit SourceTrace(const std::vector<Copy>& copies) : copies_(copies) {

@@ -45,7 +45,7 @@ void append_in_all_tables(std::vector<Span>& to, const profile::Area& area, cons
     for (const modbus::Table table : area.also) append(to, {{table, items.first, items.count}});
 }
 
-/// The words of these bits: those that have no other bits (`wholly`), or all.
+/// Returns the words that hold the bits. `wholly`: only words whose bits are all among `bits`.
 std::optional<Span> words_of(const Span& bits, bool wholly) {
     constexpr std::uint32_t kBits = profile::kBitsPerWord;
     const std::uint32_t first = (bits.first + (wholly ? kBits - 1 : 0)) / kBits;
@@ -54,7 +54,8 @@ std::optional<Span> words_of(const Span& bits, bool wholly) {
     return Span{bits.table, first, end - first};
 }
 
-/// All that shows memory of these items, and `wholly`: shows nothing else.
+/// Returns the items and the places that show the same memory. `wholly`: only places that show no
+/// other memory.
 std::vector<Span> shown(const profile::PanelProfile& profile, const Span& items, bool wholly) {
     std::vector<Span> all{items};
     for (const profile::Area& area : profile.areas) {
@@ -103,7 +104,7 @@ std::string other_range(const profile::PanelProfile& profile, const std::string&
     return "";
 }
 
-/// Returns the items at a station; `why`: what is wrong with them there.
+/// Returns the items of a rule at a station; `why` receives the fault of the items, if any.
 std::optional<Span> named_items(const profile::PanelProfile& profile, const Typed& typed,
                                 std::string& why) {
     const auto first = profile::parse_notation(profile, typed.first);

@@ -1,4 +1,4 @@
-// Listeners for Modbus/TCP: their rows, and which panels their clients reach.
+// Modbus/TCP listeners: rows of the table, and the panels that a listener's clients reach.
 
 #include <algorithm>
 #include <array>
@@ -20,7 +20,6 @@ namespace panelgate::config {
 
 namespace {
 
-using Kind = KeyShape::Kind;
 using modbus::Framing;
 using tcp_server::BroadcastMode;
 using tcp_server::Retransmissions;

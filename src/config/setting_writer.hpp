@@ -19,7 +19,7 @@ class SettingWriter {
     explicit SettingWriter(std::vector<Setting>& settings)
         : settings_(&settings), map_(std::make_shared<const SettingMap>()) {}
 
-    /// `owner`: the map whose key of the same name counts where this one is left out, or null.
+    /// `owner`: the map whose key of the same name replaces a missing key, or null.
     void put(const KeyShape& key, std::string value, const SettingWriter* owner) const {
         Setting& made = add(key.path, std::move(value));
         made.initial = key.initial;

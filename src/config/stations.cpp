@@ -19,7 +19,6 @@ namespace panelgate::config {
 namespace {
 
 using arbiter::StationSettings;
-using Kind = KeyShape::Kind;
 using profile::allows;
 using profile::PanelProfile;
 using yaml::Node;

@@ -40,7 +40,7 @@ struct Row {
     KeyShape shape;
     /// The rows of the map, or of each map of the list; empty: a value.
     std::function<const Table&()> below = {};
-    bool inherits = false;  ///< keys below it that are left out are those of the owner's map
+    bool inherits = false;  ///< missing keys below the map have the values of the owner's map
 };
 
 /// A dependency between two keys, and what is said where a file breaks it.

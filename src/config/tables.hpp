@@ -6,7 +6,8 @@
 
 namespace panelgate::config {
 
-/// A station is in two settings: what the gateway knows of it, and what its line's arbiter does.
+/// A station has two settings: the gateway's description of the panel, and the settings of the
+/// line's arbiter.
 template <class Of, class Settings>
 struct StationParts {
     Of& station;
@@ -30,7 +31,7 @@ Timing written(const arbiter::StationSettings& settings, bool automatic_gap, Dur
 /// A line while its keys are read.
 struct LineContext {
     Line& line;
-    /// False: its serial format had a fault, so nothing is checked against it.
+    /// False: the line's serial format had a fault, so no timing is checked against the format.
     bool serial_known = true;
     Timing timing{};
 };
@@ -106,8 +107,8 @@ void warn_of_same_adapter(Reader& in, const std::string& device, const std::stri
                           const std::string& other);
 /// Warns of a key that only a sending gateway uses, on a line that is only listened to.
 void warn_of_unused_key(Reader& in, std::string_view key);
-/// Checks a template that no station names as a station's body, so that its faults are found before
-/// use. Without a profile it is checked with the one that it fits best.
+/// Checks an unused template as a station's body, so that faults of the template are found before
+/// use. A template without a profile is checked with the best fitting profile.
 void check_template(Loading& loading, const yaml::Node& body);
 /// Reads the key `serial` of a line or of another port by `read`. False if there was a fault: the
 /// format must not be used.
@@ -132,7 +133,8 @@ const Table& table_range_table();
 /// Warns of rules that never decide anything.
 void warn_of_rules(Loading& loading);
 std::vector<std::string_view> role_words(const Config& config);
-/// The standing that a text names; nothing, and a problem, if it names none.
+/// Returns the standing that the role's name in `text` has; reports an unknown role and returns
+/// nothing.
 std::optional<Standing> find_role(Reader& in, std::string_view key, const std::string& text);
 
 /// The key `tls` of a listener: its files are read, and files that cannot serve are problems.

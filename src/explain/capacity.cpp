@@ -43,7 +43,7 @@ plan::Station station_of(const config::Line& line, const config::Station& statio
     return made;
 }
 
-/// The relay's end on this line; nothing if it is on another one.
+/// Returns the relay's end on the line; nothing if the relay's end is on another line.
 std::optional<plan::Relay::End> end_of(const plan::Line& line, const points::RelayEnd& end,
                                        std::uint32_t count) {
     const auto found = std::ranges::find(line.stations, end.station, &plan::Station::name);

@@ -80,7 +80,7 @@ bool is_within(const Differences& all, const std::string& path) {
     return false;
 }
 
-/// True if it changes only because the setting that it inherits from changes.
+/// True if the value changes only because the inherited setting changes.
 bool follows(const Differences& all, const Difference& difference) {
     if (is_one_sided(difference) || difference.after->otherwise.empty()) return false;
     const auto owner = all.find(difference.after->otherwise);

@@ -1,4 +1,4 @@
-// What a listener refuses by itself: whom it lets in, which lines it serves, whether it writes.
+// Refusals of a listener before rights are judged: networks, lines, access, broadcasts.
 #include "panelgate/explain/explain_door.hpp"
 
 #include <algorithm>

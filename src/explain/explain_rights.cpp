@@ -144,7 +144,7 @@ bool complete_face(const config::Config& config, AskedRight& asked) {
     return asked.wrong.empty();
 }
 
-/// A token's role, and what a door gives to those who show nothing.
+/// Completes the asked role: the token's role, or the door's role of clients without a token.
 void complete(const config::Config& config, AskedRight& asked) {
     if (!asked.who.token.empty() && config.http) {
         const auto& tokens = config.http->tokens;
@@ -327,7 +327,8 @@ Explanation explain(const config::Config& config, const std::string& file,
     AskedRight asked = parse(config, question);
     if (!asked.wrong.empty()) return {false, "", asked.wrong + kForm};
     if (asked.act != Act::raw || asked.raw_reads) return explain(config, file, asked);
-    // It was not said which: what holds for both, or what does not for one of them.
+    // A raw request without read or write: allowed if both are allowed, else the explanation of the
+    // refusal.
     asked.raw_reads = true;
     Explanation read = explain(config, file, asked);
     asked.raw_reads = false;

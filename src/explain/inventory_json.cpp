@@ -78,7 +78,7 @@ std::string_view name_of(const SettingTree& map) {
     return map.key() == "serial" ? "serial_format" : map.key();
 }
 
-/// Members that are there also where nothing is set: what has been there stays, with its type
+/// Members that are present without a setting, because a member of a release stays, with its type
 /// (docs/operate/versions.md).
 void add_lasting(json::object& made, std::string_view keys) {
     static const json::value kLasting = json::parse(R"({

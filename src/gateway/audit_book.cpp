@@ -102,7 +102,7 @@ std::string_view network_of(std::string_view address, std::string& room) {
     return room;
 }
 
-/// What one client may have of one kind of refusal is counted under this and what it is.
+/// Makes the client's key; refusals of a kind are counted by client.
 void make_client_key(std::string& key, const WhoRef& who) {
     key.clear();
     if (who) {

@@ -39,12 +39,12 @@ std::function<void(const web::Deed&)> AuditBook::deeds() {
 
 void AuditBook::deed(const web::Deed& deed) {
     if (!trail_) return;
-    // One record for one write: the bus has told of what it has refused to this client.
+    // A write has one record: the bus records refusals of its own.
     const bool is_told = std::exchange(refused_, nullptr) == deed.who && deed.who != nullptr;
     const bool discovers = deed.path.ends_with("/discover");
     const bool simulates = deed.path.find("/simulator/") != deed.path.npos;
     if (deed.status == 401 && deed.shown_token) {
-        // One key a client: it always has a place of its own.
+        // Failed log-ins are counted by client alone, so that each client has a place of its own.
         if (is_repeat(
                 deed.who, "login", 1, [&] { return member("outcome", "log-in failed"); }, false))
             return;
@@ -71,8 +71,8 @@ std::string AuditBook::place_of(const web::Deed& deed) const {
                      : std::string();
 }
 
-/// What was refused before it came to a bus. A bus tells of what it refuses itself, and the
-/// reloader of reloads.
+/// Records refusals before a bus. A bus records refusals of its own, and the reloader records
+/// reloads.
 void AuditBook::refusal(const web::Deed& deed) {
     const bool lacks_right = deed.status == 401 || deed.status == 403;
     const bool is_refusal = lacks_right || deed.status == 409 || deed.status == 422;

@@ -40,7 +40,8 @@ std::vector<std::string> names_of(const std::string& address, std::vector<std::s
     return hosts;
 }
 
-/// Reads what can be read into `files`; the first that cannot, such as while it is replaced, or "".
+/// Reads all readable files into `files`; returns the first unreadable file, such as a file under
+/// replacement, or "".
 std::string read_again(const tls::Settings& settings, tls::Material& files) {
     std::string missing;
     const auto read = [&](const std::string& path, std::string& into) {

@@ -48,7 +48,7 @@ std::string new_epoch() {
     return std::string(text.data(), end);
 }
 
-/// The line of this configuration that `line` continues as; null if there is none.
+/// Returns the line of the new configuration that continues `line`; null for a removed line.
 const config::Line* find_same(const config::Config& config, const config::Line& line) {
     const auto found = std::ranges::find_if(config.lines, [&](const config::Line& one) {
         return one.name == line.name && one.listens == line.listens;

@@ -193,7 +193,7 @@ void Reloader::Job::read() try {
     verdict.why = error.what();
 }
 
-/// Nothing but tokens has changed since, and those that were would allow more.
+/// Only tokens have changed since the former configuration, and the former tokens would allow more.
 void Reloader::Job::refuse_tokens() {
     verdict.weaker = explain::weaker(*running, *rollback);
     if (verdict.weaker.empty()) return;

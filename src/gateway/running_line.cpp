@@ -190,7 +190,8 @@ void RunningLine::forget_points() {
     heard_.clear();
 }
 
-/// One poller per line. What it reads also answers clients where a station's max_age allows it.
+/// A line has one poller. Polled values answer clients as well, as far as a station's max_age
+/// allows.
 void RunningLine::apply_points(const config::Line& line) {
     std::vector<points::PolledStation> wanted = explain::polled_stations(line);
     if (listens_) {

@@ -149,7 +149,7 @@ class Columns {
   public:
     Columns(std::string_view text, std::vector<Row> rows) : text_(text), rows_(std::move(rows)) {}
 
-    /// The first line that cannot follow those before, and what is probably meant.
+    /// Returns the first line that cannot follow the lines above, with the probable intention.
     std::optional<Finding> find() {
         Levels levels;
         for (; wrong_ < rows_.size(); ++wrong_) {

@@ -63,7 +63,7 @@ struct TooLarge {
     std::string message;
 };
 
-/// Text that belongs to nothing above it, which yaml-cpp takes for another document.
+/// Text at the left margin below an indented document, which yaml-cpp takes for a second document.
 struct Stray {
     Mark mark;
 };

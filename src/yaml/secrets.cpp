@@ -46,7 +46,8 @@ std::string_view secret_in(std::string_view line) {
     return {};
 }
 
-/// The parts of a secret: messages quote what YAML makes of it. Words that we say are none.
+/// The parts of a secret, because messages quote parts that YAML makes of a text. Words of our own
+/// messages are no parts.
 std::vector<std::string> parts_of(std::string_view secret) {
     std::vector<std::string> parts;
     std::string part;

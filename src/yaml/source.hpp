@@ -28,7 +28,7 @@ class Source {
     Mark mark(int line, int column) const;
     /// Returns the offset where the line (from 1) ends; the end of the text if it has no such line.
     std::size_t end_of(int line) const;
-    /// Returns a line (from 1) without its end; empty if there is none.
+    /// Returns the text of a line (from 1) without the line end; empty beyond the last line.
     std::string_view line(int number) const;
     /// Returns the byte at a place of yaml-cpp; '\n' beyond the end.
     char byte(int line, int column) const;

@@ -8,8 +8,8 @@
 
 namespace panelgate::config {
 
-/// Returns the read-only station because of which this listener refuses every broadcast (01);
-/// nullptr if there is none.
+/// Returns the read-only station that makes the listener refuse every broadcast (01); nullptr
+/// without such a station.
 const Station* forbids_broadcasts(const Config& config, const tcp_server::Settings& listener);
 
 /// A common client timeout, which some clients cannot change.
@@ -25,7 +25,7 @@ struct QuickSettings {
 };
 struct ClientTimeout {
     Duration worst{};  ///< every request is answered by then (P3): clients need a longer timeout
-    /// Empty if it is quick enough, or if no setting makes it so.
+    /// Empty if the panel is quick enough, or if no setting makes the panel quick enough.
     std::optional<QuickSettings> quick;
 };
 

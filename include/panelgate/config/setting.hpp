@@ -27,7 +27,7 @@ struct Setting {
     std::string path;
     std::string value;    ///< as written in the file; "": not set, or an entry that has settings
     bool secret = false;  ///< never shown
-    /// The path of the setting that this one inherits from if it is not given itself, or "".
+    /// Path of the setting whose value a missing key inherits, or "".
     std::string otherwise = {};
     /// False: a file cannot have it beside the value of a neighbour; it has its default then.
     bool applies = true;

@@ -20,7 +20,8 @@ struct Change {
     /// settings of their own (an added line is reported as one change).
     std::string before;
     std::string after;
-    /// What a reload does for it beside taking it over: "the port is opened anew"; "" nothing.
+    /// Effect of a reload beside taking the value over: "the port is opened anew"; "" without an
+    /// effect.
     std::string needs = {};
     bool weaker = false;  ///< it protects the panels less (config::Weaker), or may do so
 };

@@ -38,8 +38,8 @@ class Doors {
     void change(std::shared_ptr<const config::Config> config);
     void settle() { renewed_.clear(); }
 
-    /// Nothing if he may what he could when he came in. A listener that is gone answers what it has
-    /// taken in.
+    /// Nothing if the client may still do everything that the client could do at connection. A
+    /// removed listener still answers accepted requests.
     std::optional<bus::Admission> admit(const WhoRef& who, std::string_view line,
                                         std::uint8_t station, WallTime at) const;
 
@@ -58,7 +58,7 @@ class Doors {
         Destinations reach;
     };
     std::map<std::string, Door> doors_;  ///< by listener's or serial master's name
-    /// Of which it is known that they are there, or refused as not listed.
+    /// Stations that are known to be listed, or known to be refused as unlisted.
     Destinations plant_;
     std::set<std::string> renewed_;  ///< tokens by name
 };

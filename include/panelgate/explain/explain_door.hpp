@@ -11,7 +11,8 @@
 
 namespace panelgate::explain {
 
-/// The face of who comes by this listener; nullopt: the configuration has none of this name.
+/// Returns the face of the listener's clients; nullopt if the configuration has no listener of the
+/// name.
 std::optional<Face> face_by(const config::Config& config, const std::string& listener);
 /// The names of all listeners, for a message.
 std::string listener_names(const config::Config& config);
@@ -26,8 +27,8 @@ struct AtDoor {
     const config::Line& line;
     const config::Station& station;
 };
-/// What refuses it there, before rights are judged; "" if nothing does. `now`: a token may have
-/// ended.
+/// Returns the listener's reason to refuse the request before rights are judged; "" without a
+/// refusal. `now`: UTC, for the end of tokens.
 std::string refused_at_door(const config::Config& config, const AtDoor& request, WallTime now);
 
 }  // namespace panelgate::explain

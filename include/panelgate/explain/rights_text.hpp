@@ -9,8 +9,7 @@ namespace panelgate::explain {
 
 /// Who may write where, a row for each way in; "" without rules.
 std::string rights_matrix(const config::Config& config);
-/// Warns of ways in by which somebody may write although rules deny it to others: no rule is about
-/// them.
+/// Warns of faces by which a client may write although rules deny the write at other faces.
 std::vector<std::string> open_doors(const config::Config& config);
 
 /// What decides on a request that is described in words.

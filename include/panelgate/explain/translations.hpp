@@ -68,8 +68,8 @@ class BrokerSight {
     std::map<const config::Station*, const access::LineRules*> rules_;
 };
 
-/// What a session publishes: lines, then stations with their points, each in the order of their
-/// names: that in which they are written costs no session.
+/// Returns what a session publishes: lines, then stations with points, each sorted by name, so that
+/// another order in the file does not renew the session.
 mqtt::Subjects subjects_of(const config::Config& config);
 /// True if a session at the broker can go on: its settings and what it publishes are the same.
 bool is_same_session(const config::Config& before, const config::Config& now);

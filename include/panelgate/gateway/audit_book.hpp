@@ -33,8 +33,7 @@ namespace panelgate::gateway {
 struct Snapshot;
 struct TopicRefusal;
 
-/// Keeps the audit: what is recorded of each thing that happens, and in which words. Without
-/// `audit:` it records nothing. One thread.
+/// Composes the audit's record of each event. Without `audit:` nothing is recorded. One thread.
 class AuditBook {
   public:
     static constexpr std::size_t kPlaces = 4096;   ///< of a station, whose members are kept
@@ -68,7 +67,8 @@ class AuditBook {
     std::function<void(const web::Deed&)> deeds();
     /// What a client of REST changed, or was refused; writes are the buses'.
     void deed(const web::Deed& deed);
-    /// A client of what MQTT refuses before it comes to a bus; it may outlive this.
+    /// Returns the client for refusals that MQTT makes before a bus; the client may outlive the
+    /// book.
     std::function<void(const TopicRefusal&)> topic_refusals();
     /// A client of the writes over Modbus/TCP that come to no line; it may outlive this.
     std::function<void(const WhoRef&, std::uint8_t unit, ByteView pdu)> stray_writes();
@@ -103,8 +103,8 @@ class AuditBook {
         std::vector<std::uint16_t> items;
         std::uint64_t age_ms = 0;
     };
-    /// A write that is composed with others: what runs once in a while runs with cold caches, and
-    /// costs many times what it costs with others.
+    /// A write that is composed together with other writes: rare code runs with cold caches, and
+    /// composing many writes at once costs far less a write.
     struct Gathered {
         WallTime at{};
         bus::WriteEnd end;

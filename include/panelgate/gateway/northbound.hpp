@@ -46,8 +46,8 @@ class BrokerSession {
     void show(std::shared_ptr<const Snapshot> snapshot);
     /// Files for the next connection to the broker.
     void renew(const tls::Material& files);
-    /// Before start(): takes over what another session, which is stopped next, has not published
-    /// yet. At the same broker this session answers its outstanding writes, too.
+    /// Call before start(): takes over unpublished values of a session that is stopped next. At the
+    /// same broker the new session answers outstanding writes of the former session, too.
     void take_over(BrokerSession& before);
 
     void start();

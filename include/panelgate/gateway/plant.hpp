@@ -31,14 +31,14 @@ struct Line {
     bus::BusClient* bus = nullptr;             ///< never null
 };
 
-/// A station that the configuration lists. What it refers to outlives the plant.
+/// A station of the configuration. The profile and settings of the station outlive the plant.
 struct Station : bus::StationRef {
     const config::Station* configured = nullptr;  ///< never null
     /// The bus that simulates its panel; null for a real one.
     std::shared_ptr<sim::SimulatedBus> simulated;
     std::optional<points::StationPoints> points;    ///< the values of its polls, if it has points
     std::optional<points::StationHistory> history;  ///< their history, if REST is served
-    /// The unit id by which Modbus/TCP clients reach it: that of the first listener that has one.
+    /// The unit id of the station at the first listener that serves the station.
     std::optional<int> unit;
 };
 

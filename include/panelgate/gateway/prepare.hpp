@@ -14,8 +14,8 @@ namespace panelgate::gateway {
 /// address: then it serves IPv6 only.
 void separate_families(config::Config& config);
 
-// Descriptors that are reserved, so that clients cannot take those that devices, probes and the log
-// need.
+// Descriptors reserved for devices, probes and the log, so that clients cannot use up all
+// descriptors.
 
 /// The loop, the log, listeners, signals, files being read, connections that are refused for lack
 /// of room, and health probes.

@@ -54,9 +54,9 @@ struct LineWatch {
         admit{};
 };
 
-/// A running line: its bus, its simulated panels, and what is polled or heard on it. Its bus stays
-/// the same object through all reloads, so that its clients may keep a reference; the bus of a
-/// removed line is closed and stays. One thread.
+/// A running line: bus, simulated panels, and poller or listener of the line. The bus stays the
+/// same object through all reloads, so that clients may keep a reference; the bus of a removed line
+/// is closed and stays. One thread.
 class RunningLine {
   public:
     /// `simulate`: simulate it whatever its device is. The clock outlives it. Throws
@@ -68,7 +68,7 @@ class RunningLine {
 
     void start();
     void stop();
-    /// Destroys its bus, poller and panels. Nothing else may be called after that.
+    /// Destroys bus, poller and panels of the line. No other function may be called afterwards.
     void dispose();
     /// Applies a new configuration; `before` is the running one. Opens the line again after stop().
     void apply(const config::Line& before, const config::Line& now);

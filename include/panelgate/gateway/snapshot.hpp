@@ -83,8 +83,8 @@ void publish_points(web::EventHub& hub, const Station& station,
 /// Records the points among these wants in the station's history, if it has one.
 void remember(Station& station, const std::vector<std::size_t>& wants, TimePoint now);
 
-/// One configuration and the plant made of it, with the running lines. A reload makes a new one;
-/// users of this one keep it until they have finished. Does not move.
+/// One configuration with plant and running lines. A reload makes a new snapshot; users of a
+/// snapshot keep the snapshot until their work is done. Does not move.
 struct Snapshot {
     std::shared_ptr<const config::Config> config;
     std::vector<std::shared_ptr<RunningLine>> lines;  ///< in the order of config->lines
@@ -98,7 +98,7 @@ struct Snapshot {
     Snapshot& operator=(const Snapshot&) = delete;
 };
 
-/// Makes the snapshot of lines that run with this configuration, in its order.
+/// Makes the snapshot of running lines with a configuration, in the order of the configuration.
 std::shared_ptr<Snapshot> make_snapshot(std::shared_ptr<const config::Config> config,
                                         std::vector<std::shared_ptr<RunningLine>> lines);
 /// Starts the histories of its points and continues those of unchanged stations in `before` (may be

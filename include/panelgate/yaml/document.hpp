@@ -40,7 +40,8 @@ class Problems {
     }
     /// Keeps the problem's own file.
     void add(Problem problem) { list_.push_back(std::move(problem)); }
-    /// Adds the problems of another file that this one names; they keep their file.
+    /// Adds problems of another file, such as a template's file; each problem keeps the name of its
+    /// file.
     void take(const Problems& other) {
         list_.insert(list_.end(), other.list_.begin(), other.list_.end());
     }

@@ -45,8 +45,8 @@ class MapReader {
     bool has(std::string_view key);
     /// Like has(), and absence is a problem.
     bool require(std::string_view key);
-    /// True if finish() will report a key that is probably this one, or belongs below it, which
-    /// says more than that this key is missing.
+    /// True if finish() will report a mistyped or misplaced key that probably means `key`; a report
+    /// of a missing `key` would say less.
     bool is_mistyped(std::string_view key) const;
     /// Returns any scalar as written, quoted or not; an empty one is a problem.
     std::optional<std::string> text(std::string_view key);
@@ -94,15 +94,16 @@ class MapReader {
                                   std::size_t most = kAnyNumber);
     /// The scalars of a list; other items are problems.
     std::vector<const Node*> scalars(std::string_view key, std::string_view example);
-    /// The same of a list that has one at least, as an empty one could mean all or none; `any` says
-    /// what leaving it out means.
+    /// Reads a list with at least one entry, because an empty list could mean all or none; `any`
+    /// says the meaning of a missing list.
     std::vector<const Node*> items(std::string_view key, std::string_view example,
                                    std::string_view any);
     /// Lets finish() report a key without a value, or with all of it commented out, as it means
     /// neither "all" nor "none"; the message ends with `instead`.
     void refuse_empty(std::string_view key, std::string_view instead);
 
-    /// Adds keys that belong in another map, which finish() then names. Must outlive this.
+    /// Adds keys that belong in another map, so that finish() names the right map. The keys must
+    /// outlive the reader.
     void elsewhere(std::span<const Elsewhere> keys) { elsewhere_.push_back(keys); }
 
     /// Returns the place of the key's value (of the map if the key is absent), for later problems.
