@@ -62,6 +62,8 @@ EXAMPLES = {"profiles_dir": "/etc/panelgate/profiles", "lines.serial.data_bits":
             "mqtt.certificate": "box17.pem", "mqtt.key": "box17.key", "mqtt.tls.certificate": "/etc/panelgate/tls/box17.crt",
             "mqtt.tls.key": "/etc/panelgate/tls/box17.key",
             "http.tokens.expires": "2027-12-31"}
+# Values that differ from the default, so that the example has a station with times of its own.
+SHOWN = {"lines.stations.timing.response_timeout": "300ms"}
 FIRST = ("name", "listen", "id")
 
 
@@ -81,7 +83,7 @@ class Keys:
         """Its example, or what it is when it is left out; a station's timing is by default its line's."""
         for path in (key["path"], key["path"].replace("lines.stations.timing", "lines.timing")):
             one = next(other for other in self.all if other["path"] == path)
-            if found := one.get("example") or one.get("default") or EXAMPLES.get(path):
+            if found := SHOWN.get(path) or one.get("example") or one.get("default") or EXAMPLES.get(path):
                 return scalar(found, key["kind"])
         raise SystemExit(f"{key['path']} has neither a default nor an example")
 
@@ -148,7 +150,7 @@ class Example:
             # The first key of a list's entry stands behind the dash.
             place, shown = (indent[:-2], "- " + name(key)) if item else (indent, name(key))
             inside = bool(self.keys.below(key["path"]))
-            absent = not inside and "example" not in key
+            absent = not inside and "example" not in key and key["path"] not in SHOWN
             if not item:
                 self.comment(indent, remarks(key))
             if inside:

@@ -194,15 +194,14 @@ void log_dashboard(const gateway::Gateway& gateway) {
 ExitCode serve(config::Config config, const Service& service,
                const std::function<void(const gateway::Gateway&)>& started) {
     fit(config);
+    auto shared = std::make_shared<const config::Config>(std::move(config));
     boost::asio::io_context io(1);
     rt::AsioClock clock(io.get_executor());
     const rt::LogDrain drain(clock);
     rt::ServiceManager manager(clock);
     SignalLoop loop(io);
     gateway::Reloader reloader(io.get_executor(), service.file);
-    gateway::Gateway gateway(io.get_executor(),
-                             std::make_shared<const config::Config>(std::move(config)),
-                             service.simulate, &reloader);
+    gateway::Gateway gateway(io.get_executor(), shared, service.simulate, &reloader);
     try {
         gateway.start();
     } catch (const std::runtime_error& error) {

@@ -35,78 +35,33 @@ namespace panelgate::commands {
 
 namespace {
 
-constexpr std::string_view kHttp = "http:";
-constexpr std::string_view kListen = "listen:";
-constexpr std::string_view kBlank = " \t";
-
-bool is_one_of(std::string_view set, char c) { return set.find(c) != std::string_view::npos; }
-
-std::string_view without_indent(std::string_view text) {
-    return text.substr(std::min(text.find_first_not_of(kBlank), text.size()));
-}
-
-std::string_view without_comment(std::string_view line) {
-    if (without_indent(line).starts_with('#')) return {};
-    return line.substr(0, line.find(" #"));
-}
-
-std::vector<std::string_view> lines_of(std::string_view text) {
-    std::vector<std::string_view> lines;
-    while (!text.empty()) {
-        const std::size_t end = text.find_first_of("\r\n");
-        lines.push_back(without_comment(text.substr(0, end)));
-        text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-    }
-    return lines;
-}
-
-/// The value after a key, without quotes.
-std::string value_in(std::string_view text) {
-    text = without_indent(text);
-    const bool quoted = text.starts_with('"') || text.starts_with('\'');
-    const std::string_view ends = quoted ? text.substr(0, 1) : std::string_view(" \t,}");
-    if (quoted) text.remove_prefix(1);
-    return std::string(text.substr(0, text.find_first_of(ends)));
-}
-
-/// The value of `listen:` directly inside the outermost braces of a line.
-std::optional<std::string> in_braces(std::string_view line) {
-    int depth = 0;
-    for (std::size_t at = 0; at < line.size(); ++at) {
-        if (is_one_of("{[", line[at])) ++depth;
-        if (is_one_of("}]", line[at])) --depth;
-        const bool begins = at > 0 && is_one_of(" \t{,", line[at - 1]);
-        if (depth == 1 && begins && line.substr(at).starts_with(kListen))
-            return value_in(line.substr(at + kListen.size()));
-    }
-    return std::nullopt;
-}
-
-/// The value of `listen:` with the indentation of the block's first key.
-std::optional<std::string> in_block(const std::vector<std::string_view>& lines, std::size_t first) {
-    std::optional<std::size_t> indent;
-    for (std::size_t i = first; i < lines.size(); ++i) {
-        const std::string_view key = without_indent(lines[i]);
-        if (key.empty()) continue;
-        const std::size_t here = lines[i].size() - key.size();
-        if (here == 0) break;
-        if (!indent) indent = here;
-        if (here == *indent && key.starts_with(kListen))
-            return value_in(key.substr(kListen.size()));
-    }
-    return std::nullopt;
+/// Returns the value of `listen:` in a line of the section `http`, without quotes.
+std::optional<std::string> listen_in(std::string_view line) {
+    constexpr std::string_view kListen = "listen:";
+    const std::size_t at = line.find(kListen);
+    const bool is_key =
+        at != line.npos && at > 0 && std::string_view(" \t{,").find(line[at - 1]) != line.npos;
+    if (!is_key) return std::nullopt;
+    line.remove_prefix(at + kListen.size());
+    line.remove_prefix(std::min(line.find_first_not_of(" \t\"'"), line.size()));
+    return std::string(line.substr(0, line.find_first_of(" \t\"',}#")));
 }
 
 }  // namespace
 
 std::string http_listen_in(std::string_view text) {
     text.remove_prefix(byte_order_mark(text));
-    const std::vector<std::string_view> lines = lines_of(text);
     std::set<std::string> found;
-    for (std::size_t i = 0; i < lines.size(); ++i) {
-        if (!lines[i].starts_with(kHttp)) continue;
-        const std::string_view rest = without_indent(lines[i].substr(kHttp.size()));
-        found.insert((rest.empty() ? in_block(lines, i + 1) : in_braces(rest)).value_or(""));
+    bool is_inside = false;
+    while (!text.empty()) {
+        const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
+        const std::string_view line = text.substr(0, end);
+        text.remove_prefix(std::min(end + 1, text.size()));
+        const std::size_t first = line.find_first_not_of(" \t\r\n");
+        if (first == line.npos || line[first] == '#') continue;
+        if (first == 0) is_inside = line.starts_with("http:");
+        const auto listen = is_inside ? listen_in(line) : std::nullopt;
+        if (listen) found.insert(*listen);
     }
     return found.size() == 1 ? *found.begin() : "";
 }

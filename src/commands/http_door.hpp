@@ -20,8 +20,7 @@
 namespace panelgate::commands {
 
 /// The value of `listen:` of the top-level `http:` in a text that is not valid YAML, such as a file
-/// being edited; "" if it is found not once. Works line by line: braces over several lines, anchors
-/// and the like are not understood. Pure.
+/// being edited; "" without `listen`, or with two different ones. Pure.
 std::string http_listen_in(std::string_view text);
 
 /// Why it is unknown where a gateway is asked.

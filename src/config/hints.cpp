@@ -94,7 +94,9 @@ std::string listen_hint(std::string_view typed) {
                " for this machine alone";
     if (is_port(port) && host == "localhost") return write("127.0.0.1:" + port);
     if (is_port(port) && is_ipv6(host)) return write("\"[" + host + "]:" + port + "\", in quotes");
-    if (parse_cidr(text)) return "; add the port, such as " + text + ":502";
+    if (parse_cidr(text))
+        return "; add the port, such as " +
+               (is_ipv6(text) ? "\"[" + text + "]:502\"" : text + ":502");
     if (line::is_broken_address(host)) return "; " + yaml::quote(host) + " is no IP address";
     if (colon == text.npos || is_port(port))
         return "; names are not looked up here: write an address of this machine";

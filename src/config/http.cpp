@@ -296,7 +296,7 @@ const Keys<web::Settings>& http_keys() {
                   read_origin,
                   "Origins of other sites whose pages may read, such as "
                   "https://scada.plant.example.")
-            .weaker(By::more)
+            .weaker(By::granted)
             .example("[https://scada.plant.example]")
             .networks("allow", &Settings::allow, "all",
                       "Networks whose clients may connect, such as 192.168.1.0/24. Without it any.")

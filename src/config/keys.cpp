@@ -9,7 +9,6 @@
 
 namespace panelgate::config {
 
-
 std::string list_text(std::vector<std::string> words) {
     std::ranges::sort(words);
     std::string text;
@@ -31,6 +30,13 @@ bool is_met(const KeyRule& rule, const std::string* value) {
     return std::ranges::find(rule.words, *value) != rule.words.end();
 }
 
+/// False for a faulty value of a key that has words: the fault is told there.
+bool is_word(const std::vector<Row>& rows, const std::string& key, const yaml::Node& value) {
+    const auto row = std::ranges::find(rows, key, [](const Row& of) { return of.shape.path; });
+    if (row == rows.end() || row->shape.kind != KeyShape::Kind::word) return true;
+    return std::ranges::find(row->shape.words, value.scalar) != row->shape.words.end();
+}
+
 }  // namespace
 
 void Table::check(yaml::MapReader& in) const {
@@ -40,7 +46,7 @@ void Table::check(yaml::MapReader& in) const {
         const yaml::Node* other = in.node().find(rule.other);
         const bool right = rule.needs ? own->scalar != rule.words.front() || other != nullptr
                                       : is_met(rule, other == nullptr ? nullptr : &other->scalar);
-        if (right) continue;
+        if (right || (other != nullptr && !is_word(rows_, rule.other, *other))) continue;
         const std::string beside =
             other == nullptr || rule.needs ? "" : ", not with " + rule.other + ": " + other->scalar;
         in.problem(rule.key, rule.key + ' ' + why + beside);

@@ -18,11 +18,14 @@ using yaml::Node;
 /// RTU has 8, ASCII normally 7, and 8 on some panels (serial line V1.02, 2.5.1, 2.5.2).
 bool read_data_bits(Reader& in, SerialFormat& format) {
     const bool ascii = format.mode == SerialMode::ascii;
-    const auto bits = in.integer("data_bits", 7, 8);
+    const yaml::Node* typed = in.child("data_bits");
+    if (!ascii && typed != nullptr && typed->scalar == "7") {
+        in.problem("data_bits", "RTU needs 8 data bits; 7 is for ASCII mode");
+        return false;
+    }
+    const auto bits = in.integer("data_bits", ascii ? 7 : 8, 8);
     format.data_bits = static_cast<int>(bits.value_or(ascii ? 7 : 8));
-    if (ascii || format.data_bits == 8) return bits.has_value();
-    in.problem("data_bits", "RTU needs 8 data bits; 7 is for ASCII mode");
-    return false;
+    return bits.has_value();
 }
 
 /// A master has its protocol elsewhere.

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <charconv>
+#include <cerrno>
 #include <cstdint>
+#include <cstdlib>
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
-#include <span>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -24,6 +26,8 @@ namespace panelgate::mbusd {
 
 using config::Endpoint;
 
+namespace {
+
 struct Number {
     std::int64_t value = 0;
     bool plain = true;  ///< decimal and nothing after it: other programs read the same
@@ -32,7 +36,14 @@ struct Number {
 /// Parses a number as mbusd does (strtoul() with base 0; cfg.c, cfg_handle_param()): 0x1F6, 010 for
 /// 8; text after the digits is ignored. Nothing without a digit (0 to mbusd), if negative or beyond
 /// 2^31 - 1.
-std::optional<Number> parse_number(std::string_view text);
+std::optional<Number> parse_number(const std::string& text) {
+    char* stop = nullptr;
+    errno = 0;
+    const long long value = std::strtoll(text.c_str(), &stop, 0);
+    constexpr long long kMost = std::numeric_limits<std::int32_t>::max();
+    if (stop == text.c_str() || text[0] == '-' || value > kMost) return std::nullopt;
+    return Number{value, std::to_string(value) == text.substr(text[0] == '+' ? 1 : 0)};
+}
 
 /// One NAME = VALUE of an mbusd.conf.
 struct Line {
@@ -41,40 +52,6 @@ struct Line {
     yaml::Mark mark;        ///< of the name
     yaml::Mark value_mark;  ///< or of the end of the line
 };
-
-/// Only a line that begins with '#' is a comment: text after a value belongs to the value. Lines
-/// end with LF, CR or both; a leading byte order mark is skipped. Invalid lines are added to
-/// `problems`.
-std::vector<Line> lines_of(std::string_view text, yaml::Problems& problems);
-
-namespace {
-
-bool is_hex_digit(char c) {
-    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F');
-}
-
-int base_of(std::string_view digits) {
-    if (digits.size() < 2 || digits[0] != '0') return 10;
-    const bool is_hex =
-        digits.size() > 2 && (digits[1] == 'x' || digits[1] == 'X') && is_hex_digit(digits[2]);
-    return is_hex ? 16 : 8;
-}
-
-}  // namespace
-
-std::optional<Number> parse_number(std::string_view text) {
-    std::string_view digits = text.substr(text.starts_with('+') ? 1 : 0);
-    const int base = base_of(digits);
-    if (base == 16) digits.remove_prefix(2);
-    std::uint32_t value = 0;
-    const char* end = digits.data() + digits.size();
-    const auto [stop, error] = std::from_chars(digits.data(), end, value, base);
-    constexpr std::uint32_t kMost = std::numeric_limits<std::int32_t>::max();
-    if (error != std::errc() || value > kMost) return std::nullopt;
-    return Number{value, base == 10 && stop == end};
-}
-
-namespace {
 
 constexpr std::string_view kBlanks = " \t\f\v";
 
@@ -115,8 +92,9 @@ void take_line(std::string_view whole, int number, std::vector<Line>& lines,
     lines.push_back({std::string(name), std::string(value), mark, {number, column(value)}});
 }
 
-}  // namespace
-
+/// Only a line that begins with '#' is a comment: text after a value belongs to the value. Lines
+/// end with LF, CR or both; a leading byte order mark is skipped. Invalid lines are added to
+/// `problems`.
 std::vector<Line> lines_of(std::string_view text, yaml::Problems& problems) {
     std::vector<Line> lines;
     text.remove_prefix(byte_order_mark(text));
@@ -128,8 +106,6 @@ std::vector<Line> lines_of(std::string_view text, yaml::Problems& problems) {
     }
     return lines;
 }
-
-namespace {
 
 /// mbusd's settings, with its defaults (cfg.c, cfg_init(); README).
 struct Settings {
@@ -178,25 +154,27 @@ class Reader {
 
     void take(const Line& line) {
         line_ = &line;
-        constexpr auto kKeys = std::to_array<std::pair<std::string_view, void (Reader::*)()>>(
-            {{"device", &Reader::device},
-             {"speed", &Reader::speed},
-             {"mode", &Reader::mode},
-             {"enable_rs485", &Reader::enable_rs485},
-             {"trx_control", &Reader::trx_control},
-             {"trx_sysfile", &Reader::trx_sysfile},
-             {"address", &Reader::address},
-             {"port", &Reader::port},
-             {"maxconn", &Reader::maxconn},
-             {"timeout", &Reader::timeout},
-             {"retries", &Reader::retries},
-             {"pause", &Reader::pause},
-             {"wait", &Reader::wait},
-             {"replyonbroadcast", &Reader::replyonbroadcast},
-             {"loglevel", &Reader::loglevel},
-             {"logfile", &Reader::logfile},
-             {"daemon", &Reader::daemon},
-             {"enable_rmtaddr_in_log", &Reader::rmtaddr}});
+        using Read = void (*)(Reader&);
+        static constexpr auto kKeys = std::to_array<std::pair<std::string_view, Read>>({
+            {"device", [](Reader& in) { in.device(); }},
+            {"speed", [](Reader& in) { in.integer(in.mbusd_.speed, 50, 4'000'000); }},
+            {"mode", [](Reader& in) { in.mode(); }},
+            {"enable_rs485", [](Reader& in) { in.yes_or_no(in.kernel_); }},
+            {"trx_control", [](Reader& in) { in.trx_control(); }},
+            {"trx_sysfile", [](Reader& in) { in.trx_sysfile(); }},
+            {"address", [](Reader& in) { in.address(); }},
+            {"port", [](Reader& in) { in.integer(in.mbusd_.port, 1, 65535); }},
+            {"maxconn", [](Reader& in) { in.integer(in.mbusd_.connections, 1, 65535); }},
+            {"timeout", [](Reader& in) { in.timeout(); }},
+            {"retries", [](Reader& in) { in.retries(); }},
+            {"pause", [](Reader& in) { in.pause(); }},
+            {"wait", [](Reader& in) { in.integer(in.mbusd_.wait, 1, 120'000); }},
+            {"replyonbroadcast", [](Reader& in) { in.yes_or_no(in.mbusd_.replies_to_broadcasts); }},
+            {"loglevel", [](Reader& in) { in.loglevel(); }},
+            {"logfile", [](Reader& in) { in.note(kLogfile); }},
+            {"daemon", [](Reader& in) { in.flag_with_note(kDaemon); }},
+            {"enable_rmtaddr_in_log", [](Reader& in) { in.flag_with_note(kAddresses); }},
+        });
         std::vector<std::string_view> names;
         for (const auto& [name, read] : kKeys) {
             names.push_back(name);
@@ -205,7 +183,7 @@ class Reader {
             if (line.value.empty() && name != "trx_sysfile" && name != "logfile")
                 wrong("has no value; leave the line out for the default");
             else
-                (this->*read)();
+                read(*this);
             return;
         }
         problems_.add(line.mark, "mbusd has no setting " + yaml::quote(line.name) +
@@ -251,22 +229,24 @@ class Reader {
         comments_.push_back(told);
         notes_.push_back(problems_.file() + ':' + std::to_string(line_->mark.line) + ": " + told);
     }
-    std::int64_t integer(std::int64_t otherwise, std::int64_t min, std::int64_t max) {
+    void integer(std::int64_t& value, std::int64_t min, std::int64_t max) {
         const auto number = parse_number(line_->value);
-        if (number && number->value >= min && number->value <= max) {
-            if (!number->plain) note("mbusd reads this as " + std::to_string(number->value));
-            return number->value;
-        }
-        wrong_value("a whole number from " + std::to_string(min) + " to " + std::to_string(max));
-        return otherwise;
+        if (!number || number->value < min || number->value > max)
+            return wrong_value("a whole number from " + std::to_string(min) + " to " +
+                               std::to_string(max));
+        if (!number->plain) note("mbusd reads this as " + std::to_string(number->value));
+        value = number->value;
     }
-    bool yes_or_no() {
-        constexpr std::array<std::string_view, 5> kYes{"yes", "y", "true", "on", "1"};
-        constexpr std::array<std::string_view, 5> kNo{"no", "n", "false", "off", "0"};
-        const std::string typed = lower(line_->value);
-        const bool yes = std::ranges::find(kYes, typed) != kYes.end();
-        if (!yes && std::ranges::find(kNo, typed) == kNo.end()) wrong_value("yes or no");
-        return yes;
+    void yes_or_no(bool& yes) {
+        static const std::set<std::string, std::less<>> kYes{"yes", "y", "true", "on", "1"};
+        static const std::set<std::string, std::less<>> kNo{"no", "n", "false", "off", "0"};
+        yes = kYes.contains(lower(line_->value));
+        if (!yes && !kNo.contains(lower(line_->value))) wrong_value("yes or no");
+    }
+    void flag_with_note(const std::string& why) {
+        bool ignored = false;
+        yes_or_no(ignored);
+        note(why);
     }
 
     void device() {
@@ -276,7 +256,6 @@ class Reader {
         if (path[0] != '/' || more || as_ascii(path) != path)
             wrong_value("the absolute path of a device alone, such as /dev/ttyS0");
     }
-    void speed() { mbusd_.speed = integer(mbusd_.speed, 50, 4'000'000); }
     void mode() {
         const std::string& typed = line_->value;
         constexpr std::string_view kParityLetters = "nNeEoO";
@@ -288,13 +267,12 @@ class Reader {
         else
             wrong_value("8 data bits, parity n, e or o, and 1 or 2 stop bits, such as 8n1");
     }
-    void enable_rs485() { kernel_ = yes_or_no(); }
     void trx_control() {
-        constexpr std::array<std::string_view, 6> kWords{"addc",  "rts",     "rts_0",
-                                                         "rts_1", "sysfs_0", "sysfs_1"};
+        static const std::set<std::string, std::less<>> kWords{"addc",  "rts",     "rts_0",
+                                                               "rts_1", "sysfs_0", "sysfs_1"};
         const std::string typed = lower(line_->value);
         rts_.reset();
-        if (std::ranges::find(kWords, typed) == kWords.end()) {
+        if (!kWords.contains(typed)) {
             wrong_value("addc, rts_0, rts_1 (or rts), sysfs_0 or sysfs_1");
         } else if (typed.starts_with("rts")) {
             rts_ = *line_;
@@ -319,43 +297,39 @@ class Reader {
         else
             wrong_value("an IP address such as 0.0.0.0 or 127.0.0.1");
     }
-    void port() { mbusd_.port = integer(mbusd_.port, 1, 65535); }
-    void maxconn() { mbusd_.connections = integer(mbusd_.connections, 1, 65535); }
     void timeout() {
-        if (integer(0, 0, 1'000'000) == 0) return;  // nor does mbusd close any then
+        std::int64_t idle = 0;
+        integer(idle, 0, 1'000'000);
+        if (idle == 0) return;  // nor does mbusd close any then
         note(
             "connections are not closed for being idle; TCP keep-alive finds those whose client "
             "is gone within 90 s");
     }
     void retries() {
-        mbusd_.retries = integer(mbusd_.retries, 0, 15);
+        integer(mbusd_.retries, 0, 15);
         if (mbusd_.retries > 10) note("10 is the most");
         mbusd_.retries = std::min<std::int64_t>(mbusd_.retries, 10);
     }
     void pause() {
-        const std::int64_t pause = integer(100, 0, 10'000);
+        std::int64_t pause = 100;
+        integer(pause, 0, 10'000);
         if (pause == 0) return;  // no more than t3.5, as here
         note(
             "between two requests is t3.5, as the standard says, and nothing else; panels that "
             "need more get timing: {frame_gap: " +
             std::to_string(pause) + "ms}, which costs its share of every second");
     }
-    void wait() { mbusd_.wait = integer(mbusd_.wait, 1, 120'000); }
-    void replyonbroadcast() { mbusd_.replies_to_broadcasts = yes_or_no(); }
     void loglevel() {
         constexpr std::array<const char*, 4> kLevels{"error", "warn", "info", "debug"};
-        mbusd_.level =
-            kLevels[static_cast<std::size_t>(std::min<std::int64_t>(integer(2, 0, 9), 3))];
+        std::int64_t level = 2;
+        integer(level, 0, 9);
+        mbusd_.level = kLevels[static_cast<std::size_t>(std::min<std::int64_t>(level, 3))];
     }
-    void logfile() { note("the log goes to standard error: under systemd to the journal"); }
-    void daemon() {
-        yes_or_no();
-        note("run it as a service: deploy/ has a unit for systemd");
-    }
-    void rmtaddr() {
-        yes_or_no();
-        note("the log and the status always name clients by their addresses");
-    }
+    static constexpr const char* kLogfile =
+        "the log goes to standard error: under systemd to the journal";
+    static constexpr const char* kDaemon = "run it as a service: deploy/ has a unit for systemd";
+    static constexpr const char* kAddresses =
+        "the log and the status always name clients by their addresses";
 
     yaml::Problems& problems_;
     const Line* line_ = nullptr;

@@ -17,6 +17,8 @@ namespace {
 
 constexpr std::size_t kWindow = 200;  // lines before a parser's error in which its cause is sought
 
+constexpr std::size_t kShownTail = 30;  // letters of a text that is quoted
+
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 
 std::size_t behind_blanks(std::string_view text, std::size_t at) {
@@ -36,6 +38,7 @@ struct Row {
     std::size_t dashes = 0;
     bool key = false;
     bool value = false;       ///< of the key, on this line
+    bool bracket = false;     ///< the word is a list or map in brackets
     std::string_view name{};  ///< of the key
 
     bool has_word() const { return word < end; }
@@ -45,6 +48,7 @@ struct Row {
 std::size_t colon_of(std::string_view rest) {
     const char first = rest[0];
     if (first == '[' || first == '{') return rest.npos;
+    const std::size_t bracket = rest.find_first_of("{[");
     if (first == '"' || first == '\'') {
         const std::size_t close = rest.find(first, 1);
         const std::size_t colon = close == rest.npos ? close : behind_blanks(rest, close + 1);
@@ -53,7 +57,7 @@ std::size_t colon_of(std::string_view rest) {
     std::size_t colon = rest.find(':');
     while (colon != rest.npos && colon + 1 < rest.size() && !is_blank(rest[colon + 1]))
         colon = rest.find(':', colon + 1);
-    return colon;
+    return colon < bracket ? colon : rest.npos;
 }
 
 Row row_of(std::string_view text, const TextLine& line) {
@@ -68,6 +72,7 @@ Row row_of(std::string_view text, const TextLine& line) {
     row.columns.push_back(row.word - row.begin);
     const std::string_view rest = text.substr(row.word, row.end - row.word);
     const std::size_t colon = colon_of(rest);
+    row.bracket = rest[0] == '{' || rest[0] == '[';
     if (colon == rest.npos) return row;
     row.key = true;
     row.name = rest.substr(0, colon);
@@ -111,6 +116,7 @@ bool read_row(Levels& levels, const Row& row, std::size_t number) {
         if (!list && !row.key) {
             // A text: the value of a dash or key above, or its next line.
             if (levels.empty() || (i == 0 && column <= levels.back().column)) return false;
+            if (row.bracket && !levels.back().waits) return false;
             levels.back().waits = false;
             return true;
         }
@@ -185,33 +191,48 @@ class Columns {
     }
 
     std::vector<Edit> edits(const Levels& levels) const {
+        std::vector<Edit> all;
+        for (const Level& level : levels) add_edits(all, level);
+        if (wrong_ > 0) add_edits_above(all, levels);
+        return all;
+    }
+    /// Moves rows from `from` on, which begin at `at`, to the column `to`.
+    void add_move(std::vector<Edit>& all, std::size_t from, std::size_t at, std::size_t to,
+                  std::size_t beside) const {
+        const auto by = static_cast<std::ptrdiff_t>(to) - static_cast<std::ptrdiff_t>(at);
+        if (by == 0) return;
+        all.push_back({from, 1, by, 0, beside});
+        const std::size_t count = from == wrong_ ? rows_beside(from) : 1;
+        if (count > 1) all.push_back({from, count, by, 0, beside});
+    }
+    /// What the wrong row may mean in an open list or map.
+    void add_edits(std::vector<Edit>& all, const Level& level) const {
         const Row& row = rows_[wrong_];
         const std::size_t column = row.columns.front();
         const bool dash = row.dashes > 0;
-        std::vector<Edit> all;
-        const auto move = [&](std::size_t from, std::size_t at, std::size_t to,
-                              std::size_t beside) {
-            const auto by = static_cast<std::ptrdiff_t>(to) - static_cast<std::ptrdiff_t>(at);
-            if (by == 0) return;
-            all.push_back({from, 1, by, 0, beside});
-            const std::size_t count = from == wrong_ ? rows_beside(from) : 1;
-            if (count > 1) all.push_back({from, count, by, 0, beside});
-        };
-        for (const Level& level : levels) {
-            if (level.list == dash) move(wrong_, column, level.column, level.row);
-            if (level.list && level.column == column && !dash) {
-                const bool again = rows_[level.row].name == row.name;
-                all.push_back({wrong_, 1, 0, 1, level.row, again});
-                if (row.key && !again) all.push_back({level.row, 1, 0, -1, wrong_, true});
-            }
-            if (dash && !level.list && level.column == column + 2)
-                all.push_back({level.row, 1, -2, 1, wrong_});
+        const bool again = rows_[level.row].name == row.name;
+        if (level.list == dash) add_move(all, wrong_, column, level.column, level.row);
+        if (level.list && level.column == column && !dash) {
+            all.push_back({wrong_, 1, 0, 1, level.row, again});
+            if (row.key && !again) all.push_back({level.row, 1, 0, -1, wrong_, row.value});
         }
-        if (wrong_ == 0) return all;
+        if (level.list && row.bracket && column == level.column + 2)
+            all.push_back({wrong_, 1, -2, 1, level.row, true});
+        if (level.list && dash && level.column > column) move_rows(all, level, column);
+        if (level.list || !dash) return;
+        if (row.key && !row.value && level.column == column)
+            all.push_back({wrong_, 1, 0, -1, level.row, !again});
+        if (level.column == column + 2) all.push_back({level.row, 1, -2, 1, wrong_});
+    }
+    /// What the row above, or the first row, may mean.
+    void add_edits_above(std::vector<Edit>& all, const Levels& levels) const {
+        const Row& row = rows_[wrong_];
         const Row& above = rows_[wrong_ - 1];
-        if (!dash) move(wrong_ - 1, above.columns.back(), column, wrong_);
+        const std::size_t column = row.columns.front();
+        const bool dash = row.dashes > 0;
+        if (!dash) add_move(all, wrong_ - 1, above.columns.back(), column, wrong_);
         if (!dash && !levels.front().list && column < levels.front().column)
-            move(levels.front().row, levels.front().column, column, wrong_);
+            add_move(all, levels.front().row, levels.front().column, column, wrong_);
         if (dash && above.dashes == 0 && !above.key && above.columns.front() >= column)
             all.push_back({wrong_ - 1, 1, above.columns.front() > column ? -2 : 0, 1, wrong_});
         const bool beside = wrong_ + 1 < rows_.size() && rows_[wrong_ + 1].dashes == 0 &&
@@ -220,7 +241,13 @@ class Columns {
             return level.list && rows_[level.row].name == row.name;
         });
         if (dash && beside && !item) all.push_back({wrong_, 1, 0, -1, wrong_ + 1, true});
-        return all;
+    }
+
+    /// The first item of a list is moved to the column of the wrong row.
+    void move_rows(std::vector<Edit>& all, const Level& list, std::size_t column) const {
+        const auto by =
+            static_cast<std::ptrdiff_t>(column) - static_cast<std::ptrdiff_t>(list.column);
+        all.push_back({list.row, wrong_ - list.row, by, 0, wrong_});
     }
 
     /// The first row that cannot follow after this edit; at most kAhead behind the wrong one.
@@ -239,10 +266,14 @@ class Columns {
 
     std::optional<Edit> best_of(std::vector<Edit> all) const {
         for (Edit& edit : all) edit.next = next_wrong(edit);
-        const auto rank = [](const Edit& edit) {
+        const auto rank = [&](const Edit& edit) {
             const std::ptrdiff_t size = edit.dashes == 0 ? std::abs(edit.by) : 2;
+            // A key that opens a map is rather one of an outer map than of the map before.
+            const bool outer =
+                edit.by < 0 && !rows_[edit.row].value &&
+                edit.by + static_cast<std::ptrdiff_t>(rows_[edit.row].columns.front()) > 0;
             return std::tuple(edit.next, edit.likely, -static_cast<std::ptrdiff_t>(edit.count),
-                              -size, edit.dashes == 0, edit.by > 0, edit.row);
+                              -size, edit.dashes == 0, edit.row, outer, edit.by > 0);
         };
         const auto best = std::ranges::max_element(all, {}, rank);
         if (best == all.end() || best->next <= wrong_) return std::nullopt;
@@ -261,12 +292,12 @@ class Columns {
                    line(edit.beside) + ", in the same map, has none; remove it";
         const std::string blanks =
             std::to_string(std::abs(edit.by)) + (std::abs(edit.by) == 1 ? " blank" : " blanks");
-        const bool dash = row.dashes > 0 && edit.row == wrong_;
+        const bool dash = row.dashes > 0 && rows_[edit.beside].dashes > 0;
         const bool left = edit.by > 0;
         const std::string other = dash ? "the '-'" : quote(rows_[edit.beside].name);
-        return "indentation: " + (dash ? "this '-'" : quote(row.name)) + " is " + blanks +
-               (left ? " left of " : " right of ") + other + " on line " + line(edit.beside) +
-               (left ? "; add " : "; take away ") + blanks;
+        return "indentation: " + (dash ? "this '-'" : quote(row.key ? row.name : word)) + " is " +
+               blanks + (left ? " left of " : " right of ") + other + " on line " +
+               line(edit.beside) + (left ? "; add " : "; take away ") + blanks;
     }
 
     std::string_view text_;
@@ -281,7 +312,7 @@ using Match = std::match_results<std::string_view::const_iterator>;
 std::optional<Finding> comma_in(std::string_view text, const TextLine& line,
                                 const TextLine* above) {
     static const std::regex kMissing(
-        R"re(.*?[{,] *("[^"]*"|[A-Za-z][\w-]*) *: *([^ ,:{}[\]]+|"[^"]*"|\[[^\]]*\]) +((["]?)([A-Za-z][\w-]*)\4: .*))re");
+        R"re(.*?[{,] *("[^"]*"|[A-Za-z0-9][\w-]*) *: *([^ ,:{}[\]]+|"[^"]*"|\[[^\]]*\]) +((["]?)([A-Za-z0-9][\w-]*)\4: .*))re");
     const std::string_view rest =
         text.substr(line.at, std::min<std::size_t>(line.end - line.at, kWindow));
     if (rest.empty()) return std::nullopt;
@@ -292,6 +323,22 @@ std::optional<Finding> comma_in(std::string_view text, const TextLine& line,
     if (!std::regex_match(rest.begin(), rest.end(), match, kMissing)) return std::nullopt;
     return Finding{line.at + static_cast<std::size_t>(match.position(3)),
                    "a ',' is missing before " + quote(match[5].str())};
+}
+
+/// A text behind the bracket that ends a line's value. Lines with quotes are left alone.
+std::optional<Finding> behind_bracket(std::string_view text, const TextLine& line) {
+    const std::string_view rest = text.substr(line.at, line.end - line.at);
+    if (line.depth > 0 || rest.find_first_of("\"'") != rest.npos) return std::nullopt;
+    int depth = 0;
+    for (std::size_t at = 0; at < rest.size(); ++at) {
+        if (rest[at] == '{' || rest[at] == '[') ++depth;
+        if ((rest[at] != '}' && rest[at] != ']') || --depth != 0) continue;
+        const std::size_t next = rest.find_first_not_of(" \t", at + 1);
+        if (next == rest.npos || rest[next] == ':') return std::nullopt;
+        return Finding{line.at + next, quote(rest.substr(next, kShownTail)) +
+                                           " is after the closing " + rest[at] + "; remove it"};
+    }
+    return std::nullopt;
 }
 
 // Characters that look like a blank, or are invisible, but are no blank to YAML
@@ -392,6 +439,7 @@ Findings find_causes(std::string_view text, const Lines& lines, std::size_t erro
         if (line >= from && line <= last) {
             if (lines.brackets.empty()) take(findings, comma_in(text, *line, above));
             take(findings, slip_in(text, row, On::refused));
+            take(findings, behind_bracket(text, *line));
         }
         if (line->depth > 0) continue;
         rows.push_back(row);

@@ -119,16 +119,17 @@ class LineReader {
         const bool is_key = before.substr(word).find_first_of("\"'") == 0;  // "key":value"
         return from + (is_key ? before.rfind(':') + 1 : word);
     }
-    /// True for `name"`, and not for 3/4", 6' and the operators' key.
+    /// True for `name"`, and not for 3/4", 6', it's" and the operators' key.
     bool is_not_opened(std::size_t quote) const {
         const std::size_t word = word_before(quote);
         const bool ends = ends_word(quote + 1) || kEnds.find(byte(quote + 1)) != kNone;
         const bool begins = is_name(byte(word)) || byte(word) == '/';
         const bool is_number = byte(word) >= '0' && byte(word) <= '9';
+        const bool has_quote = text_.substr(word, quote - word).find_first_of("\"'") != kNone;
         const std::size_t before = word > 1 ? text_.find_last_not_of(" \t", word - 1) : kNone;
         const bool one_word =
             before == kNone || std::string_view(":-,{[\n").find(byte(before)) != kNone;
-        return ends && begins && !is_number && one_word;
+        return ends && begins && !is_number && !has_quote && one_word;
     }
     Finding not_opened(std::size_t quote) const {
         const std::size_t begin = word_before(quote);

@@ -138,8 +138,9 @@ std::optional<std::string> MapReader::required_text(std::string_view key) {
 std::optional<std::int64_t> MapReader::integer(std::string_view key, std::int64_t min,
                                                std::int64_t max) {
     if (!has(key)) return std::nullopt;
+    const std::string most = std::to_string(max);
     const std::string wanted =
-        "a whole number from " + std::to_string(min) + " to " + std::to_string(max);
+        min == max ? most : "a whole number from " + std::to_string(min) + " to " + most;
     const Node* node = scalar(key, wanted);
     if (node == nullptr) return std::nullopt;
     const auto value = node->is_text() ? std::nullopt : parse_integer(without_plus(node->scalar));

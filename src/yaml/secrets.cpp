@@ -19,7 +19,7 @@ constexpr std::string_view kHidden = "***";
 
 /// True if a key may begin behind this.
 bool is_before_key(char c) {
-    return std::string_view(" \t{[,\"'").find(c) != std::string_view::npos;
+    return std::string_view(" \t{[,\"'-_").find(c) != std::string_view::npos;
 }
 
 /// What stands behind the word where it is a key, to the end of the line or, in braces, of the
@@ -44,6 +44,14 @@ std::string_view secret_in(std::string_view line) {
         }
     }
     return {};
+}
+
+/// True if the value of a secret's key stands on the next line.
+bool awaits_secret(std::string_view line) {
+    if (!line.ends_with(':')) return false;
+    const std::string plain = to_lower(line.substr(0, line.size() - 1));
+    return std::ranges::any_of(kWords,
+                               [&](std::string_view word) { return plain.ends_with(word); });
 }
 
 /// The parts of a secret, because messages quote parts that YAML makes of a text. Words of our own
@@ -72,13 +80,15 @@ void hide(std::string& text, const std::string& part) {
 
 void Problems::conceal_secrets(std::string_view text) {
     std::map<int, std::vector<std::string>> secrets;  // parts, by line
+    bool awaited = false;
     for (int number = 1; !text.empty(); ++number) {
         const std::size_t end = std::min(text.find('\n'), text.size());
         std::string_view line = text.substr(0, end);
         text.remove_prefix(std::min(end + 1, text.size()));
         while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back())) != 0)
             line.remove_suffix(1);
-        const std::string_view secret = secret_in(line);
+        const std::string_view secret = awaited ? line : secret_in(line);
+        if (!line.empty()) awaited = awaits_secret(line);
         if (!secret.empty()) secrets.emplace(number, parts_of(secret));
     }
     for (Problem& problem : list_) {

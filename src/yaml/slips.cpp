@@ -31,10 +31,11 @@ constexpr auto kSlips = std::to_array<Slip>({
      "(?:.*: +)?((?:\xE2\x80[\x98\x99\x9A\x9C\x9D\x9E]|\xC2[\xAB\xBB])(.+)"
      "(?:\xE2\x80[\x98\x99\x9A\x9C\x9D\x9E]|\xC2[\xAB\xBB]))(?::.*)?",
      1, "these are no quotes of YAML; write \"$2\""},
-    {On::any, R"((?:.*[^$])?(\{\{) *([A-Za-z]\w*)?.*)", 1,
+    {On::any, R"((?:[^"']*[:,{[-] +)?(\{\{) *([A-Za-z]\w*)?.*)", 1,
      "'{{' means nothing here; a variable is written ${$2}"},
     {On::any, R"(-([A-Za-z][\w-]*):?(?: .*)?)", 0, "a blank is missing after '-'; write '- $1:'"},
-    {On::any, R"((?://|/\*|--(?!-)|<!--|; ).*)", 0, "a comment begins with '#'"},
+    {On::any, R"((?://|/\*|-- |<!--|; ).*)", 0, "a comment begins with '#'"},
+    {On::refused, R"(-([{["'].*))", 0, "a blank is missing after '-'; write '- $1'"},
     {On::refused, R"(([A-Za-z][\w-]*:)([{["'].*))", 2,
      "a blank is missing after '$1'; write '$1 $2'"},
     {On::refused, R"((?:.*[:,{[] *)?(([%@`])[^}\]]*?)(?:[}\]].*|, .*)?)", 1,

@@ -26,6 +26,7 @@ struct Weaker {
         growing,  ///< a number, or the place among `ranks`, grows; no value is the highest number
         falling,  ///< ... shrinks; no value is the lowest number
         more,     ///< a list has more words; an empty list means all
+        granted,  ///< ... an empty list means none
         wider,    ///< networks that were not let in; an empty list means all
         added,    ///< an entry, or the map itself, is new
         removed   ///< ... is gone

@@ -2,6 +2,7 @@
 
 #include <boost/json/array.hpp>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -42,6 +43,9 @@ std::vector<std::string> weaker(const config::Config& before, const config::Conf
 std::string to_string(const Change& change);
 /// {"path", "kind", "before", "after", "needs"} each; the last three unless they are empty.
 boost::json::array to_json(const std::vector<Change>& changes);
+
+/// The listeners by their names in Setting::path; `config` outlives the map.
+std::map<std::string, const tcp_server::Settings*> listeners_of(const config::Config& config);
 
 /// What is cut when another configuration is taken over.
 struct Interruption {

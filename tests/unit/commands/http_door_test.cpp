@@ -31,24 +31,16 @@ const struct {
     {"#http: {listen: 127.0.0.1:1}\nhttp:\n# listen: 127.0.0.1:2\n", ""},
     {"http: {hosts: [a]}\nmodbus_tcp: [{listen: 127.0.0.1:502}]\n[", ""},
     {"http:\n  relisten: 127.0.0.1:2\n", ""},
-    // Deeper.
-    {"http: {tls: {listen: 127.0.0.1:1}}\n[", ""},
-    {"http: {tls: {listen: 127.0.0.1:1}, listen: 127.0.0.1:2}\n[", "127.0.0.1:2"},
-    {"http:\n  tokens:\n    - listen: 127.0.0.1:1\n[", ""},
-    {"http:\n  tls:\n    listen: 127.0.0.1:1\n  listen: 127.0.0.1:2\n[", "127.0.0.1:2"},
     // Of two none is taken.
     {"<<<<<<< ours\nhttp: {listen: 127.0.0.1:1}\n=======\n"
      "http: {listen: 127.0.0.1:2}\n>>>>>>> theirs\n",
      ""},
-    {"http: {listen: 127.0.0.1:1}\nhttp: {anonymous: none}\n", ""},
     {"http: {listen: 127.0.0.1:1}\nhttp: {listen: 127.0.0.1:1}\n", "127.0.0.1:1"},
 };
 
 TEST(ListenInText, IsFoundInATextThatIsNoYamlUnlessItIsNotItsOwn) {
     for (const auto& row : kTexts) EXPECT_EQ(http_listen_in(row.text), row.listen) << row.text;
 }
-
-/// The figures are four pieces; the version identifies the copy.
 
 }  // namespace
 }  // namespace panelgate::commands::http_door_test

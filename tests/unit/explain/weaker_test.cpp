@@ -172,6 +172,8 @@ TEST(Weaker, PagesOfMoreSitesThatMayRead) {
     EXPECT_EQ(told(http, ", cors: ['http://a.example']",
                    ", cors: ['http://a.example', 'http://b.example:81']"),
               "http: cors [http://a.example] -> [http://a.example, http://b.example:81]");
+    EXPECT_EQ(told(http, "", ", cors: ['http://a.example']"),
+              "http: cors not set -> [http://a.example]");
 }
 
 TEST(Weaker, HostsThatAreMore) {
@@ -223,6 +225,9 @@ TEST(Weaker, WritesOfABroker) {
         return station("") + "mqtt: {broker: 'mqtt://127.0.0.1', topic: a" + keys + "}\n";
     };
     EXPECT_EQ(told(mqtt, "", ", write: points"), "mqtt: write none -> points");
+    EXPECT_EQ(told(station(""), mqtt(", write: points")), "mqtt: added");
+    EXPECT_EQ(told(station(""), mqtt("")), "");
+    EXPECT_EQ(told(mqtt, "", ", password_file: /a, username: u"), "") << "the broker's";
 }
 
 }  // namespace

@@ -52,7 +52,7 @@ constexpr const char* kValid[] = {
     "a: \"# {: \\\" x\" # \"\n\"b\": 'c'\n",
     "a: ${B:-c}\n",
     "a:\tb\nc: it's 5\" - x\n",
-    "a: 3/4\"\nb: pipe 6'\nc: the operators' key\n\"d\" : \"e\n  f\" # g\n",
+    "a: 3/4\"\nb: pipe 6'\nc: the operators' key\nx: it's\"\n\"d\" : \"e\n  f\" # g\n",
     "{\"a\":\"b, [c: {\",\"d\":[\"e\",'f: '],'g':1}\n",
     "a:\n    b: 1\n\n# x\n    c: 2\nd: -5\n",
 };
