@@ -1,4 +1,4 @@
-#include "asking_commands.hpp"
+#include "command_line.hpp"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include "certificate_commands.hpp"
+#include "command_line.hpp"
 
 #include <fcntl.h>
 #include <sys/file.h>

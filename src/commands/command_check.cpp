@@ -15,7 +15,6 @@
 #include "commands.hpp"
 #include "panelgate/base/text.hpp"
 #include "panelgate/config/real_files.hpp"
-#include "panelgate/explain/access_doubts.hpp"
 #include "panelgate/explain/capacity.hpp"
 #include "panelgate/explain/difference.hpp"
 #include "panelgate/explain/inventory.hpp"

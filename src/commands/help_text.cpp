@@ -1,4 +1,4 @@
-#include "help_text.hpp"
+#include "command_line.hpp"
 
 #include <CLI/CLI.hpp>
 #include <CLI/Error.hpp>

@@ -16,10 +16,8 @@
 #include <vector>
 
 #include "adapters.hpp"
-#include "asking_commands.hpp"
-#include "certificate_commands.hpp"
+#include "command_line.hpp"
 #include "commands.hpp"
-#include "help_text.hpp"
 #include "panelgate/base/text.hpp"
 #include "panelgate/gateway/build_info.hpp"
 

@@ -2,7 +2,7 @@
 #include <memory>
 #include <string>
 
-#include "asking_commands.hpp"
+#include "command_line.hpp"
 
 namespace panelgate::commands {
 

@@ -1,4 +1,4 @@
-#include "check_doors.hpp"
+// Checks of what listeners let in.
 
 #include <algorithm>
 #include <array>
@@ -13,6 +13,7 @@
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/deadlines.hpp"
 #include "panelgate/config/endpoint.hpp"
+#include "tables.hpp"
 
 namespace panelgate::config {
 

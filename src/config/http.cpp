@@ -194,7 +194,7 @@ bool read_expiry(Reader& in, Token& token) {
 /// A schema knows no file, so it takes any name for a role.
 KeyShape role_shape(std::string_view key, std::string_view text) {
     KeyShape shape = text_shape(key, {"^[a-z0-9-]+$"}, text);
-    shape.weaker = {By::growing, {}, {"none", "viewer", "operator", "engineer", "admin"}};
+    shape.weaker = {.by = By::role};
     return shape;
 }
 

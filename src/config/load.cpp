@@ -12,7 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include "check_doors.hpp"
 #include "panelgate/yaml/document.hpp"
 #include "panelgate/yaml/variables.hpp"
 #include "tables.hpp"
@@ -360,7 +359,8 @@ namespace {
 
 std::optional<Config> load_text(std::string_view text, const Files& files, yaml::Problems& problems,
                                 const yaml::Environment& environment) {
-    yaml::Node tree = yaml::parse(text, problems);
+    const std::vector<std::string_view> sections = root_keys().names();
+    yaml::Node tree = yaml::parse(text, problems, sections);
     if (tree.kind == yaml::Node::Kind::null) {
         if (problems.empty())
             problems.add({1, 1}, "the file is empty; a configuration needs at least 'lines'");

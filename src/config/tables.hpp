@@ -144,4 +144,15 @@ KeyShape tls_shape(std::string_view text);
 /// Of Modbus/TCP Security, where a listener with `tls` names no port.
 inline constexpr std::uint16_t kSecurePort = 802;
 
+/// Reports every key and value with a line end or another control character, from an escape
+/// ("\\u0007") or a variable: names and labels go into logs, metrics and pages, and no
+/// configuration needs one.
+void refuse_control_characters(const yaml::Node& tree, yaml::Problems& problems);
+
+/// Warns about listeners in what was loaded from `tree` without a problem: writable from outside
+/// (is_reachable_from_outside()), sharing a port, units that hide the stations with these ids,
+/// tokens that others can read or guess, UDP open to the outside, and what anonymous clients from
+/// there may see.
+void warn_of_listeners(Loading& loading, const yaml::Node& tree);
+
 }  // namespace panelgate::config

@@ -1,4 +1,4 @@
-#include "panelgate/explain/access_doubts.hpp"
+// What `check` doubts of access and audit.
 
 #include <algorithm>
 #include <filesystem>
@@ -7,6 +7,7 @@
 
 #include "panelgate/access/settings.hpp"
 #include "panelgate/explain/explain_door.hpp"
+#include "panelgate/explain/rights_text.hpp"
 #include "panelgate/modbus/function.hpp"
 
 namespace panelgate::explain {

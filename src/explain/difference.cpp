@@ -10,10 +10,12 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <string_view>
 #include <tuple>
 #include <utility>
 
+#include "panelgate/base/role.hpp"
 #include "panelgate/base/text.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/config/describe.hpp"
@@ -141,6 +143,7 @@ bool covers_network(const std::string& wide, const std::string& narrow) {
 bool weakens(const Weaker& how, const Change& change) {
     switch (how.by) {
         case By::nothing:
+        case By::role:  // is_weaker() knows the roles
             return false;
         case By::added:
             return change.kind == Kind::added;
@@ -173,6 +176,8 @@ bool weakens(const Weaker& how, const Change& change) {
 struct Sides {
     const Settings& before;
     const Settings& after;
+    std::span<const OwnRole> roles_before;
+    std::span<const OwnRole> roles_after;
 
     static bool has(const Settings& side, const std::string& path, std::string_view value) {
         const auto found = side.find(path);
@@ -225,6 +230,9 @@ bool is_weaker(const Change& change, const Setting& setting, const Sides& sides)
                !Sides::has(sides.after,
                            change.path.substr(0, change.path.find("/units/")) + "/broadcast",
                            "deny");
+    if (key->weaker.by == By::role)
+        return standing_named(change.after, sides.roles_after)
+            .exceeds(standing_named(change.before, sides.roles_before));
     return weakens(key->weaker, change) && !is_harmless(change, *key, sides);
 }
 
@@ -386,7 +394,7 @@ std::vector<Change> differences(const config::Config& before, const config::Conf
         changes.push_back(change_of(path, difference));
         changes.back().weaker = is_weaker(
             changes.back(), difference.after == nullptr ? *difference.before : *difference.after,
-            {old_settings, new_settings});
+            {old_settings, new_settings, before.access.roles, after.access.roles});
         if (is_one_sided(difference)) continue;
         const config::KeyShape* key = keys.of(*difference.after);
         if (key != nullptr && !is_taken_over(before, after, path))

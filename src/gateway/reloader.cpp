@@ -163,6 +163,7 @@ void Reloader::Job::read() try {
         verdict.weaker = explain::weaker(*running, *next);
         if (!verdict.weaker.empty() && !may_be_weaker) {
             next = nullptr;
+            verdict.weaker = explain::weaker(*running, *rollback);  // tokens included
             verdict.outcome = ReloadOutcome::refused;
             verdict.why =
                 "what ran before protects less than what runs now; ask with weaker where "

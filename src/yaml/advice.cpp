@@ -153,7 +153,9 @@ struct Edit {
 
 class Columns {
   public:
-    Columns(std::string_view text, std::vector<Row> rows) : text_(text), rows_(std::move(rows)) {}
+    Columns(std::string_view text, std::vector<Row> rows,
+            std::span<const std::string_view> sections)
+        : text_(text), rows_(std::move(rows)), sections_(sections) {}
 
     /// Returns the first line that cannot follow the lines above, with the probable intention.
     std::optional<Finding> find() {
@@ -201,7 +203,9 @@ class Columns {
                   std::size_t beside) const {
         const auto by = static_cast<std::ptrdiff_t>(to) - static_cast<std::ptrdiff_t>(at);
         if (by == 0) return;
-        all.push_back({from, 1, by, 0, beside});
+        const bool section = to == 0 && rows_[from].dashes == 0 &&
+                             std::ranges::find(sections_, rows_[from].name) != sections_.end();
+        all.push_back({from, 1, by, 0, beside, section});
         const std::size_t count = from == wrong_ ? rows_beside(from) : 1;
         if (count > 1) all.push_back({from, count, by, 0, beside});
     }
@@ -302,6 +306,7 @@ class Columns {
 
     std::string_view text_;
     std::vector<Row> rows_;
+    std::span<const std::string_view> sections_;
     std::size_t wrong_ = 0;
     std::vector<Levels> history_;  ///< before the rows up to the wrong one
 };
@@ -426,7 +431,8 @@ Findings find_traps(std::string_view text, const Lines& lines) {
     return sorted(text, findings);
 }
 
-Findings find_causes(std::string_view text, const Lines& lines, std::size_t error) {
+Findings find_causes(std::string_view text, const Lines& lines, std::size_t error,
+                     std::span<const std::string_view> sections) {
     Findings findings = find_traps(text, lines);
     std::vector<Row> rows;
     const TextLine* above = nullptr;
@@ -450,7 +456,7 @@ Findings find_causes(std::string_view text, const Lines& lines, std::size_t erro
     if (lines.quotes.empty())
         findings.insert(findings.end(), lines.brackets.begin(), lines.brackets.end());
     if (!findings.empty()) return sorted(text, findings);
-    take(findings, Columns(text, std::move(rows)).find());
+    take(findings, Columns(text, std::move(rows), sections).find());
     return findings;
 }
 

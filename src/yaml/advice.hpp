@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -34,7 +35,9 @@ struct Lines {
 Findings find_traps(std::string_view text, const Lines& lines);
 /// Finds probable causes of a parser's error at the offset `error`, at the mistake: a parser often
 /// stops lines below. Empty: no cause is known.
-Findings find_causes(std::string_view text, const Lines& lines, std::size_t error);
+/// `sections`: keys of the outermost map.
+Findings find_causes(std::string_view text, const Lines& lines, std::size_t error,
+                     std::span<const std::string_view> sections = {});
 
 /// On which lines a slip is looked for.
 enum class On : std::uint8_t {

@@ -305,18 +305,22 @@ void add(const Source& source, const Findings& findings, Problems& problems) {
 
 /// A decoded text, and what its author may have meant where it is no YAML.
 struct Text {
-    explicit Text(std::string all)
-        : source(std::move(all)), masked(mask_variables(source.text())), lines(masked) {}
+    Text(std::string all, std::span<const std::string_view> of_top)
+        : source(std::move(all)),
+          masked(mask_variables(source.text())),
+          lines(masked),
+          sections(of_top) {}
 
     Source source;
     std::string masked;
     Lines lines;
+    std::span<const std::string_view> sections;
 };
 
 /// Adds the causes, or `otherwise` at the place of the error.
 void explain(const Text& text, Mark mark, std::string otherwise, Problems& problems) {
     const Findings causes =
-        find_causes(text.source.text(), text.lines, text.source.end_of(mark.line));
+        find_causes(text.source.text(), text.lines, text.source.end_of(mark.line), text.sections);
     add(text.source, causes, problems);
     if (causes.empty()) problems.add(mark, std::move(otherwise), text.source.excerpt(mark));
 }
@@ -346,9 +350,9 @@ bool build(const Text& text, Builder& builder, Problems& problems, Problems& fou
 
 }  // namespace
 
-Node parse(std::string_view bytes, Problems& problems) {
+Node parse(std::string_view bytes, Problems& problems, std::span<const std::string_view> sections) {
     Decoded decoded = decode(bytes);
-    const Text text(std::move(decoded.text));
+    const Text text(std::move(decoded.text), sections);
     const Source& source = text.source;
     add(source, decoded.bad, problems);
     if (!decoded.bad.empty()) return {};  // all later problems may follow from it
@@ -370,7 +374,7 @@ Node parse(std::string_view bytes, Problems& problems) {
     // A file of lines such as `device = /dev/ttyUSB0` is a single text.
     const bool is_text = root.kind == Node::Kind::scalar && !root.quoted;
     if (!is_text || root.scalar.find_first_of("=:") == root.scalar.npos) return root;
-    const Findings causes = find_causes(source.text(), text.lines, source.text().size());
+    const Findings causes = find_causes(source.text(), text.lines, source.text().size(), sections);
     add(source, causes, problems);
     return causes.empty() ? root : Node();
 }

@@ -191,6 +191,18 @@ class Viewer(unittest.TestCase):
             self.assertEqual(ask(program, "POST", "/api/v1/reload", None, {"rollback": True, "weaker": True})[0], 200)
             self.assertEqual(ask(program, "GET", "/api/v1/stations/oven", "eye")[0], 403)
 
+    def test_a_refused_rollback_tells_tokens_beside_the_rest(self):
+        with plant() as program:
+            file = program.file
+            text = file.read_text()
+            file.write_text(text.replace("role: viewer, file", "role: viewer, expires: 2090-01-01, file")
+                            .replace("tokens: [eye], stations: [press]", "tokens: [eye]"))
+            self.assertEqual(ask(program, "POST", "/api/v1/reload")[0], 200)
+            status, text = ask(program, "POST", "/api/v1/reload", None, {"rollback": True})
+            self.assertEqual((status, sorted(json.loads(text)["weaker"])),
+                             (409, ["access/rules/eye-sees-press: stations not set -> [floor1/31]",
+                                    "http/tokens/eye: expires 2090-01-01 -> not set"]))
+
     def test_a_rollback_over_which_only_a_token_changed_says_so(self):
         with plant() as program:
             self.assertEqual(ask(program, "GET", "/api/v1/lines", "eye")[0], 200)

@@ -28,6 +28,7 @@ struct Weaker {
         more,     ///< a list has more words; an empty list means all
         granted,  ///< ... an empty list means none
         wider,    ///< networks that were not let in; an empty list means all
+        role,     ///< the role of this name has a right that the one before had not
         added,    ///< an entry, or the map itself, is new
         removed   ///< ... is gone
     };

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "panelgate/base/time.hpp"
 #include "panelgate/config/config.hpp"
 
 namespace panelgate::explain {
@@ -11,6 +12,10 @@ namespace panelgate::explain {
 std::string rights_matrix(const config::Config& config);
 /// Warns of faces by which a client may write although rules deny the write at other faces.
 std::vector<std::string> open_doors(const config::Config& config);
+
+/// Warns of what `check` can know of access and audit, and a start would not refuse: rules that
+/// nobody can come by, tokens that have ended, an audit without its folder.
+std::vector<std::string> access_doubts(const config::Config& config, WallTime now);
 
 /// What decides on a request that is described in words.
 struct Explanation {

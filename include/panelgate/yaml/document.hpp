@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -105,6 +106,8 @@ Size size_of(const Node& node);
 /// errors (at their cause, if it can be found), unclosed quotes, duplicate keys, non-scalar keys,
 /// tags, a second document, and what exceeds a limit of settings.hpp (aliases count as what they
 /// repeat). Returns what could be read (a null node if nothing).
-Node parse(std::string_view text, Problems& problems);
+/// `sections`: keys of the outermost map, for advice about indentation.
+Node parse(std::string_view text, Problems& problems,
+           std::span<const std::string_view> sections = {});
 
 }  // namespace panelgate::yaml

@@ -196,6 +196,18 @@ TEST(Weaker, RolesOfAnonymousClientsAndOfTokens) {
         << "another secret";
 }
 
+TEST(Weaker, ARoleOfAnotherNameByItsRights) {
+    const Maker roles = [](const std::string& anonymous) {
+        return http(", anonymous: " + anonymous) +
+               "access: {roles: [{name: eye, rights: [read]}, {name: hand, rights: [read, "
+               "write]}]}\n";
+    };
+    EXPECT_EQ(one_way(roles("viewer"), roles("eye")), "");
+    EXPECT_EQ(one_way(roles("operator"), roles("hand")), "");
+    EXPECT_EQ(told(roles, "viewer", "hand"), "http: anonymous viewer -> hand");
+    EXPECT_EQ(told(roles, "eye", "operator"), "http: anonymous eye -> operator");
+}
+
 TEST(Weaker, ARoleOfTheSameNameThatHasMoreRights) {
     const Maker rights = [](const std::string& list) {
         return http(", anonymous: maint, tokens: [{name: a, role: maint, file: /a}]") +
