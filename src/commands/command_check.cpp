@@ -7,7 +7,6 @@
 #include <iostream>
 #include <iterator>
 #include <string>
-#include <string_view>
 #include <tuple>
 #include <utility>
 #include <vector>

@@ -2,7 +2,6 @@
 #include <iostream>
 #include <map>
 #include <optional>
-#include <string_view>
 #include <system_error>
 #include <vector>
 

@@ -1,11 +1,9 @@
 #pragma once
 
 #include <boost/json/object.hpp>
-#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "answers.hpp"

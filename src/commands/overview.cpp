@@ -6,9 +6,7 @@
 #include <boost/json/value.hpp>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <cstdio>
-#include <optional>
 #include <utility>
 
 #include "answers.hpp"

@@ -5,7 +5,6 @@
 #include <boost/json/serialize.hpp>
 #include <boost/json/string.hpp>
 #include <cstddef>
-#include <cstdio>
 
 #include "answers.hpp"
 #include "panelgate/base/text.hpp"

@@ -3,8 +3,6 @@
 #include <boost/json/object.hpp>
 #include <map>
 #include <string>
-#include <string_view>
-#include <utility>
 #include <vector>
 
 namespace panelgate::commands {

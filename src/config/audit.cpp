@@ -1,5 +1,4 @@
 #include <array>
-#include <charconv>
 #include <cstdint>
 #include <optional>
 #include <string>

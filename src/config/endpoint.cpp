@@ -3,7 +3,6 @@
 #include <arpa/inet.h>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <tuple>
 

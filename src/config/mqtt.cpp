@@ -5,7 +5,6 @@
 #include <chrono>
 #include <string>
 #include <string_view>
-#include <utility>
 
 #include "panelgate/base/text.hpp"
 #include "panelgate/line/settings.hpp"

@@ -1,7 +1,6 @@
 #include "templates.hpp"
 
 #include <algorithm>
-#include <cstddef>
 #include <map>
 #include <optional>
 #include <set>

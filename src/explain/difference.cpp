@@ -4,12 +4,10 @@
 #include <array>
 #include <boost/json/object.hpp>
 #include <charconv>
-#include <cstdint>
 #include <cstdlib>
 #include <functional>
 #include <map>
 #include <optional>
-#include <set>
 #include <span>
 #include <string_view>
 #include <tuple>

@@ -5,7 +5,6 @@
 #include <boost/system/error_code.hpp>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include "panelgate/base/role.hpp"
 #include "panelgate/tcp_server/unit_map.hpp"

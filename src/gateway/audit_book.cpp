@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <boost/asio/post.hpp>
-#include <span>
 #include <utility>
 
 #include "panelgate/gateway/asked_place.hpp"

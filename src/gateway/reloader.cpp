@@ -4,7 +4,6 @@
 #include <sys/stat.h>
 #include <algorithm>
 #include <ranges>
-#include <system_error>
 #include <utility>
 
 #include "panelgate/config/describe.hpp"

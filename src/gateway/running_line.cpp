@@ -1,12 +1,8 @@
 #include "panelgate/gateway/running_line.hpp"
 
-#include <algorithm>
-#include <cstdlib>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <variant>
 #include <vector>

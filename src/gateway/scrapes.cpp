@@ -12,7 +12,6 @@
 #include <cstddef>
 #include <exception>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 #include <utility>

@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
-#include <cerrno>
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
+#include <initializer_list>
 #include <limits>
 #include <map>
 #include <optional>
@@ -38,7 +37,6 @@ struct Number {
 /// 2^31 - 1.
 std::optional<Number> parse_number(const std::string& text) {
     char* stop = nullptr;
-    errno = 0;
     const long long value = std::strtoll(text.c_str(), &stop, 0);
     constexpr long long kMost = std::numeric_limits<std::int32_t>::max();
     if (stop == text.c_str() || text[0] == '-' || value > kMost) return std::nullopt;
@@ -53,45 +51,6 @@ struct Line {
     yaml::Mark value_mark;  ///< or of the end of the line
 };
 
-constexpr std::string_view kBlanks = " \t\f\v";
-
-std::string_view without_blanks(std::string_view text) {
-    const std::size_t first = text.find_first_not_of(kBlanks);
-    if (first == text.npos) return {};
-    return text.substr(first, text.find_last_not_of(kBlanks) + 1 - first);
-}
-
-bool has_control_character(std::string_view text) {
-    return std::ranges::any_of(text, [](unsigned char c) { return c < ' ' || c == 0x7f; });
-}
-
-void take_line(std::string_view whole, int number, std::vector<Line>& lines,
-               yaml::Problems& problems) {
-    const std::string_view typed = without_blanks(whole);
-    if (typed.empty() || typed[0] == '#') return;
-    const auto column = [&](std::string_view part) {
-        return part.empty() ? static_cast<int>(whole.size()) + 1
-                            : static_cast<int>(part.data() - whole.data()) + 1;
-    };
-    const std::size_t sign = typed.find('=');
-    const std::string_view name = without_blanks(typed.substr(0, sign));
-    const yaml::Mark mark{number, column(typed)};
-    if (sign == typed.npos || name.empty()) {
-        problems.add(mark,
-                     "a line must be NAME = VALUE such as speed = 19200, or a comment that "
-                     "begins with '#', not " +
-                         yaml::quote(typed));
-        return;
-    }
-    const std::string_view value = without_blanks(typed.substr(sign + 1));
-    if (has_control_character(value)) {
-        problems.add({number, column(value)},
-                     std::string(name) + " must be plain text; it holds control characters");
-        return;
-    }
-    lines.push_back({std::string(name), std::string(value), mark, {number, column(value)}});
-}
-
 /// Only a line that begins with '#' is a comment: text after a value belongs to the value. Lines
 /// end with LF, CR or both; a leading byte order mark is skipped. Invalid lines are added to
 /// `problems`.
@@ -99,10 +58,29 @@ std::vector<Line> lines_of(std::string_view text, yaml::Problems& problems) {
     std::vector<Line> lines;
     text.remove_prefix(byte_order_mark(text));
     for (int number = 1; !text.empty(); ++number) {
-        const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
-        take_line(text.substr(0, end), number, lines, problems);
-        text.remove_prefix(end);
+        const std::string_view whole = text.substr(0, text.find_first_of("\r\n"));
+        text.remove_prefix(whole.size());
         text.remove_prefix(text.starts_with("\r\n") ? 2 : text.empty() ? 0 : 1);
+        const std::string_view typed = trimmed(whole);
+        if (typed.empty() || typed[0] == '#') continue;
+        const std::size_t sign = std::min(typed.find('='), typed.size());
+        const std::string_view name = trimmed(typed.substr(0, sign));
+        const std::string_view value = trimmed(typed.substr(std::min(sign + 1, typed.size())));
+        const auto mark = [&](std::string_view part) {
+            return yaml::Mark{number, static_cast<int>(part.data() - whole.data()) + 1};
+        };
+        const yaml::Mark behind =
+            value.empty() ? yaml::Mark{number, static_cast<int>(whole.size()) + 1} : mark(value);
+        if (sign == typed.size() || name.empty())
+            problems.add(mark(typed),
+                         "a line must be NAME = VALUE such as speed = 19200, or a comment that "
+                         "begins with '#', not " +
+                             yaml::quote(typed));
+        else if (std::ranges::any_of(value, [](unsigned char c) { return c < ' ' || c == 0x7f; }))
+            problems.add(behind,
+                         std::string(name) + " must be plain text; it holds control characters");
+        else
+            lines.push_back({std::string(name), std::string(value), mark(typed), behind});
     }
     return lines;
 }
@@ -121,12 +99,6 @@ struct Settings {
     bool replies_to_broadcasts = false;
     std::string level = "info";
 };
-
-std::string lower(std::string_view text) {
-    std::string made(text);
-    std::ranges::transform(made, made.begin(), [](unsigned char c) { return std::tolower(c); });
-    return made;
-}
 
 /// Returns text that a comment may hold, whatever the file's encoding.
 std::string as_ascii(std::string text) {
@@ -240,8 +212,8 @@ class Reader {
     void yes_or_no(bool& yes) {
         static const std::set<std::string, std::less<>> kYes{"yes", "y", "true", "on", "1"};
         static const std::set<std::string, std::less<>> kNo{"no", "n", "false", "off", "0"};
-        yes = kYes.contains(lower(line_->value));
-        if (!yes && !kNo.contains(lower(line_->value))) wrong_value("yes or no");
+        yes = kYes.contains(to_lower(line_->value));
+        if (!yes && !kNo.contains(to_lower(line_->value))) wrong_value("yes or no");
     }
     void flag_with_note(const std::string& why) {
         bool ignored = false;
@@ -270,7 +242,7 @@ class Reader {
     void trx_control() {
         static const std::set<std::string, std::less<>> kWords{"addc",  "rts",     "rts_0",
                                                                "rts_1", "sysfs_0", "sysfs_1"};
-        const std::string typed = lower(line_->value);
+        const std::string typed = to_lower(line_->value);
         rts_.reset();
         if (!kWords.contains(typed)) {
             wrong_value("addc, rts_0, rts_1 (or rts), sysfs_0 or sysfs_1");
@@ -342,13 +314,6 @@ class Reader {
     std::vector<std::string> comments_;
 };
 
-std::string serial_text(const Settings& mbusd) {
-    const int parity = std::tolower(static_cast<unsigned char>(mbusd.mode[1]));
-    const char* word = parity == 'n' ? "none" : parity == 'e' ? "even" : "odd";
-    return "{baud: " + std::to_string(mbusd.speed) + ", data_bits: 8, parity: " + word +
-           ", stop_bits: " + mbusd.mode[2] + '}';
-}
-
 /// All attempts must fit; empty if the default is enough.
 std::string deadline_text(const Settings& mbusd) {
     constexpr std::int64_t kDefault = 2000;
@@ -360,37 +325,49 @@ std::string deadline_text(const Settings& mbusd) {
            "s}   # all tries fit into it; clients have to wait for longer\n";
 }
 
-std::string listen_text(const Settings& mbusd) {
-    const auto at = endpoint_of(mbusd.address, mbusd.port);
-    return at ? endpoint_text(at->address, at->port) : "";
-}
+constexpr std::string_view kForm = R"(# made of an mbusd.conf by panelgate import
+lines:
+  - name: line1
+    device: $
+    serial: {baud: $, data_bits: 8, parity: $, stop_bits: $}
+    rs485: $
+    timing: {response_timeout: $ms}
+    retries: $   # of reads; mbusd repeats writes, too: here a station says retry_writes: true
+$    # stations:   # none are needed: all addresses pass. Listed, they have names, points,
+    #   - {id: 1, name: press, profile: autonics-gplp-s}   # limits: panelgate init
+modbus_tcp:
+  - listen: '$'
+    broadcast: $
+    max_connections: $
+$log: {level: $}
+)";
+constexpr std::string_view kHttp =
+    "http:   # status, metrics and a dashboard, which mbusd has not\n  listen: 127.0.0.1:8080\n";
 
-std::string line_text(const Settings& mbusd) {
-    return "lines:\n  - name: line1\n    device: " + quoted(mbusd.device) +
-           "\n    serial: " + serial_text(mbusd) + "\n    rs485: " + mbusd.rs485 +
-           "\n    timing: {response_timeout: " + std::to_string(mbusd.wait) +
-           "ms}\n    retries: " + std::to_string(mbusd.retries) +
-           "   # of reads; mbusd repeats writes, too: here a station says retry_writes: true\n" +
-           deadline_text(mbusd) +
-           "    # stations:   # none are needed: all addresses pass. Listed, they have names, "
-           "points,\n"
-           "    #   - {id: 1, name: press, profile: autonics-gplp-s}   # limits: panelgate init\n";
-}
-
-std::string servers_text(const Settings& mbusd) {
-    std::string text = "modbus_tcp:\n  - listen: '" + listen_text(mbusd) +
-                       "'\n    broadcast: " + (mbusd.replies_to_broadcasts ? "reply" : "silent") +
-                       "\n    max_connections: " + std::to_string(mbusd.connections) + '\n';
-    if (mbusd.port != 8080)
-        text +=
-            "http:   # status, metrics and a dashboard, which mbusd has not\n"
-            "  listen: 127.0.0.1:8080\n";
-    return text;
+/// Puts the values in place of the '$' of the form.
+std::string filled(std::string_view form, std::initializer_list<std::string> values) {
+    std::string text;
+    for (const std::string& value : values) {
+        const std::size_t at = form.find('$');
+        text += std::string(form.substr(0, at)) + value;
+        form.remove_prefix(at + 1);
+    }
+    return text + std::string(form);
 }
 
 std::string yaml_of(const Settings& mbusd, const std::vector<std::string>& comments) {
-    std::string text = "# made of an mbusd.conf by panelgate import\n" + line_text(mbusd) +
-                       servers_text(mbusd) + "log: {level: " + mbusd.level + "}\n";
+    const char parity = to_lower(mbusd.mode)[1];
+    const auto listen = endpoint_of(mbusd.address, mbusd.port);
+    std::string text = filled(
+        kForm, {quoted(mbusd.device), std::to_string(mbusd.speed),
+                parity == 'n'   ? "none"
+                : parity == 'e' ? "even"
+                                : "odd",
+                std::string(1, mbusd.mode[2]), mbusd.rs485, std::to_string(mbusd.wait),
+                std::to_string(mbusd.retries), deadline_text(mbusd),
+                listen ? endpoint_text(listen->address, listen->port) : "",
+                mbusd.replies_to_broadcasts ? "reply" : "silent", std::to_string(mbusd.connections),
+                mbusd.port == 8080 ? "" : std::string(kHttp), mbusd.level});
     if (!comments.empty()) text += "\n# Without a counterpart, or not as it was written:\n";
     for (const std::string& comment : comments) text += "# " + comment + '\n';
     return text;

@@ -1,8 +1,6 @@
 #include "advice.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cstdint>
 #include <map>
 #include <regex>
 #include <tuple>

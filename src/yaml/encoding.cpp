@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <optional>
-#include <utility>
 
 #include "panelgate/base/text.hpp"
 #include "panelgate/yaml/settings.hpp"

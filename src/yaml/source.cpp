@@ -1,7 +1,6 @@
 #include "source.hpp"
 
 #include <algorithm>
-#include <array>
 #include <string>
 #include <utility>
 

@@ -40,6 +40,7 @@ class State(unittest.TestCase):
         self.assertRegex(well.stdout, r"(?m)^press +floor1/31 +autonics-gplp-s +online +[\d.]+ s ago +[\d.]+ ms +0 of \d+$")
         self.assertTrue(well.stdout.endswith("\nall is well\n"))
         self.assertNotIn("\x1b", well.stdout)
+        self.assertEqual(self.gateway.get("/api/v1/stations/mixer/devices/UW0")[0], 200)  # it has answered once
         self.gateway.rest("PUT", "/api/v1/simulator/mixer", {"dead": 1})
         try:
             for _ in range(4):

@@ -2,7 +2,6 @@
 
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "panelgate/access/settings.hpp"
 #include "panelgate/base/time.hpp"

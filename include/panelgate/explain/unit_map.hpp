@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 #include "panelgate/config/config.hpp"
 #include "panelgate/tcp_server/unit_map.hpp"

@@ -7,7 +7,6 @@
 #include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus_client.hpp"
