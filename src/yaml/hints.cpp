@@ -72,8 +72,11 @@ std::string number_hint(std::string_view text, bool whole) {
         const auto [stop, error] = std::from_chars(text.data() + 2, end, value, 16);
         return error == std::errc() && stop == end ? write(std::to_string(value)) : "";
     }
+    std::string digits(text);
+    std::erase(digits, '_');
     std::string_view unit;
-    const auto number = leading_number(text, unit);
+    const auto exact = parse_number(digits);  // 115_200, 1e3
+    const auto number = exact ? exact : leading_number(text, unit);
     constexpr double kMost = 1e15;  // whole numbers that a double holds exactly
     const bool fits =
         number && std::fabs(*number) < kMost && (!whole || *number == std::floor(*number));

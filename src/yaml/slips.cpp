@@ -58,6 +58,7 @@ constexpr auto kSlips = std::to_array<Slip>({
      "a list begins below its key; begin a new line before this '-'"},
     {On::refused, R"((?:.*[{,] *)[\w-]+: +([^ {}"'[\],][^{}"'[\],]*: [^{},]*[^{}, ]).*)", 1,
      "a text that holds ': ' must be in quotes; write \"$1\""},
+    {On::refused, R"([\w-]+: +([\w-]+: [^{}]*\}))", 1, "a '{' is missing; write '{$1'"},
     {On::refused, R"([\w-]+: +((?:[^{}"'[\]]* )?([A-Za-z][\w-]*):(?: .*)?))", 1,
      "two keys on one line; begin a new line for '$2'; one text that holds ': ' must be in quotes: "
      "\"$1\""},
