@@ -6,7 +6,6 @@
 #include <boost/asio/error.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/post.hpp>
 #include <boost/asio/write.hpp>
 #include <cstddef>
 #include <optional>
@@ -22,11 +21,10 @@
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/explain/load.hpp"
 #include "panelgate/line/settings.hpp"
-#include "panelgate/metrics/process.hpp"
 #include "panelgate/tls/stream.hpp"
-#include "panelgate/web/http/gzip.hpp"
 #include "panelgate/yaml/document.hpp"
 #include "panelgate/yaml/map_reader.hpp"
+#include "table.hpp"
 
 namespace panelgate::commands {
 
@@ -265,11 +263,7 @@ class Question {
 }  // namespace
 
 std::string first_line(std::string_view text) {
-    const std::string_view line = text.substr(0, text.find_first_of("\r\n")).substr(0, kShown);
-    std::string shown = as_utf8(line);
-    std::ranges::replace_if(
-        shown, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
-    return shown;
+    return printable(text.substr(0, text.find_first_of("\r\n")).substr(0, kShown));
 }
 
 std::string HttpReply::status() const {

@@ -49,8 +49,7 @@ bool wants_colours(bool is_terminal, const char* no_color, const char* term) {
 
 std::string printable(std::string_view text) {
     std::string made = as_utf8(text);
-    std::ranges::replace_if(
-        made, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+    std::ranges::replace_if(made, is_control, '?');
     return made;
 }
 

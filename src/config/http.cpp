@@ -110,9 +110,7 @@ bool holds_secret(const Node& node) {
 
 /// HTTP headers cannot carry them; in an encoding of two bytes a character every second one may be
 /// zero.
-bool has_control_character(std::string_view text) {
-    return std::ranges::any_of(text, [](unsigned char c) { return c < ' ' || c == 0x7f; });
-}
+bool has_control_character(std::string_view text) { return std::ranges::any_of(text, is_control); }
 
 /// Returns a path that a variable supplied, as the configuration does not show it. Text that is no
 /// path may be the token itself.
@@ -310,7 +308,7 @@ const Keys<web::Settings>& http_keys() {
                     for (const Token& token : http.tokens) {
                         const SettingWriter one = out.item("tokens", token.name);
                         token_keys().show(one, token);
-                        one.put_secret("secret", token.hash);
+                        one.put_secret("secret", token.hash, true);
                     }
                 })
             .weaker(By::added)
@@ -473,8 +471,8 @@ void show_tls(const SettingWriter& out, const std::optional<tls::Settings>& sett
     const SettingWriter section = out.item("tls");
     tls_keys().show(section, *settings);
     const tls::Material& files = settings->material;
-    section.put_secret("files", files.certificate + files.key);
-    section.put_secret("trusted", files.ca + files.crl);
+    section.put_secret("files", files.certificate + files.key, false);
+    section.put_secret("trusted", files.ca + files.crl, true);
 }
 
 }  // namespace panelgate::config

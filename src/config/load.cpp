@@ -237,7 +237,7 @@ const Keys<Config>& root_keys() {
                     if (!config.mqtt) return;
                     mqtt_keys().show(out.item("mqtt"), *config.mqtt);
                     if (!config.mqtt->password.empty())
-                        out.below("mqtt").put_secret("password", config.mqtt->password);
+                        out.below("mqtt").put_secret("password", config.mqtt->password, false);
                 })
             .change_needs(kConnectsAnew)
             .map("access", &Config::access, access_keys,

@@ -26,8 +26,11 @@ class SettingWriter {
     }
     /// A key that is not one of the table's.
     void put(std::string_view key, std::string value) const { add(key, std::move(value)); }
-    void put_secret(std::string_view key, std::string value) const {
-        add(key, std::move(value)).secret = true;
+    /// `lets_in`: the secret decides who is let in, so each change may protect the panels less.
+    void put_secret(std::string_view key, std::string value, bool lets_in) const {
+        Setting& made = add(key, std::move(value));
+        made.secret = true;
+        made.lets_in = lets_in;
     }
 
     std::size_t size() const { return settings_->size(); }

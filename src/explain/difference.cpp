@@ -20,11 +20,9 @@
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/config/setting.hpp"
 #include "panelgate/explain/translations.hpp"
-#include "panelgate/explain/unit_map.hpp"
-#include "panelgate/modbus/function.hpp"
 #include "panelgate/tls/settings.hpp"
-#include "panelgate/yaml/document.hpp"
 #include "panelgate/yaml/map_reader.hpp"
+#include "setting_tree.hpp"
 
 namespace panelgate::explain {
 
@@ -114,19 +112,12 @@ bool is_larger(const std::string& before, const std::string& after, const Weaker
     return was && is ? *is > *was : true;
 }
 
-std::vector<std::string> items_of(const std::string& list) {
-    yaml::Problems problems("");
-    std::vector<std::string> items;
-    for (const yaml::Node& item : yaml::parse(list, problems).items) items.push_back(item.scalar);
-    return items;
-}
-
 /// True if the second list has an item that no item of the first one covers.
 template <class Covers>
 bool has_more(const std::string& before, const std::string& after, const Covers& covers) {
     if (before.empty() || after.empty()) return after.empty();
-    const auto known = items_of(before);
-    return std::ranges::any_of(items_of(after), [&](const std::string& item) {
+    const auto known = list_items(before);
+    return std::ranges::any_of(list_items(after), [&](const std::string& item) {
         return std::ranges::none_of(known,
                                     [&](const std::string& one) { return covers(one, item); });
     });
@@ -209,7 +200,7 @@ bool is_unprotected(const Change& change, const Sides& sides) {
 /// `setting`: of one of the sides.
 bool is_weaker(const Change& change, const Setting& setting, const Sides& sides) {
     const config::KeyShape* key = config::describe().of(setting);
-    if (setting.secret) return change.path.starts_with("http/tokens/");
+    if (setting.secret) return setting.lets_in;
     if (key == nullptr) return false;
     if (key->path == "mqtt")
         return change.kind == Kind::added && Sides::has(sides.after, "mqtt/write", "points");

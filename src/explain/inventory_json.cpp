@@ -41,11 +41,9 @@ json::value number(const std::string& text) {
 }
 
 json::value list_json(const std::string& text, const config::KeyShape& key) {
-    yaml::Problems problems("");
     json::array made;
-    for (const yaml::Node& item : yaml::parse(text, problems).items)
-        made.push_back(key.holds_integers ? number<std::int64_t>(item.scalar)
-                                          : json::value(item.scalar));
+    for (const std::string& item : list_items(text))
+        made.push_back(key.holds_integers ? number<std::int64_t>(item) : json::value(item));
     return made;
 }
 

@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "panelgate/config/describe.hpp"
+#include "panelgate/yaml/document.hpp"
 
 namespace panelgate::explain {
 namespace {
@@ -66,6 +67,13 @@ bool is_default(const config::Setting& setting,
     if (setting.initial) return *setting.initial == setting.value;
     const config::KeyShape* key = config::describe().of(setting);
     return key != nullptr && !key->initial.empty() && key->initial == setting.value;
+}
+
+std::vector<std::string> list_items(const std::string& list) {
+    yaml::Problems problems("");
+    std::vector<std::string> items;
+    for (const yaml::Node& item : yaml::parse(list, problems).items) items.push_back(item.scalar);
+    return items;
 }
 
 }  // namespace panelgate::explain

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -29,5 +30,8 @@ SettingTree tree_of(const std::vector<config::Setting>& settings);
 /// True if leaving it out means its value. `find` gives the setting at a path; nullptr for none.
 bool is_default(const config::Setting& setting,
                 const std::function<const config::Setting*(std::string_view)>& find);
+
+/// The items of a list's value, "[a, b]"; none of "".
+std::vector<std::string> list_items(const std::string& list);
 
 }  // namespace panelgate::explain

@@ -76,7 +76,7 @@ std::vector<Line> lines_of(std::string_view text, yaml::Problems& problems) {
                          "a line must be NAME = VALUE such as speed = 19200, or a comment that "
                          "begins with '#', not " +
                              yaml::quote(typed));
-        else if (std::ranges::any_of(value, [](unsigned char c) { return c < ' ' || c == 0x7f; }))
+        else if (std::ranges::any_of(value, is_control))
             problems.add(behind,
                          std::string(name) + " must be plain text; it holds control characters");
         else

@@ -14,6 +14,7 @@
 #include <memory>
 
 #include "native.hpp"
+#include "panelgate/base/text.hpp"
 #include "panelgate/tls/peer.hpp"
 
 namespace panelgate::tls {
@@ -88,10 +89,9 @@ class Draft {
         ASN1_TIME_set(X509_getm_notBefore(get()), static_cast<time_t>(validity.now - kHour));
         ASN1_TIME_set(X509_getm_notAfter(get()), static_cast<time_t>(end));
         const auto* const text = reinterpret_cast<const unsigned char*>(name.c_str());
-        const bool is_name =
-            std::ranges::none_of(name, [](unsigned char c) { return c < ' ' || c == 0x7f; }) &&
-            X509_NAME_add_entry_by_txt(X509_get_subject_name(get()), "CN", MBSTRING_UTF8, text, -1,
-                                       -1, 0) == 1;
+        const bool is_name = std::ranges::none_of(name, is_control) &&
+                             X509_NAME_add_entry_by_txt(X509_get_subject_name(get()), "CN",
+                                                        MBSTRING_UTF8, text, -1, -1, 0) == 1;
         ERR_clear_error();
         if (!is_name) throw WrongName("a name has 1 to 64 characters, of UTF-8, none of control");
         X509_set_pubkey(get(), key);

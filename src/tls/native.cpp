@@ -1,4 +1,5 @@
 #include "native.hpp"
+#include "panelgate/base/text.hpp"
 
 #include <openssl/asn1.h>
 #include <openssl/err.h>
@@ -89,7 +90,7 @@ std::string name_text(const X509_NAME* name) {
     const long size = BIO_get_mem_data(out.get(), &text);
     std::string subject(text, static_cast<std::size_t>(std::max(size, 0L)));
     if (subject.size() > kLongestName) subject.resize(kLongestName);
-    std::ranges::replace_if(subject, [](unsigned char c) { return c < ' ' || c == 0x7f; }, '?');
+    std::ranges::replace_if(subject, is_control, '?');
     for (const std::string_view one : kTurnsLines)
         for (std::size_t at = subject.find(one); at != subject.npos; at = subject.find(one))
             subject.replace(at, one.size(), "?");

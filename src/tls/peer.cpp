@@ -51,8 +51,7 @@ void read_role(const ASN1_OCTET_STRING* value, Peer& peer) {
 }  // namespace
 
 bool is_role_word(std::string_view word) {
-    const bool has_control =
-        std::ranges::any_of(word, [](unsigned char c) { return c < ' ' || c == 0x7f; });
+    const bool has_control = std::ranges::any_of(word, is_control);
     return !word.empty() && word.size() <= kLongestRole && !has_control && is_utf8(word);
 }
 

@@ -37,6 +37,9 @@ std::size_t byte_order_mark(std::string_view text);
 /// Replaces every byte that belongs to no character with U+FFFD.
 std::string as_utf8(std::string_view bytes);
 
+/// True for a control character of ASCII: below a blank, or DEL.
+constexpr bool is_control(char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; }
+
 /// With small ASCII letters.
 std::string to_lower(std::string_view text);
 

@@ -33,7 +33,8 @@ struct Setting {
     bool applies = true;
     std::shared_ptr<const SettingMap> map = {};  ///< that it is in; of an entry, the entry itself
     std::optional<std::string_view> initial =
-        {};  ///< KeyShape::initial; nothing of what has no row
+        {};                ///< KeyShape::initial; nothing of what has no row
+    bool lets_in = false;  ///< a secret that decides who is let in
 
     bool is_entry() const { return path == map->path; }
     /// The last part of its path; "" of an entry.

@@ -196,6 +196,16 @@ TEST(Weaker, RolesOfAnonymousClientsAndOfTokens) {
         << "another secret";
 }
 
+TEST(Weaker, AnotherContentOfTheFilesThatSayWhomToTrust) {
+    Config running = loaded(http(""));
+    running.http->tls.emplace();
+    Config next = running;
+    next.http->tls->material.certificate = "renewed";
+    EXPECT_EQ(joined(weaker(running, next)), "") << "shown to clients";
+    next.http->tls->material.ca = "another";
+    EXPECT_EQ(joined(weaker(running, next)), "http/tls: trusted changed");
+}
+
 TEST(Weaker, ARoleOfAnotherNameByItsRights) {
     const Maker roles = [](const std::string& anonymous) {
         return http(", anonymous: " + anonymous) +
