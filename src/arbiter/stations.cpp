@@ -109,7 +109,7 @@ TimePoint Stations::affordable_at(TimePoint now, const Station& station, bool is
     const ProbeBudget& budget = pays || failing >= kSeveral ? suspects_ : ignored_writes_;
     const TimePoint shared = budget.next() - credit();
     if (station.failed() == TimePoint{}) return std::max(own, shared);
-    // Each has its turn, whatever a lossy panel spends whose retries are answered.
+    // Each doubtful station has a turn, whatever a lossy panel with answered retries spends.
     const Duration turn = kTurn * budget.time_for(station.settings().response_timeout);
     return std::max(own, std::min(shared, station.failed() + (failing + 1) * turn));
 }

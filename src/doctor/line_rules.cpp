@@ -178,7 +178,7 @@ double share(std::uint64_t part, std::uint64_t whole) {
     return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-/// The line's counts without those of stations whose damage has another cause.
+/// Sums the line's counts, without stations whose damage has another cause.
 Symptoms unexplained(const Case& c) {
     Sample rest;
     for (const auto& [id, symptoms] : c.window.stations) {

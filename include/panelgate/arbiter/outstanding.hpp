@@ -121,7 +121,7 @@ class Outstanding {
 class KnownReads {
   public:
     void on_answered(const modbus::Request& read);
-    /// A client wants this of a station that has never answered: perhaps all that it answers.
+    /// A client wants this read of a station that never answered; perhaps the panel's only read.
     void on_wanted(const modbus::Request& request) {
         if (request.span()) wanted_ = request;
     }

@@ -67,7 +67,7 @@ class Station {
     bool wants_check() const { return wants_check_; }
     /// True if it is neither listed nor was ever heard: there may be no such station.
     bool speculative() const { return !listed_ && !health_.last_heard(); }
-    /// When it was last asked, or wanted, and the client that wanted it.
+    /// When the station was last asked, or wanted by a client, and the client.
     TimePoint asked() const { return asked_; }
     Client wanted_by() const { return wanted_by_; }
     /// End of its last failed attempt.

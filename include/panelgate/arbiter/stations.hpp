@@ -58,7 +58,7 @@ class Stations {
     void on_failed(TimePoint now, std::uint8_t id, bool is_read, Duration cost);
     /// A station has answered (Station::on_reply()); `retried`: behind a silence.
     void on_reply(TimePoint now, bool retried);
-    /// A station is back: others may be back for the same reason, so their budget is new.
+    /// A station is back: more may be back for the same reason, so the budget of probes is new.
     void on_recovery() { offline_.clear(); }
     /// The line was opened: all stations may be there.
     void on_opened(TimePoint now) {
@@ -74,8 +74,8 @@ class Stations {
     std::optional<std::uint8_t> next_to_probe(TimePoint now) const;
     /// When the next probe is due; empty: never.
     std::optional<TimePoint> next_probe(TimePoint now) const;
-    /// A read that shows whether this station is there: a proof, or, where none is known, a read
-    /// whose reply may at most be that to its own earlier attempt.
+    /// Returns a read that shows whether the station is there: a proof, or, without a known read, a
+    /// read whose reply may at most be the reply to an earlier attempt of the read.
     modbus::Request probe_for(TimePoint now, const Station& station) const;
     /// A read whose normal reply proves that the station has served all earlier requests (T2): of
     /// another length than each outstanding reply, and a part of a read that it has answered, or
