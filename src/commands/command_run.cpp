@@ -24,6 +24,7 @@
 #include "panelgate/gateway/reloader.hpp"
 #include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/rt/loop.hpp"
 #include "panelgate/rt/process.hpp"
 
 namespace panelgate::commands {
@@ -34,6 +35,7 @@ namespace asio = boost::asio;
 using boost::system::error_code;
 
 constexpr auto kLook = 5ms;
+constexpr int kFacesNice = 5;  ///< of the thread of the faces: the lines' frames go first
 
 /// Lives on run()'s stack while the loop runs.
 class Loop {
@@ -196,11 +198,13 @@ ExitCode serve(config::Config config, const Service& service,
     auto shared = std::make_shared<const config::Config>(std::move(config));
     boost::asio::io_context io(1);
     rt::AsioClock clock(io.get_executor());
-    const rt::LogDrain drain(clock);
+    const rt::LogDrain drain(clock, io.get_executor());
     rt::ServiceManager manager(clock);
     SignalLoop loop(io);
     gateway::Reloader reloader(io.get_executor(), service.file);
-    gateway::Gateway gateway(io.get_executor(), shared, service.simulate, &reloader);
+    const rt::Loop faces(kFacesNice);
+    gateway::Gateway gateway({faces.get_executor(), io.get_executor()}, shared, service.simulate,
+                             &reloader);
     try {
         gateway.start();
     } catch (const std::runtime_error& error) {

@@ -77,7 +77,7 @@ ExitCode simulate(const std::string& file, const std::vector<std::string>& texts
     rt::set_up_log(loaded.config->log);
     boost::asio::io_context io(1);
     rt::AsioClock clock(io.get_executor());
-    const rt::LogDrain drain(clock);
+    const rt::LogDrain drain(clock, io.get_executor());
     SignalLoop loop(io);
     gateway::SimulatedPanels panels(io.get_executor());
     try {

@@ -201,9 +201,9 @@ void Discoveries::report_progress(const std::string& line) const {
                  {"state", std::string(state)},
                  {"asked", std::to_string(what.asked())},
                  {"found", std::to_string(found)}});
-    if (!hub_.announce("discovery")) return;
-    hub_.publish({"discovery", line, {}, {}},
-                 web::discovery_event(line, state, what.asked(), what.of(), found));
+    if (!events_.is_wanted()) return;
+    events_.publish({"discovery", line, {}, {}},
+                    web::discovery_event(line, state, what.asked(), what.of(), found));
 }
 
 void Discoveries::stop(std::string_view line) {

@@ -17,6 +17,7 @@
 #include "panelgate/gateway/reloader.hpp"
 #include "panelgate/gateway/running_line.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/rt/loop.hpp"
 
 namespace panelgate::gateway {
 
@@ -73,14 +74,15 @@ std::shared_ptr<const web::Directory> directory_in(const std::shared_ptr<Snapsho
 
 }  // namespace
 
-Gateway::Gateway(boost::asio::any_io_executor executor,
-                 std::shared_ptr<const config::Config> config, bool simulate, Reloader* reloads)
-    : executor_(std::move(executor)),
+Gateway::Gateway(web::Loops loops, std::shared_ptr<const config::Config> config, bool simulate,
+                 Reloader* reloads)
+    : loops_(std::move(loops)),
+      executor_(loops_.plant),
       clock_(executor_),
       simulate_(simulate),
       reloads_(reloads),
-      events_(new_epoch()),
-      servers_(executor_, clock_, audit_.stray_writes()),
+      events_(std::make_shared<web::EventHub>(new_epoch()), loops_.faces),
+      servers_(loops_, clock_, audit_.stray_writes()),
       northbound_(executor_, clock_, audit_.topic_refusals()) {
     Lines lines = lines_of(*config);
     for (std::size_t i = 0; i < lines.size(); ++i)
@@ -94,6 +96,12 @@ Gateway::Gateway(boost::asio::any_io_executor executor,
         rt::log_about(relay.name, ok ? rt::LogLevel::info : rt::LogLevel::warn, "relay",
                       {{"relay", relay.name}, {"state", text_of(relay)}});
     });
+}
+
+/// What the faces hold of the plant comes back while the plant is still there.
+Gateway::~Gateway() {
+    servers_.close();
+    rt::call(loops_.faces, loops_.plant, [] {});  // events on their way, which own the hub
 }
 
 Gateway::KnownLines::~KnownLines() {
@@ -310,8 +318,8 @@ web::Providers Gateway::providers() {
     providers.commit = build_commit();
     providers.compiler = build_compiler();
     providers.libraries = build_libraries();
-    providers.now = [this] { return clock_.now(); };
-    providers.events = &events_;
+    providers.now = rt::AsioClock::read;
+    providers.events = events_.hub();
     providers.relays = [this] { return relays_->status(); };
     providers.wall = rt::wall_now;
     providers.discovery = discoveries_.get();

@@ -157,9 +157,8 @@ ListenerHandle handle_of(const web::Settings& settings, web::Server* server) {
 
 }  // namespace
 
-Servers::Servers(boost::asio::any_io_executor executor, rt::Clock& clock,
-                 tcp_server::StrayWrite stray)
-    : executor_(std::move(executor)), clock_(clock), openings_(clock), stray_(std::move(stray)) {}
+Servers::Servers(web::Loops loops, rt::Clock& clock, tcp_server::StrayWrite stray)
+    : loops_(std::move(loops)), clock_(clock), openings_(clock), stray_(std::move(stray)) {}
 
 tcp_server::Settings Servers::completed(tcp_server::Settings settings,
                                         const config::Config& config) const {
@@ -172,7 +171,7 @@ tcp_server::Settings Servers::completed(tcp_server::Settings settings,
 Servers::Modbus Servers::make(const tcp_server::Settings& settings, const Plant& plant) {
     tcp_server::UnitMap units(settings, plant.listener_lines());
     return {settings,
-            std::make_unique<tcp_server::Listener>(executor_, clock_, settings, std::move(units),
+            std::make_unique<tcp_server::Listener>(loops_.plant, clock_, settings, std::move(units),
                                                    PANELGATE_VERSION, stray_)};
 }
 
@@ -226,8 +225,8 @@ void Servers::open_new(const config::Config& config, const Plant& plant, const W
         add(handle_of(settings, fresh_.listeners.back().listener.get()));
     }
     if (config.http && !(http_ && http_->settings.is_same_listener(*config.http))) {
-        auto server = std::make_unique<web::Server>(executor_, *config.http, web.directory(),
-                                                    web.providers());
+        auto server =
+            std::make_unique<web::Server>(loops_, *config.http, web.directory(), web.providers());
         fresh_.http = Http{*config.http, std::move(server)};
         add(handle_of(*config.http, fresh_.http->server.get()));
     }
@@ -295,7 +294,7 @@ void Servers::apply_masters(const config::Config& config, const Plant& plant) {
         device.owner = "serial master '" + one.settings.name + '\'';
         one.master = std::make_unique<serial_server::SerialMaster>(
             clock_, one.settings, tcp_server::UnitMap(one.settings.access, lines),
-            line::make_tty_line(executor_, clock_, std::move(device)));
+            line::make_tty_line(loops_.plant, clock_, std::move(device)));
         one.master->start();
     }
 }

@@ -89,27 +89,27 @@ points::PointSample sample_of(const Station& station, const points::Point& point
 
 /// Converts bus events to those of /api/v1/events.
 struct Publisher {
-    web::EventHub& hub;
+    web::EventOutlet& events;
     const Plant& plant;
     const std::string& line;
 
     void operator()(const bus::LineEvent& event) const {
-        if (!hub.announce("line")) return;
-        hub.publish({"line", line, {}, {}, plant.name_of(line, event.station)},
-                    web::line_event(line, event.up ? "up" : "down", event.why));
+        if (!events.is_wanted()) return;
+        events.publish({"line", line, {}, {}, plant.name_of(line, event.station)},
+                       web::line_event(line, event.up ? "up" : "down", event.why));
     }
     void operator()(const arbiter::StationEvent& event) const {
-        if (!hub.announce("station")) return;
+        if (!events.is_wanted()) return;
         const std::string station = plant.name_of(line, event.station);
-        hub.publish({"station", line, station, {}},
-                    web::station_event(line, station, label(event.kind)));
+        events.publish({"station", line, station, {}},
+                       web::station_event(line, station, label(event.kind)));
     }
     void operator()(const bus::TransactionEvent& event) const {
-        if (!hub.announce("transaction")) return;
+        if (!events.is_wanted()) return;
         const std::string station = plant.name_of(line, event.station);
-        hub.publish({"transaction", line, station, {}},
-                    web::transaction_event(line, station, event.function, label(event.outcome),
-                                           event.took));
+        events.publish({"transaction", line, station, {}},
+                       web::transaction_event(line, station, event.function, label(event.outcome),
+                                              event.took));
     }
     void operator()(const bus::WriteEvent&) const {}   // published as changes of points
     void operator()(const tap::Transaction&) const {}  // likewise
@@ -154,9 +154,9 @@ std::vector<points::RelaySample> relay_samples(const std::vector<points::RelaySt
     return samples;
 }
 
-void publish(web::EventHub& hub, const Plant& plant, const std::string& line,
+void publish(web::EventOutlet& events, const Plant& plant, const std::string& line,
              const bus::BusEvent& event) {
-    std::visit(Publisher{hub, plant, line}, event);
+    std::visit(Publisher{events, plant, line}, event);
 }
 
 void remember(Station& station, const std::vector<std::size_t>& wants, TimePoint now) {
@@ -168,14 +168,14 @@ void remember(Station& station, const std::vector<std::size_t>& wants, TimePoint
     }
 }
 
-void publish_points(web::EventHub& hub, const Station& station,
+void publish_points(web::EventOutlet& events, const Station& station,
                     const std::vector<std::size_t>& wants, TimePoint now) {
     if (!station.points) return;
     for (const std::size_t want : wants) {
         const points::Point* point = station.points->point_of(want);
-        if (point == nullptr || !hub.announce("point")) continue;  // a poll block
-        hub.publish({"point", station.line, station.name, point->name},
-                    web::point_event(station, *point, station.points->read(*point, now)));
+        if (point == nullptr || !events.is_wanted()) continue;  // a poll block
+        events.publish({"point", station.line, station.name, point->name},
+                       web::point_event(station, *point, station.points->read(*point, now)));
     }
 }
 

@@ -153,7 +153,7 @@ void AsioClock::Alarms::on_time() {
 AsioClock::AsioClock(const asio::any_io_executor& executor)
     : alarms_(std::make_shared<Alarms>(executor)) {}
 
-TimePoint AsioClock::now() const { return std::chrono::steady_clock::now(); }
+TimePoint AsioClock::read() { return std::chrono::steady_clock::now(); }
 
 std::unique_ptr<Alarm> AsioClock::make_alarm() { return std::make_unique<Alarms::One>(alarms_); }
 

@@ -5,9 +5,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
+#include <boost/asio/post.hpp>
 #include <chrono>
 #include <cstdlib>
 #include <memory>
+#include <mutex>
 #include <utility>
 
 #include "panelgate/base/network.hpp"
@@ -18,7 +21,10 @@
 namespace panelgate::rt {
 namespace {
 
+/// Held by each function of the interface, for all that follows here.
+std::mutex g_mutex;
 LogSettings g_settings;
+std::atomic<LogLevel> g_level = LogSettings{}.level;
 
 /// The words of the configuration.
 std::string_view word(LogLevel level) {
@@ -191,19 +197,31 @@ void write_merged(std::vector<LogRepeats::Gathered> gathered) {
     }
 }
 
+/// Of throttled lines those that are due.
+void write_what_waits(TimePoint now) {
+    const std::lock_guard lock(g_mutex);
+    write_throttled(now);
+    write_merged(g_repeats.take_due(now));
+}
+
 }  // namespace
 
 void set_up_log(const LogSettings& settings) {
+    const std::lock_guard lock(g_mutex);
     g_settings = settings;
+    g_level = settings.level;
     output().on_lost([](std::uint64_t lines) {
         const LogField count{"count", std::to_string(lines)};
         return whole(LogLevel::warn, line_of(LogLevel::warn, "log lines dropped", {&count, 1}));
     });
 }
 
-bool log_enabled(LogLevel level) { return level <= g_settings.level; }
+bool log_enabled(LogLevel level) { return level <= g_level; }
 
-std::uint64_t log_lines_dropped() { return output().dropped(); }
+std::uint64_t log_lines_dropped() {
+    const std::lock_guard lock(g_mutex);
+    return output().dropped();
+}
 
 void log(LogLevel level, std::string_view event, std::initializer_list<LogField> fields) {
     log(level, event, std::span(fields.begin(), fields.size()));
@@ -211,6 +229,7 @@ void log(LogLevel level, std::string_view event, std::initializer_list<LogField>
 
 void log(LogLevel level, std::string_view event, std::span<const LogField> fields) {
     if (!log_enabled(level)) return;
+    const std::lock_guard lock(g_mutex);
     if (level > LogLevel::info) return put(level, line_of(level, event, fields), 0);
     write_throttled_line(level, event, subject_of(fields), fields, LogThrottle::kIncidents);
 }
@@ -218,6 +237,7 @@ void log(LogLevel level, std::string_view event, std::span<const LogField> field
 void log_about(std::string_view subject, LogLevel level, std::string_view event,
                std::initializer_list<LogField> fields) {
     if (!log_enabled(level)) return;
+    const std::lock_guard lock(g_mutex);
     write_throttled_line(level, event, subject, std::span(fields.begin(), fields.size()),
                          LogThrottle::kIncidents);
 }
@@ -225,12 +245,14 @@ void log_about(std::string_view subject, LogLevel level, std::string_view event,
 void log_collapsed(std::string_view event, std::string_view subject,
                    std::span<const LogField> fields) {
     if (!log_enabled(LogLevel::info)) return;
+    const std::lock_guard lock(g_mutex);
     write_throttled_line(LogLevel::info, event, subject, fields, LogThrottle::kActions);
 }
 
 void log_each(std::string_view event, std::string_view place, std::string_view what,
               std::span<const LogField> fields) {
     if (!log_enabled(LogLevel::info)) return;
+    const std::lock_guard lock(g_mutex);
     const bool again = g_repeats.is_repeat(std::chrono::steady_clock::now(), place, what);
     write_merged(g_repeats.take_ended());
     LogLine line = line_of(LogLevel::info, event, fields);
@@ -239,54 +261,69 @@ void log_each(std::string_view event, std::string_view place, std::string_view w
 }
 
 struct LogDrain::State : std::enable_shared_from_this<LogDrain::State> {
-    explicit State(Clock& its_clock)
-        : clock(its_clock), alarm(clock.make_alarm()), held(clock.make_alarm()) {}
+    State(Clock& its_clock, boost::asio::any_io_executor its_loop)
+        : clock(its_clock),
+          loop(std::move(its_loop)),
+          alarm(clock.make_alarm()),
+          held(clock.make_alarm()) {}
 
     void write_throttled_later() {
         constexpr Duration kPause = 10s;
         held->arm(clock.now() + kPause, [self = shared_from_this()] {
-            write_throttled(self->clock.now());
-            write_merged(g_repeats.take_due(self->clock.now()));
+            write_what_waits(self->clock.now());
             self->write_throttled_later();
         });
     }
 
     void watch() {
         constexpr Duration kPause = 20ms;
-        if (!output().pending()) return;
         alarm->arm(clock.now() + kPause, [self = shared_from_this()] {
+            const std::lock_guard lock(g_mutex);
             output().flush();
-            self->watch();
+            if (output().pending()) self->watch();
         });
     }
 
+    /// Lines begin to queue, in whatever thread.
+    void on_pending() {
+        if (!loop) return watch();
+        boost::asio::post(loop, [self = shared_from_this()] { self->watch(); });
+    }
+
     Clock& clock;
+    boost::asio::any_io_executor loop;
     std::unique_ptr<Alarm> alarm;
     std::unique_ptr<Alarm> held;  ///< writes throttled lines that nothing follows
 };
 
-LogDrain::LogDrain(Clock& clock) : state_(std::make_shared<State>(clock)) {
-    output().on_pending([state = state_.get()] { state->watch(); });
-    state_->watch();
+LogDrain::LogDrain(Clock& clock, boost::asio::any_io_executor loop)
+    : state_(std::make_shared<State>(clock, std::move(loop))) {
+    const std::lock_guard lock(g_mutex);
+    output().on_pending([state = state_.get()] { state->on_pending(); });
+    if (output().pending()) state_->watch();
     state_->write_throttled_later();
 }
 
 LogDrain::~LogDrain() {
-    output().on_pending({});
     state_->alarm->cancel();
     state_->held->cancel();
-    write_throttled(TimePoint::max());
-    write_merged(g_repeats.take_due(TimePoint::max()));
+    write_what_waits(TimePoint::max());
+    const std::lock_guard lock(g_mutex);
+    output().on_pending({});
     output().flush();
 }
 
 LogTap::LogTap() : lines_(std::make_shared<std::vector<std::string>>()) {
+    const std::lock_guard lock(g_mutex);
     g_tap_lines = lines_;
     g_throttle = {};
     g_repeats = {};
 }
 
-LogTap::~LogTap() { g_tap_lines.reset(); }
+LogTap::~LogTap() {
+    const std::lock_guard lock(g_mutex);
+    g_tap_lines.reset();
+}
 
 std::size_t LogTap::count(std::string_view part) const {
     return static_cast<std::size_t>(std::ranges::count_if(

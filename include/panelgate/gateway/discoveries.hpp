@@ -73,8 +73,8 @@ class Discoveries final : public web::DiscoverySource {
         const Plant& plant;
         std::shared_ptr<const profile::Catalogue> profiles;
     };
-    Discoveries(rt::Clock& clock, std::function<Place()> place, web::EventHub& hub)
-        : clock_(clock), place_(std::move(place)), hub_(hub) {}
+    Discoveries(rt::Clock& clock, std::function<Place()> place, web::EventOutlet& events)
+        : clock_(clock), place_(std::move(place)), events_(events) {}
 
     std::optional<std::string> start(std::string_view line, std::string_view stations,
                                      unsigned share_percent) override;
@@ -88,7 +88,7 @@ class Discoveries final : public web::DiscoverySource {
 
     rt::Clock& clock_;
     std::function<Place()> place_;
-    web::EventHub& hub_;
+    web::EventOutlet& events_;
     std::map<std::string, std::shared_ptr<LineDiscovery>, std::less<>> by_line_;
 };
 

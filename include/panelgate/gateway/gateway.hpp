@@ -33,12 +33,13 @@ namespace panelgate::gateway {
 class Reloader;
 
 /// The composition root: builds the gateway from a configuration, and changes it when a reload
-/// brings a new one. One thread.
+/// brings a new one. An object of the plant's loop.
 class Gateway {
   public:
-    /// `reloads` serves the reload requests of REST and outlives this.
-    Gateway(boost::asio::any_io_executor executor, std::shared_ptr<const config::Config> config,
-            bool simulate, Reloader* reloads);
+    /// `reloads` serves the reload requests of REST and outlives this, as both loops do.
+    Gateway(web::Loops loops, std::shared_ptr<const config::Config> config, bool simulate,
+            Reloader* reloads);
+    ~Gateway();
     Gateway(const Gateway&) = delete;
     Gateway& operator=(const Gateway&) = delete;
 
@@ -92,14 +93,15 @@ class Gateway {
     bool copy_figures(metrics::Snapshot& figures, PointCopy& points,
                       const Snapshot& snapshot) const;
 
-    boost::asio::any_io_executor executor_;
+    web::Loops loops_;
+    boost::asio::any_io_executor executor_;  ///< of the plant
     rt::AsioClock clock_;
     rt::LoopLag lag_{clock_};
     AuditBook audit_{executor_, clock_};  ///< lines record in it until they are destroyed
     explain::Doors doors_;                ///< lines ask it until they are destroyed
     bool simulate_;
     Reloader* reloads_;
-    web::EventHub events_;  ///< buses publish to it until they are destroyed
+    web::EventOutlet events_;  ///< buses publish by it until they are destroyed
     /// The current snapshot, never null.
     std::shared_ptr<Snapshot> snapshot_;
     std::function<void(const std::string&, const bus::WriteEvent&)> relay_listener_;

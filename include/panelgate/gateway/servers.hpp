@@ -85,7 +85,7 @@ std::string listening_advice(const boost::system::error_code& why, std::uint16_t
 class Servers {
   public:
     /// `stray` may be called as long as a connection lives.
-    Servers(boost::asio::any_io_executor executor, rt::Clock& clock, tcp_server::StrayWrite stray);
+    Servers(web::Loops loops, rt::Clock& clock, tcp_server::StrayWrite stray);
 
     /// What HTTP serves, created when first needed.
     struct Web {
@@ -143,7 +143,7 @@ class Servers {
     void leave(Http http, Duration longest);
     void apply_masters(const config::Config& config, const Plant& plant);
 
-    boost::asio::any_io_executor executor_;
+    web::Loops loops_;
     rt::Clock& clock_;
     std::vector<Modbus> listeners_;  ///< in the order of the configuration
     std::optional<Http> http_;

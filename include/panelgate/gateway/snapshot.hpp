@@ -74,10 +74,10 @@ class PointCopy {
 std::vector<points::RelaySample> relay_samples(const std::vector<points::RelayStatus>& relays);
 
 /// Publishes what has happened on a line, if any client listens.
-void publish(web::EventHub& hub, const Plant& plant, const std::string& line,
+void publish(web::EventOutlet& events, const Plant& plant, const std::string& line,
              const bus::BusEvent& event);
 /// The same for the points among these wants of the station's polls.
-void publish_points(web::EventHub& hub, const Station& station,
+void publish_points(web::EventOutlet& events, const Station& station,
                     const std::vector<std::size_t>& wants, TimePoint now);
 
 /// Records the points among these wants in the station's history, if it has one.

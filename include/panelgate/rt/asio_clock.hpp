@@ -44,7 +44,9 @@ class AsioClock final : public Clock {
     /// Throws std::system_error if no timerfd can be created.
     explicit AsioClock(const boost::asio::any_io_executor& executor);
 
-    TimePoint now() const override;
+    TimePoint now() const override { return read(); }
+    /// The same, from any thread.
+    static TimePoint read();
     std::unique_ptr<Alarm> make_alarm() override;
 
   private:

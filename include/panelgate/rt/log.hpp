@@ -1,5 +1,6 @@
 #pragma once
 
+#include <boost/asio/any_io_executor.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
@@ -16,6 +17,8 @@ namespace panelgate::rt {
 
 class Clock;
 
+// Any thread may log.
+
 /// Logs to stderr without ever blocking: lines that its reader does not take are queued
 /// (LogOutput), beyond a limit dropped and counted. If stderr is systemd's journal, journald gets
 /// each line with its priority and fields (log_output.hpp), or with <N> before it.
@@ -27,7 +30,8 @@ std::uint64_t log_lines_dropped();
 /// Flushes queued and throttled lines periodically while it lives, and at its end.
 class LogDrain {
   public:
-    explicit LogDrain(Clock& clock);
+    /// `loop`: the clock's; empty: all lines are logged from that loop.
+    explicit LogDrain(Clock& clock, boost::asio::any_io_executor loop = {});
     ~LogDrain();
 
   private:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <boost/json/object.hpp>
+#include <iterator>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -39,6 +40,9 @@ struct Row {
     std::string_view queries = {};  ///< separated by blanks
     bool probe = false;
 };
+/// Handlers that need only what never changes, or the events.
+constexpr Handler kOfFaces[] = {get_index, get_page, get_docs, get_manual, get_openapi, get_events};
+
 constexpr Row kRows[] = {
     {"GET", "/", get_index, kPage},
     {"GET", "/page/{}", get_page, kPage},
@@ -125,8 +129,9 @@ std::vector<Route> routes(std::shared_ptr<const Api> api) {
         const auto call = [api, &row](HttpRequest request) {
             return conduct(std::move(request), api.get(), row.handler, row.policy);
         };
+        const bool face = std::ranges::find(kOfFaces, row.handler) != std::end(kOfFaces);
         made.push_back({row.verb, row.pattern, row.needed, call, words_of(row.queries), row.probe,
-                        right_for(row), other_right_for(row)});
+                        face, row.handler == get_metrics, right_for(row), other_right_for(row)});
     }
     return made;
 }

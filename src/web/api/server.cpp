@@ -1,9 +1,11 @@
 #include "panelgate/web/api/server.hpp"
 
+#include <boost/asio/post.hpp>
 #include <utility>
 
 #include "key_book.hpp"
 #include "panelgate/bus/bus_client.hpp"
+#include "panelgate/rt/loop.hpp"
 #include "panelgate/tls/context.hpp"
 #include "panelgate/web/http/listener.hpp"
 #include "panelgate/web/http/message.hpp"
@@ -11,18 +13,19 @@
 
 namespace panelgate::web {
 
-Server::Server(boost::asio::any_io_executor executor, Settings settings,
-               std::shared_ptr<const Directory> directory, Providers providers, Surface surface)
-    : providers_(std::move(providers)),
+Server::Server(Loops loops, Settings settings, std::shared_ptr<const Directory> directory,
+               Providers providers, Surface surface)
+    : crossing_(std::make_shared<Crossing>(std::move(loops))),
+      providers_(std::move(providers)),
       surface_(surface),
       keys_(std::make_shared<KeyBook>(providers_.settings)),
+      current_(std::make_shared<Current>(crossing_->lend(directory))),
       listener_(std::make_shared<HttpListener>(
-          std::move(executor), site_of(std::move(settings), std::move(directory)))) {}
+          crossing_->loops().faces, site_of(std::move(settings), std::move(directory)))) {}
 
 std::shared_ptr<const Site> Server::site_of(Settings settings,
                                             std::shared_ptr<const Directory> directory) const {
     auto api = std::make_shared<Api>();
-    *current_ = directory;
     api->current = current_;
     api->directory = directory.get();
     api->keeps = std::move(directory);
@@ -31,38 +34,64 @@ std::shared_ptr<const Site> Server::site_of(Settings settings,
     api->configuration = std::make_shared<std::map<std::string, std::shared_ptr<KeptAnswer>>>();
     auto site = std::make_shared<Site>();
     site->settings = std::move(settings);
+    site->crossing = crossing_;
+    site->keep_figures = [figures = figures_](const Counters& now) { *figures = now; };
     site->product = "panelgate/" + providers_.version;
     site->now = providers_.now;
     site->record = providers_.record;
     site->wall = providers_.wall;
-    site->routes =
-        surface_ == Surface::gateway ? routes(std::move(api)) : simulator_routes(std::move(api));
+    const auto lent = crossing_->lend(std::shared_ptr<const Api>(std::move(api)));
+    site->routes = surface_ == Surface::gateway ? routes(lent) : simulator_routes(lent);
     site->next_caller = bus::next_client_id;
     return site;
+}
+
+void Server::run(std::function<void()> work) const {
+    if (crossing_->is_one_loop()) return work();
+    boost::asio::post(crossing_->loops().faces, std::move(work));
 }
 
 void Server::apply(Settings settings, std::shared_ptr<const Directory> directory,
                    SharedText configuration) {
     providers_.configuration = std::move(configuration);
-    listener_->apply(site_of(std::move(settings), std::move(directory)));
+    run([current = current_, lent = crossing_->lend(directory), listener = listener_,
+         site = site_of(std::move(settings), directory)] {
+        *current = lent;
+        listener->apply(site);
+    });
 }
 
 Server::~Server() {
     keys_->dismiss();
-    listener_->abandon();
+    crossing_->close();
+    rt::call(crossing_->loops().faces, crossing_->loops().plant, [this] {
+        listener_->abandon();
+        listener_.reset();
+    });
 }
 
-boost::system::error_code Server::start() { return listener_->open(); }
+boost::system::error_code Server::start() {
+    boost::system::error_code error;
+    rt::call(crossing_->loops().faces, crossing_->loops().plant, [this, &error] {
+        error = listener_->open();
+        port_ = listener_->port();
+    });
+    return error;
+}
 
-std::uint16_t Server::port() const { return listener_->port(); }
-
-void Server::stop(Duration reading) { listener_->stop(reading); }
+void Server::stop(Duration reading) {
+    run([listener = listener_, reading] { listener->stop(reading); });
+}
 
 void Server::renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context) {
-    listener_->renew(settings, std::move(context));
+    run([listener = listener_, settings, context = std::move(context)] {
+        listener->renew(settings, context);
+    });
 }
 
-Counters Server::counters() const { return listener_->counters(); }
+Counters Server::counters() const {
+    return crossing_->is_one_loop() ? listener_->counters() : *figures_;
+}
 
 std::size_t Server::connections() const { return listener_->connections(); }
 

@@ -1,6 +1,8 @@
 #include "panelgate/web/http/event_hub.hpp"
 
 #include <algorithm>
+#include <boost/asio/post.hpp>
+#include <utility>
 
 #include "panelgate/web/http/query.hpp"
 
@@ -108,22 +110,22 @@ std::shared_ptr<EventHub::Listener> EventHub::listen(EventFilter filter, std::st
         listener->opening_ += "\n" + loss(R"("events":null,"exact":false)");
     }
     listeners_.push_back(listener);
-    was_heard_ = true;
-    for (auto& [type, ring] : rings_) ring.unheard = 0;
+    wanted_ = true;
+    unheard_ = 0;
     return listener;
 }
 
-bool EventHub::announce(std::string_view type) {
-    const bool heard = !is_idle();
-    if (!heard && !was_heard_) return false;
-    auto found = rings_.find(type);
-    if (found == rings_.end()) found = rings_.try_emplace(std::string(type)).first;
-    Ring& ring = found->second;
-    if (heard || ring.unheard < kKept) return true;
-    ring.gone = ++last_;
-    ring.events.clear();
-    ring.bytes = 0;
-    return false;
+/// Ids of the epoch before are those of a previous run from now on.
+void EventHub::forget_all() {
+    wanted_ = false;
+    rings_.clear();
+    last_ = 0;
+    epoch_ = first_epoch_ + '.' + std::to_string(++forgotten_);
+}
+
+void EventHub::lose(std::uint64_t count) {
+    for (const auto& weak : listeners_)
+        if (const auto listener = weak.lock()) listener->lost_ += count;
 }
 
 /// Drops a ring's oldest event; it counts as lost to listeners that have not read it.
@@ -140,11 +142,11 @@ void EventHub::forget(Ring& ring) {
 }
 
 void EventHub::publish(EventTopic topic, std::string_view json) {
+    if (is_idle() && ++unheard_ > kKept) return forget_all();
     Event event{++last_, std::move(topic), {}};
     event.text = "id: " + id_of(last_) + "\nevent: " + event.topic.type +
                  "\ndata: " + std::string(json) + "\n\n";
     Ring& ring = rings_[event.topic.type];
-    ring.unheard = is_idle() ? ring.unheard + 1 : 0;
     ring.bytes += event.text.size();
     ring.events.push_back(std::move(event));
     while (ring.events.size() > kKept || (ring.bytes > kKeptBytes && ring.events.size() > 1))
@@ -170,6 +172,32 @@ void EventHub::end() {
         listener->ended_ = true;
         if (listener->wake) listener->wake();
     }
+}
+
+EventOutlet::EventOutlet(std::shared_ptr<EventHub> hub, boost::asio::any_io_executor loop)
+    : hub_(std::move(hub)), loop_(std::move(loop)) {}
+
+void EventOutlet::run(std::function<void(EventHub&)> work) {
+    if (!loop_) return work(*hub_);
+    boost::asio::post(loop_, [hub = hub_, work = std::move(work)] { work(*hub); });
+}
+
+void EventOutlet::publish(EventTopic topic, std::string json) {
+    if (*waiting_ >= kWaiting) {
+        ++dropped_;
+        return;
+    }
+    ++*waiting_;
+    run([topic = std::move(topic), json = std::move(json), waiting = waiting_,
+         dropped = std::exchange(dropped_, 0)](EventHub& hub) {
+        --*waiting;
+        if (dropped > 0) hub.lose(dropped);
+        hub.publish(topic, json);
+    });
+}
+
+void EventOutlet::end() {
+    run([](EventHub& hub) { hub.end(); });
 }
 
 }  // namespace panelgate::web

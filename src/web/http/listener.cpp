@@ -43,6 +43,10 @@ HttpListener::HttpListener(asio::any_io_executor executor, std::shared_ptr<const
 
 error_code HttpListener::open() {
     const Settings& settings = shared_->site->settings;
+    shared_->figures = [self = weak_from_this()] {
+        const auto listener = self.lock();
+        return listener ? listener->counters() : Counters();
+    };
     return acceptor_.open(settings.address, settings.port, settings.ipv6_only);
 }
 
@@ -156,6 +160,7 @@ void HttpListener::take(tcp::socket socket) {
             return listener && listener->make_room(*caller);
         });
     sessions_.emplace(caller->id(), session);
+    open_ = sessions_.size();
     asio::co_spawn(
         acceptor_.get_executor(), HttpSession::run(session),
         [self = weak_from_this(), session, id = caller->id()](std::exception_ptr failed) {
@@ -165,6 +170,7 @@ void HttpListener::take(tcp::socket socket) {
             if (!listener) return;
             listener->shared_->places.leave(id);
             listener->sessions_.erase(id);
+            listener->open_ = listener->sessions_.size();
         });
 }
 

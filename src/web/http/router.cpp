@@ -18,6 +18,7 @@
 #include "admission.hpp"
 #include "panelgate/base/sha256.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/web/http/crossing.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/problem.hpp"
 #include "panelgate/web/http/query.hpp"
@@ -377,35 +378,71 @@ void identify(HttpRequest& request, const Site& site) {
                              site.settings.name());
 }
 
-/// What an audit needs of a request that its handler takes away.
+/// What an audit needs of a request that its handler takes away. Records in the plant's loop.
 class Witness {
   public:
-    Witness(const HttpRequest& request, const Site& site)
-        : site_(&site), changes_(request.method != "GET" && request.method != "HEAD") {
-        if (!site.record) return;
+    using Record = std::function<void(const Deed&)>;
+
+    Witness(const HttpRequest& request, Record record)
+        : record_(std::move(record)),
+          changes_(request.method != "GET" && request.method != "HEAD"),
+          who_(request.caller->who()) {
+        if (!record_) return;
         method_ = request.method;
         for (const std::string& segment : request.path) path_ += '/' + segment;
         if (changes_) body_ = request.body.substr(0, Deed::kMostOfBody);
-        caller_ = request.caller;
         shown_token_ = carries_token(request);
     }
     /// Refusals are recorded whatever was asked for.
     void record(const HttpResponse& response) const {
         const bool is_refusal = response.status == 401 || response.status == 403;
-        if (!site_->record || (!changes_ && !is_refusal)) return;
-        site_->record(
-            {caller_->who(), method_, path_, body_, response.status, response.body, shown_token_});
+        if (!record_ || (!changes_ && !is_refusal)) return;
+        record_({who_, method_, path_, body_, response.status, response.body, shown_token_});
     }
 
   private:
-    const Site* site_;
+    Record record_;
     bool changes_;
+    WhoRef who_;
     std::string method_;
     std::string path_;
     std::string body_;
-    std::shared_ptr<Caller> caller_;
     bool shown_token_ = false;
 };
+
+/// Carries out a request, and records what it has changed. Of the plant's loop.
+Handling witnessed(HttpRequest request, Crossing::Handler handler, Witness::Record record) {
+    const Witness witness(request, std::move(record));
+    Handling handling = handler(std::move(request));
+    HttpResponse response = co_await std::move(handling);
+    witness.record(response);
+    co_return response;
+}
+
+/// Carries out a request where its handler belongs.
+Handling carry_out(HttpRequest request, const Route* route, Shared* shared) {
+    const std::shared_ptr<const Site> site = shared->site;
+    if (route->face || !site->crossing)
+        return witnessed(std::move(request), route->handler, site->record);
+    if (route->figures && site->keep_figures && shared->figures)
+        site->crossing->tell([site, figures = shared->figures()] { site->keep_figures(figures); });
+    return site->crossing->ask(
+        std::move(request), [handler = route->handler, record = site->record](HttpRequest asked) {
+            return witnessed(std::move(asked), handler, record);
+        });
+}
+
+/// Records a refusal of the faces.
+void record_refusal(const HttpRequest& request, const HttpResponse& response, const Site& site) {
+    Witness witness(request, site.record);
+    if (!site.crossing) return witness.record(response);
+    if (!site.record) return;
+    HttpResponse told;
+    told.status = response.status;
+    told.body = response.body;
+    site.crossing->tell(
+        [witness = std::move(witness), told = std::move(told)] { witness.record(told); });
+}
 
 }  // namespace
 
@@ -429,11 +466,10 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     if (request.caller->has_left()) co_return HttpResponse();
     identify(request, *site);
     record_use(*request.caller, *shared);
-    const Witness witness(request, *site);
     if (refused) {
         count_refused(request, *refused);
         HttpResponse response = to_response(*refused);
-        witness.record(response);
+        record_refusal(request, response, *site);
         co_return response;
     }
     // Probes are answered with any query.
@@ -441,10 +477,9 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     if (!mistaken) mistaken = check_encoding(request);
     if (mistaken) co_return to_response(*mistaken);
     request.arguments = std::move(found.arguments);
-    Handling handling = found.route->handler(std::move(request));
+    Handling handling = carry_out(std::move(request), found.route, shared);
     HttpResponse response = co_await std::move(handling);
     response.probe = probe;
-    witness.record(response);
     co_return response;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <utility>
 
@@ -33,6 +34,7 @@ struct Shared {
     Places places;
     RateLimiter rate_limit;
     Counters counters;
+    std::function<Counters()> figures;  ///< the listener's, set by it
 };
 
 }  // namespace panelgate::web

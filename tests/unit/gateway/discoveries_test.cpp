@@ -69,7 +69,8 @@ class DiscoveriesTest : public testing::Test {
     sim::Station gt{*shipped.find("panasonic-gt"), 20};
     config::Line floor;
     Plant plant;
-    web::EventHub hub;
+    web::EventOutlet events{std::make_shared<web::EventHub>(), {}};
+    web::EventHub& hub = *events.hub();
     std::shared_ptr<web::EventHub::Listener> listener = hub.listen({});
     std::uint8_t unanswered = 0;  ///< a station that does not answer yet
     Discoveries discoveries{clock,
@@ -78,7 +79,7 @@ class DiscoveriesTest : public testing::Test {
                                                           std::shared_ptr<const profile::Catalogue>(
                                                               std::shared_ptr<void>(), &shipped)};
                             },
-                            hub};
+                            events};
 };
 
 TEST_F(DiscoveriesTest, FindsAnUnlistedPanelAndSaysWhatToPaste) {

@@ -69,7 +69,8 @@ class SnapshotTest : public testing::Test {
     Plant plant;
     TimePoint now{1h};
     std::unique_ptr<points::StationPolls> polls;
-    web::EventHub hub;
+    web::EventOutlet events{std::make_shared<web::EventHub>(), {}};
+    web::EventHub& hub = *events.hub();
     profile::PanelProfile generic;
 };
 
@@ -146,7 +147,7 @@ TEST_F(SnapshotTest, TellsOfStationsByTheirNames) {
         arbiter::StationEvent event;
         event.kind = arbiter::StationEvent::Kind::offline;
         event.station = id;
-        publish(hub, plant, "floor1", event);
+        publish(events, plant, "floor1", event);
     }
     const std::string told = listener->take();
     EXPECT_THAT(told, HasSubstr(R"("station":"press")"));
@@ -165,10 +166,10 @@ TEST_F(SnapshotTest, TellsEachEventOnlyToThoseWhoWantWhatItIsAbout) {
     const auto of_line = hub.listen(elsewhere);
     for (const auto& listener : {of_press, of_point, of_line}) listener->take();
     poll();
-    publish_points(hub, *plant.find("press"), {0}, now);
-    publish(hub, plant, "floor1", bus::TransactionEvent{31, 3, Outcome::ok, 5ms});
-    publish(hub, plant, "floor1", bus::TransactionEvent{5, 3, Outcome::ok, 5ms});
-    publish(hub, plant, "floor1", bus::LineEvent{true, {}});
+    publish_points(events, *plant.find("press"), {0}, now);
+    publish(events, plant, "floor1", bus::TransactionEvent{31, 3, Outcome::ok, 5ms});
+    publish(events, plant, "floor1", bus::TransactionEvent{5, 3, Outcome::ok, 5ms});
+    publish(events, plant, "floor1", bus::LineEvent{true, {}});
     EXPECT_THAT(of_press->take(), AllOf(HasSubstr("event: point"), HasSubstr("event: transaction"),
                                         Not(HasSubstr("meter")), Not(HasSubstr("event: line"))));
     EXPECT_THAT(of_point->take(), AllOf(HasSubstr("event: point"), Not(HasSubstr("transaction"))));
@@ -179,9 +180,9 @@ TEST_F(SnapshotTest, TellsWhatHasBecomeOfPointsAndNotOfPollBlocks) {
     const auto listener = hub.listen({});
     listener->take();
     poll();
-    publish_points(hub, *plant.find("press"), {1}, now);
+    publish_points(events, *plant.find("press"), {1}, now);
     EXPECT_EQ(listener->take(), "");
-    publish_points(hub, *plant.find("press"), {0, 1}, now);
+    publish_points(events, *plant.find("press"), {0, 1}, now);
     const std::string told = listener->take();
     EXPECT_THAT(told, HasSubstr(R"("name":"temperature")"));
     EXPECT_THAT(told, HasSubstr(R"("line":"floor1","station":"press")"));

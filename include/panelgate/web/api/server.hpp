@@ -15,6 +15,7 @@
 #include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/api/sources.hpp"
 #include "panelgate/web/http/counters.hpp"
+#include "panelgate/web/http/crossing.hpp"
 #include "panelgate/web/http/event_hub.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/settings.hpp"
@@ -46,7 +47,8 @@ class KeyBook;
 class ReloadSource;
 struct Site;
 
-/// What the server shows besides the directory. All functions are called from the loop's thread.
+/// What the server shows besides the directory. All functions but now() and wall() are called from
+/// the plant's loop.
 struct Providers {
     MetricsSource* metrics = nullptr;      ///< never null; outlives the server
     std::string metrics_type;              ///< the content type of its text
@@ -56,10 +58,10 @@ struct Providers {
     std::string commit;                            ///< the commit that it was built from
     std::string compiler;                          ///< "clang 19.1.7"
     std::map<std::string, std::string> libraries;  ///< name to version
-    std::function<TimePoint()> now;                ///< the machine's monotonic clock
-    std::function<WallTime()> wall;                ///< the current wall-clock time
+    std::function<TimePoint()> now;                ///< the machine's monotonic clock, any thread
+    std::function<WallTime()> wall;                ///< the current wall-clock time, any thread
     std::function<std::vector<points::RelayStatus>()> relays;
-    EventHub* events = nullptr;            ///< never null; outlives the server
+    EventHub* events = nullptr;            ///< of the faces' loop; never null; outlives the server
     DiscoverySource* discovery = nullptr;  ///< null only without lines; outlives the server
     ReloadSource* reload = nullptr;        ///< null: reload is not available; outlives the server
     SharedText configuration;  ///< the active one, a JSON object without secrets; null: not shown
@@ -71,12 +73,12 @@ struct Providers {
 /// What is served: the gateway, or only simulated panels, whose directory may have no buses.
 enum class Surface : std::uint8_t { gateway, simulator };
 
-/// HTTP/1.1 server: probes, metrics and the REST API. Lives in the thread that runs the executor.
+/// HTTP/1.1 server: probes, metrics and the REST API. An object of the plant's loop, whose listener
+/// lives in that of the faces.
 class Server {
   public:
-    Server(boost::asio::any_io_executor executor, Settings settings,
-           std::shared_ptr<const Directory> directory, Providers providers,
-           Surface surface = Surface::gateway);
+    Server(Loops loops, Settings settings, std::shared_ptr<const Directory> directory,
+           Providers providers, Surface surface = Surface::gateway);
     /// Closes everything at once, unlike stop(); outstanding answers are not sent.
     ~Server();
     Server(const Server&) = delete;
@@ -89,7 +91,7 @@ class Server {
     void apply(Settings settings, std::shared_ptr<const Directory> directory,
                SharedText configuration);
     /// The port that it listens on; 0 before start().
-    std::uint16_t port() const;
+    std::uint16_t port() const { return port_; }
     /// Closes the listener and idle connections; running requests are answered, then their
     /// connections are closed. A client has at most `reading` to read its answer.
     void stop(Duration reading = 10s);
@@ -97,18 +99,25 @@ class Server {
     std::size_t connections() const;
     /// As HttpListener::renew().
     void renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context);
+    /// The counters as they were when /metrics was asked for last.
     Counters counters() const;
 
   private:
+    using Current = std::shared_ptr<const Directory>;
+
+    void run(std::function<void()> work) const;
     std::shared_ptr<const Site> site_of(Settings settings,
                                         std::shared_ptr<const Directory> directory) const;
 
+    std::shared_ptr<Crossing> crossing_;
     Providers providers_;
     Surface surface_;
     std::shared_ptr<KeyBook> keys_;
+    std::shared_ptr<Counters> figures_ = std::make_shared<Counters>();
+    std::uint16_t port_ = 0;
+    // Of the faces' loop:
     /// The directory that is served, also for streams that began with an earlier one.
-    std::shared_ptr<std::shared_ptr<const Directory>> current_ =
-        std::make_shared<std::shared_ptr<const Directory>>();
+    std::shared_ptr<Current> current_;
     std::shared_ptr<HttpListener> listener_;
 };
 

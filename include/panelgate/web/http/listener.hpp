@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/system/error_code.hpp>
@@ -22,7 +23,8 @@ namespace panelgate::web {
 class HttpSession;
 struct Shared;
 
-/// Accepts connections and owns their sessions. Runs in the executor's single thread.
+/// Accepts connections and owns their sessions. Of the executor's single thread, but for
+/// connections().
 class HttpListener : public std::enable_shared_from_this<HttpListener> {
   public:
     /// Throws std::invalid_argument for an invalid `allow`.
@@ -42,7 +44,7 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
     void stop(Duration reading);
     /// Closes everything; outstanding replies are not sent.
     void abandon();
-    std::size_t connections() const { return sessions_.size(); }
+    std::size_t connections() const { return open_; }
     /// For connections to come: the same `tls`, whose files have changed. Ignored without TLS.
     void renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context);
     Counters counters() const;
@@ -60,6 +62,7 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
     std::shared_ptr<tls::Handshakes> handshakes_;  ///< null: no TLS
     rt::Acceptor acceptor_;
     std::map<std::uint64_t, std::shared_ptr<HttpSession>> sessions_;  ///< by caller id
+    std::atomic<std::size_t> open_ = 0;                               ///< their number
 };
 
 }  // namespace panelgate::web

@@ -20,7 +20,7 @@
 
 namespace panelgate::web {
 
-/// The client of one connection. Shared by the session and its handlers; single-threaded.
+/// The client of one connection, or of one request at the plant. Belongs to one loop.
 class Caller {
   public:
     /// `id` is unique to this connection; `address` has no port, "" if unknown.
@@ -40,6 +40,13 @@ class Caller {
     /// What its certificate says; `standing`: by the role in it, where the listener goes by that.
     void certify(std::string subject, std::string word, std::optional<Standing> standing);
     const std::optional<Standing>& certificate_role() const { return certificate_role_; }
+    /// A caller of the same identity for another loop, still there and without callbacks.
+    Caller stand_in() const {
+        Caller caller(id_, address_);
+        caller.who_ = who_;
+        caller.certificate_role_ = certificate_role_;
+        return caller;
+    }
     /// Asks on behalf of another caller.
     void acts_for(const Caller& client) { who_ = client.who_; }
     /// True once the connection is over: no reply is wanted, and the site's objects may be gone.
@@ -141,7 +148,9 @@ struct Route {
     Role needed = Role::none;  ///< none: public, but allow list and host name still apply
     std::function<Handling(HttpRequest)> handler;
     std::vector<std::string_view> queries{};  ///< supported; any other is refused
-    bool probe = false;  ///< answered for any host name and query, even when all else is barred
+    bool probe = false;    ///< answered for any host name and query, even when all else is barred
+    bool face = false;     ///< the handler needs nothing of the plant's loop
+    bool figures = false;  ///< the response shows the server's counters
     Right right = Right::read;  ///< that an own role has to have; none is needed where `needed` is
     std::optional<Right> or_right{};  ///< one that is enough for an own role, too
 };
@@ -159,15 +168,20 @@ struct Deed {
     static constexpr std::size_t kMostOfBody = 1024;
 };
 
+class Crossing;
+struct Counters;
+
 /// What a server serves. Shared by its sessions; the first matching route is used.
 struct Site {
     Settings settings;
-    std::string product;  ///< for the Server header: "name/1.2.3"
+    std::shared_ptr<Crossing> crossing{};  ///< null: handlers run in the sessions' loop
+    std::function<void(const Counters&)> keep_figures{};  ///< of the plant's loop; may be empty
+    std::string product;                                  ///< for the Server header: "name/1.2.3"
     std::vector<Route> routes;
     std::function<std::uint64_t()> next_caller;  ///< returns connection ids
-    std::function<TimePoint()> now;              ///< required unless all routes are public
-    std::function<void(const Deed&)> record{};   ///< may be empty; must not throw
-    std::function<WallTime()> wall{};            ///< empty: no token expires
+    std::function<TimePoint()> now;              ///< any thread; required unless all is public
+    std::function<void(const Deed&)> record{};  ///< of the plant's loop; may be empty, never throws
+    std::function<WallTime()> wall{};           ///< any thread; empty: no token expires
 };
 
 /// Logs at info what a client did or was refused: its name (address, token) first, as `client`.

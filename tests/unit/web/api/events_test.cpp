@@ -70,7 +70,7 @@ class ApiEvents : public HttpRig {
         return text;
     }
     void tell(EventTopic topic, std::string_view json) {
-        if (events.announce(topic.type)) events.publish(std::move(topic), json);
+        if (events.is_wanted()) events.publish(std::move(topic), json);
     }
     /// The events that a listener with this query gets when press's point, press, an unlisted
     /// station and floor2 have had one event each.

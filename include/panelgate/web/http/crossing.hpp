@@ -1,0 +1,75 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <concepts>
+#include <functional>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "panelgate/web/http/message.hpp"
+
+namespace panelgate::web {
+
+/// The loops of a server: the faces' has connections, TLS, tokens and texts; the plant's has lines,
+/// points and all that a request asks for. One executor: both are the same loop.
+struct Loops {
+    boost::asio::any_io_executor faces;
+    boost::asio::any_io_executor plant;
+
+    // NOLINTNEXTLINE(google-explicit-constructor): one loop may be both.
+    template <class Executor>
+        requires std::constructible_from<boost::asio::any_io_executor, const Executor&>
+    Loops(const Executor& both) : faces(both), plant(both) {}
+    Loops(boost::asio::any_io_executor of_faces, boost::asio::any_io_executor of_plant)
+        : faces(std::move(of_faces)), plant(std::move(of_plant)) {}
+};
+
+/// What crosses between the loops of a server, as messages: a request to the plant, its response
+/// back, that a client has left, a deed for the audit. (Events cross by an EventOutlet, counters by
+/// Server::counters().) The loops share nothing but immutable objects. The number of requests under
+/// way is bounded by that of connections.
+class Crossing : public std::enable_shared_from_this<Crossing> {
+  public:
+    using Handler = std::function<Handling(HttpRequest)>;
+
+    explicit Crossing(Loops loops) : loops_(std::move(loops)) {}
+
+    const Loops& loops() const { return loops_; }
+    bool is_one_loop() const { return loops_.faces == loops_.plant; }
+
+    /// Faces: carries out the request on the plant's loop. The handler gets a caller of its own,
+    /// which leaves when the session's leaves; then the response is empty. An exception of the
+    /// handler is logged, and answered with 500.
+    Handling ask(HttpRequest request, Handler handler);
+    /// Faces: runs `work` on the plant's loop, after what was asked before.
+    void tell(std::function<void()> work);
+    /// Plant: the server is gone. All callers leave, and what comes later is dropped.
+    void close();
+
+    /// An object of the plant for the faces: the last of them to let go gives it back to the
+    /// plant's loop, where its end may touch lines.
+    template <class Object>
+    std::shared_ptr<const Object> lend(std::shared_ptr<const Object> object) const {
+        if (is_one_loop()) return object;
+        const Object* const lent = object.get();
+        return {lent, [plant = loops_.plant, object = std::move(object)](const Object*) mutable {
+                    give_back(plant, std::move(object));
+                }};
+    }
+
+  private:
+    struct Question;
+
+    static void give_back(const boost::asio::any_io_executor& plant,
+                          std::shared_ptr<const void> object);
+    void begin(HttpRequest request, std::shared_ptr<const Handler> handler,
+               std::weak_ptr<Question> waiting);
+
+    Loops loops_;
+    // Of the plant's loop:
+    std::set<std::shared_ptr<Caller>> callers_;  ///< of the requests under way
+    bool closed_ = false;
+};
+
+}  // namespace panelgate::web

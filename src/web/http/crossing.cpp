@@ -1,0 +1,101 @@
+#include "panelgate/web/http/crossing.hpp"
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/redirect_error.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <exception>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "panelgate/rt/log.hpp"
+#include "panelgate/web/http/problem.hpp"
+
+namespace panelgate::web {
+
+namespace asio = boost::asio;
+
+/// A request that waits at the faces. Only their loop locks the plant's reference to a question.
+struct Crossing::Question {
+    explicit Question(const asio::any_io_executor& faces) : bell(faces) {
+        bell.expires_at(asio::steady_timer::time_point::max());
+    }
+    asio::steady_timer bell;
+    std::optional<HttpResponse> response;
+};
+
+Handling Crossing::ask(HttpRequest request, Handler handler) {
+    const std::shared_ptr<Caller> client = request.caller;
+    const auto caller = std::make_shared<Caller>(client->stand_in());
+    const auto question = std::make_shared<Question>(loops_.faces);
+    client->at_leaving(question.get(), [self = shared_from_this(), caller, question] {
+        self->tell([caller] { caller->leave(); });
+        question->bell.cancel();
+    });
+    request.caller = caller;
+    tell([self = shared_from_this(), request = std::move(request),
+          handler = std::make_shared<const Handler>(std::move(handler)),
+          waiting = std::weak_ptr(question)]() mutable {
+        self->begin(std::move(request), handler, std::move(waiting));
+    });
+    while (!question->response && !client->has_left()) {
+        boost::system::error_code rung;
+        co_await question->bell.async_wait(asio::redirect_error(asio::use_awaitable, rung));
+    }
+    client->forget(question.get());
+    if (!question->response) co_return HttpResponse();
+    co_return std::move(*question->response);
+}
+
+void Crossing::tell(std::function<void()> work) { asio::post(loops_.plant, std::move(work)); }
+
+namespace {
+
+HttpResponse failure(const std::string& path, const std::exception_ptr& failed) {
+    std::string what = "unknown";
+    try {
+        std::rethrow_exception(failed);
+    } catch (const std::exception& error) {
+        what = error.what();
+    } catch (...) {  // the text above
+    }
+    rt::log(rt::LogLevel::error, "http handler failed", {{"path", path}, {"error", what}});
+    return to_response(problem(500, "the gateway failed to handle this request"));
+}
+
+}  // namespace
+
+void Crossing::begin(HttpRequest request, std::shared_ptr<const Handler> handler,
+                     std::weak_ptr<Question> waiting) {
+    if (closed_) return;
+    const std::string path = request.path.empty() ? "/" : request.path.front();
+    const std::shared_ptr<Caller> caller = request.caller;
+    callers_.insert(caller);
+    asio::co_spawn(loops_.plant, (*handler)(std::move(request)),
+                   [self = shared_from_this(), handler, caller, path, waiting = std::move(waiting)](
+                       const std::exception_ptr& failed, HttpResponse response) {
+                       self->callers_.erase(caller);
+                       if (failed && caller->has_left()) return;
+                       if (failed) response = failure(path, failed);
+                       asio::post(self->loops_.faces,
+                                  [waiting, response = std::move(response)]() mutable {
+                                      const auto question = waiting.lock();
+                                      if (!question) return;
+                                      question->response = std::move(response);
+                                      question->bell.cancel();
+                                  });
+                   });
+}
+
+void Crossing::close() {
+    closed_ = true;
+    for (const std::shared_ptr<Caller>& caller : std::exchange(callers_, {})) caller->leave();
+}
+
+void Crossing::give_back(const asio::any_io_executor& plant, std::shared_ptr<const void> object) {
+    asio::post(plant, [object = std::move(object)] {});
+}
+
+}  // namespace panelgate::web
