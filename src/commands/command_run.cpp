@@ -191,6 +191,15 @@ void log_dashboard(const gateway::Gateway& gateway) {
     rt::log(rt::LogLevel::info, "dashboard", {{"url", url_of(config, gateway) + '/'}});
 }
 
+std::unique_ptr<gateway::FileWatch> watch_of(const Service& service,
+                                             const asio::any_io_executor& executor,
+                                             rt::Clock& clock, gateway::Reloader& reloader) {
+    if (!service.watch) return nullptr;
+    return std::make_unique<gateway::FileWatch>(executor, clock, service.file, [&reloader] {
+        reload_file(reloader, "the file has changed");
+    });
+}
+
 /// Runs the gateway until a signal ends it. `started` is called once it serves.
 ExitCode serve(config::Config config, const Service& service,
                const std::function<void(const gateway::Gateway&)>& started) {
@@ -215,10 +224,7 @@ ExitCode serve(config::Config config, const Service& service,
     reloader.on_step([&](bool begins) { begins ? manager.reloading() : manager.ready(); });
     started(gateway);
     manager.ready([&gateway] { return gateway.status(); });
-    std::optional<gateway::FileWatch> watch;
-    if (service.watch)
-        watch.emplace(io.get_executor(), clock, service.file,
-                      [&] { reload_file(reloader, "the file has changed"); });
+    auto watch = watch_of(service, io.get_executor(), clock, reloader);
     Ending ending{.begin = {},
                   .done = [&] { return gateway.drained(); },
                   .finish = [&] { gateway.stop(); },

@@ -1,11 +1,9 @@
 #include "panelgate/web/api/server.hpp"
 
-#include <boost/asio/post.hpp>
 #include <utility>
 
 #include "key_book.hpp"
 #include "panelgate/bus/bus_client.hpp"
-#include "panelgate/rt/loop.hpp"
 #include "panelgate/tls/context.hpp"
 #include "panelgate/web/http/listener.hpp"
 #include "panelgate/web/http/message.hpp"
@@ -46,16 +44,11 @@ std::shared_ptr<const Site> Server::site_of(Settings settings,
     return site;
 }
 
-void Server::run(std::function<void()> work) const {
-    if (crossing_->is_one_loop()) return work();
-    boost::asio::post(crossing_->loops().faces, std::move(work));
-}
-
 void Server::apply(Settings settings, std::shared_ptr<const Directory> directory,
                    SharedText configuration) {
     providers_.configuration = std::move(configuration);
-    run([current = current_, lent = crossing_->lend(directory), listener = listener_,
-         site = site_of(std::move(settings), directory)] {
+    crossing_->run([current = current_, lent = crossing_->lend(directory), listener = listener_,
+                    site = site_of(std::move(settings), directory)] {
         *current = lent;
         listener->apply(site);
     });
@@ -64,7 +57,7 @@ void Server::apply(Settings settings, std::shared_ptr<const Directory> directory
 Server::~Server() {
     keys_->dismiss();
     crossing_->close();
-    rt::call(crossing_->loops().faces, crossing_->loops().plant, [this] {
+    crossing_->call([this] {
         listener_->abandon();
         listener_.reset();
     });
@@ -72,7 +65,7 @@ Server::~Server() {
 
 boost::system::error_code Server::start() {
     boost::system::error_code error;
-    rt::call(crossing_->loops().faces, crossing_->loops().plant, [this, &error] {
+    crossing_->call([this, &error] {
         error = listener_->open();
         port_ = listener_->port();
     });
@@ -80,11 +73,11 @@ boost::system::error_code Server::start() {
 }
 
 void Server::stop(Duration reading) {
-    run([listener = listener_, reading] { listener->stop(reading); });
+    crossing_->run([listener = listener_, reading] { listener->stop(reading); });
 }
 
 void Server::renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context) {
-    run([listener = listener_, settings, context = std::move(context)] {
+    crossing_->run([listener = listener_, settings, context = std::move(context)] {
         listener->renew(settings, context);
     });
 }

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "panelgate/rt/log.hpp"
+#include "panelgate/rt/loop.hpp"
 #include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::web {
@@ -87,6 +88,15 @@ void Crossing::begin(HttpRequest request, std::shared_ptr<const Handler> handler
                                       question->bell.cancel();
                                   });
                    });
+}
+
+void Crossing::run(std::function<void()> work) const {
+    if (is_one_loop()) return work();
+    asio::post(loops_.faces, std::move(work));
+}
+
+void Crossing::call(const std::function<void()>& work) const {
+    rt::call(loops_.faces, loops_.plant, work);
 }
 
 void Crossing::close() {

@@ -105,7 +105,6 @@ class Server {
   private:
     using Current = std::shared_ptr<const Directory>;
 
-    void run(std::function<void()> work) const;
     std::shared_ptr<const Site> site_of(Settings settings,
                                         std::shared_ptr<const Directory> directory) const;
 

@@ -44,6 +44,10 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
     Handling ask(HttpRequest request, Handler handler);
     /// Faces: runs `work` on the plant's loop, after what was asked before.
     void tell(std::function<void()> work);
+    /// Plant: runs `work` on the faces' loop; at once if there is one loop.
+    void run(std::function<void()> work) const;
+    /// Plant: the same, and returns when `work` has ended.
+    void call(const std::function<void()>& work) const;
     /// Plant: the server is gone. All callers leave, and what comes later is dropped.
     void close();
 
