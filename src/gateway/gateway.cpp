@@ -83,7 +83,7 @@ Gateway::Gateway(web::Loops loops, std::shared_ptr<const config::Config> config,
       reloads_(reloads),
       events_(std::make_shared<web::EventHub>(new_epoch()), loops_.faces),
       servers_(loops_, clock_, audit_.stray_writes()),
-      northbound_(executor_, clock_, audit_.topic_refusals()) {
+      northbound_(loops_, clock_, audit_.topic_refusals()) {
     Lines lines = lines_of(*config);
     for (std::size_t i = 0; i < lines.size(); ++i)
         known_.lines.emplace(std::pair(config->lines[i].name, lines[i]->listens()), lines[i]);
@@ -322,6 +322,7 @@ web::Providers Gateway::providers() {
     providers.events = events_.hub();
     providers.relays = [this] { return relays_->status(); };
     providers.wall = rt::wall_now;
+    providers.collect = northbound_.collector();
     providers.discovery = discoveries_.get();
     providers.reload = reloads_;
     providers.record = audit_.deeds();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <boost/asio/ip/host_name.hpp>
+#include <boost/asio/post.hpp>
 #include <utility>
 #include <variant>
 
@@ -10,6 +11,7 @@
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tls/replacement.hpp"
 #include "panelgate/web/http/json_text.hpp"
+#include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::gateway {
 
@@ -18,7 +20,6 @@ namespace {
 
 constexpr std::size_t kSwept = 500;  ///< subjects per turn: well below a millisecond
 constexpr Duration kSweep = 1s;
-constexpr Duration kRebirth = 1s;  ///< minimum interval: hosts may ask as often as they like
 
 mqtt::Settings completed(mqtt::Settings settings) {
     std::string host = boost::asio::ip::host_name();
@@ -43,25 +44,39 @@ struct BrokerSession::Order {
     web::PointOrder order;
 };
 
-BrokerSession::BrokerSession(boost::asio::any_io_executor executor, rt::Clock& clock,
-                             std::shared_ptr<const Snapshot> snapshot, TopicRefusals refused)
-    : clock_(clock),
+BrokerSession::BrokerSession(web::Loops loops, rt::Clock& clock,
+                             const std::shared_ptr<const Snapshot>& snapshot, TopicRefusals refused,
+                             std::shared_ptr<std::weak_ptr<BrokerDesk>> serving)
+    : loops_(std::move(loops)),
+      clock_(clock),
       settings_(completed(*snapshot->config->mqtt)),
-      publisher_(settings_, explain::subjects_of(*snapshot->config)),
+      subjects_(explain::subjects_of(*snapshot->config)),
       alarm_(clock.make_alarm()),
-      rebirth_alarm_(clock.make_alarm()),
       refused_(std::move(refused)),
       who_(explain::client_of(settings_)),
       writes_(std::make_shared<Writes>(Writes{this, bus::next_client_id()})),
-      client_(std::move(executor), clock, settings_, publisher_,
-              [this](const mqtt::Command& command) { on_command(command); }) {
-    show(std::move(snapshot));
+      desk_(std::make_shared<BrokerDesk>(loops_, settings_, subjects_)),
+      serving_(std::move(serving)) {
+    show(snapshot);
+}
+
+/// The desk ends in its own loop, behind what is on its way.
+BrokerSession::~BrokerSession() {
+    boost::asio::post(loops_.faces, [desk = std::move(desk_)] {});
+}
+
+void BrokerSession::at_desk(std::function<void(BrokerDesk&)> work) const {
+    ++desk_->waiting;
+    boost::asio::post(loops_.faces, [desk = desk_, work = std::move(work)] {
+        --desk->waiting;
+        work(*desk);
+    });
 }
 
 bool BrokerSession::fits(const Snapshot& snapshot) const {
     const auto& mqtt = snapshot.config->mqtt;
     return mqtt && completed(*mqtt) == settings_ &&
-           explain::subjects_of(*snapshot.config) == publisher_.subjects();
+           explain::subjects_of(*snapshot.config) == subjects_;
 }
 
 void BrokerSession::show(std::shared_ptr<const Snapshot> snapshot) {
@@ -90,13 +105,15 @@ void BrokerSession::show(std::shared_ptr<const Snapshot> snapshot) {
 
 void BrokerSession::renew(const tls::Material& files) {
     settings_.files = mqtt::Files{files};
-    certificate_expiry_ = tls::summary_of(files.certificate).end;
-    client_.renew(files);
+    counters_.certificate_expiry = tls::summary_of(files.certificate).end;
+    at_desk([files](BrokerDesk& desk) { desk.renew(files); });
 }
 
 void BrokerSession::take_over(BrokerSession& before) {
-    publisher_.take_over(before.publisher_);
-    counters_ = before.counters();
+    at_desk([former = before.desk_](BrokerDesk& desk) { desk.take_over(*former); });
+    const std::int64_t expiry = counters_.certificate_expiry;
+    counters_ = before.counters_;
+    counters_.certificate_expiry = expiry;
     if (settings_.broker() != before.settings_.broker())
         return;  // the clients of those writes are at the other broker
     writes_ = std::move(before.writes_);
@@ -105,25 +122,30 @@ void BrokerSession::take_over(BrokerSession& before) {
 
 void BrokerSession::start() {
     for (std::size_t i = 0; i < places_.size(); ++i)
-        if (auto state = seen(i)) publisher_.know(i, std::move(*state));
-    client_.start();
+        if (auto state = seen(i))
+            at_desk([i, state = std::move(*state)](BrokerDesk& desk) { desk.know(i, state); });
+    at_desk([self = weak_from_this(), serving = serving_,
+             own = std::weak_ptr(desk_)](BrokerDesk& desk) {
+        desk.start(self);
+        *serving = own;
+    });
     sweep();
 }
 
-std::unique_ptr<mqtt::GracefulClose> BrokerSession::stop() {
+void BrokerSession::stop() {
+    if (closed_) return;
+    closed_ = std::make_shared<std::atomic<bool>>(false);
     alarm_->cancel();
-    rebirth_alarm_->cancel();
-    auto leaving = client_.stop();
-    if (!writes_) return leaving;
-    for (const Place& place : places_)
-        if (place.station != nullptr && place.point == nullptr)
-            place.station->bus->cancel(writes_->client);
+    at_desk([closed = closed_](BrokerDesk& desk) { desk.stop(closed); });
+    if (writes_) {
+        for (const Place& place : places_)
+            if (place.station != nullptr && place.point == nullptr)
+                place.station->bus->cancel(writes_->client);
+    }
     writes_.reset();
-    return leaving;
-}
-
-void BrokerSession::offer(std::size_t subject, mqtt::State state) {
-    if (publisher_.offer(subject, std::move(state))) client_.wake();
+    places_.clear();
+    numbers_.clear();
+    snapshot_.reset();  // the lines of an earlier configuration end
 }
 
 mqtt::State BrokerSession::state_of(const Station& station, const points::Point& point) const {
@@ -153,7 +175,19 @@ std::optional<mqtt::State> BrokerSession::seen(std::size_t subject) const {
 }
 
 void BrokerSession::look(std::size_t subject) {
-    if (auto state = seen(subject)) offer(subject, std::move(*state));
+    auto state = desk_->has_room() ? seen(subject) : std::nullopt;
+    if (!state) return;
+    at_desk([subject, state = std::move(*state)](BrokerDesk& desk) { desk.offer(subject, state); });
+}
+
+/// The stations of a line, or one of them.
+void BrokerSession::look_at_stations(const std::string& line, std::optional<std::uint8_t> id) {
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+        const Place& place = places_[i];
+        if (place.station != nullptr && place.point == nullptr && place.station->line == line &&
+            (!id || place.station->id == *id))
+            look(i);
+    }
 }
 
 /// Publishes what becomes stale or bad by time alone, a part of the plant per turn.
@@ -167,28 +201,23 @@ void BrokerSession::sweep() {
     alarm_->arm(clock_.now() + std::max<Duration>(kSweep / share, 20ms), [this] { sweep(); });
 }
 
+void BrokerSession::keep(mqtt::Counters counters) {
+    counters.certificate_expiry = counters_.certificate_expiry;
+    counters_ = std::move(counters);
+}
+
 void BrokerSession::on_bus_event(const std::string& line, const bus::BusEvent& event) {
-    if (const auto* of_station = std::get_if<arbiter::StationEvent>(&event)) {
-        for (std::size_t i = 0; i < places_.size(); ++i) {
-            const Place& place = places_[i];
-            if (place.station != nullptr && place.point == nullptr && place.station->line == line &&
-                place.station->id == of_station->station)
-                look(i);
-        }
-    }
+    if (const auto* of_station = std::get_if<arbiter::StationEvent>(&event))
+        look_at_stations(line, of_station->station);
     const auto* of_line = std::get_if<bus::LineEvent>(&event);
-    const auto subject = publisher_.subjects().find_line(line);
+    const auto subject = subjects_.find_line(line);
     if (of_line == nullptr || !subject || (of_line->up && !of_line->why.empty())) return;
     mqtt::State state;
     state.value = of_line->up;
     state.text = of_line->up ? "up" : "down: " + of_line->why;
     state.time = rt::wall_now();
-    offer(*subject, std::move(state));
-    for (std::size_t i = 0; i < places_.size(); ++i) {  // its stations are unknown now
-        const Place& place = places_[i];
-        if (place.station != nullptr && place.point == nullptr && place.station->line == line)
-            look(i);
-    }
+    at_desk([subject = *subject, state](BrokerDesk& desk) { desk.offer(subject, state); });
+    look_at_stations(line, {});  // they are unknown now
 }
 
 void BrokerSession::on_points(const Station& station, const std::vector<std::size_t>& wants) {
@@ -199,115 +228,81 @@ void BrokerSession::on_points(const Station& station, const std::vector<std::siz
     look(numbers->second.station);  // it may have answered for the first time
 }
 
-void BrokerSession::on_command(const mqtt::Command& command) {
-    if (std::holds_alternative<mqtt::Rebirth>(command)) {
-        if (std::exchange(rebirth_waits_, true)) return;
-        rebirth_alarm_->arm(std::max(clock_.now(), next_rebirth_), [this] { on_rebirth(); });
-    } else if (const auto* bad = std::get_if<mqtt::BadCommand>(&command)) {
-        refuse(bad->topic, bad->id, web::problem(400, bad->why), {});
-    } else {
-        write(std::get<mqtt::WriteCommand>(command));
-    }
-}
-
-void BrokerSession::on_rebirth() {
-    rebirth_waits_ = false;
-    next_rebirth_ = clock_.now() + kRebirth;
-    publisher_.rebirth();
-    client_.wake();
-}
-
-void BrokerSession::refuse(const std::string& topic, const std::string& id, const web::Problem& why,
-                           const Place& place) {
-    if (refused_) {
-        const TopicRefusal refusal{who_, topic, why, place.station, place.point};
-        refused_(refusal);
-    }
-    answer_refused(topic, id, why);
+void BrokerSession::refused(const std::string& topic, const web::Problem& why,
+                            std::optional<std::size_t> point) {
+    if (!refused_) return;
+    const Place place = point && *point < places_.size() ? places_[*point] : Place{};
+    refused_({who_, topic, why, place.station, place.point});
 }
 
 void BrokerSession::answer_refused(const std::string& topic, const std::string& id,
-                                   const web::Problem& why) {
-    ++counters_.writes_refused;
+                                   const web::Problem& why) const {
     rt::log(rt::LogLevel::warn, "mqtt write refused",
             {{"client", "mqtt"}, {"topic", web::excerpt(topic)}, {"why", why.detail}});
-    json::object body{{"ok", false}};
-    for (const auto& [name, value] : web::json_of(why)) body[name] = value;
-    publisher_.answer({topic, id, web::json_text(body)}, true);
-    client_.wake();
+    at_desk([topic, id, body = refusal_text(why)](BrokerDesk& desk) {
+        desk.answer(topic, id, body, BrokerDesk::WriteEnd::refused);
+    });
 }
 
-void BrokerSession::write(const mqtt::WriteCommand& command) {
-    const Place& place = places_[command.point];
+void BrokerSession::write(const mqtt::WriteCommand& command, const std::string& topic) {
+    const Place place = command.point < places_.size() ? places_[command.point] : Place{};
+    if (place.point == nullptr || !writes_)
+        return answer_refused(topic, command.id, web::problem(503, "the configuration changes"));
     const Station& station = *place.station;
-    const std::string topic = publisher_.topic_of(command.point);
-    if (writes_->open >= settings_.writes)
-        return refuse(topic, command.id, web::problem(503, "too many writes are under way"), place);
-    if (!publisher_.has_room_for_answer(writes_->open))
-        return refuse(topic, command.id, web::problem(503, "too many answers wait for the broker"),
-                      place);
     const profile::ProfileRef profile = station.configured->profile;
     auto order = web::order_of(*station.bus, station.id, *profile, *place.point, command.value);
     if (!order) {
-        publisher_.repeat(command.point);  // for clients that ignore our answers
-        return refuse(topic, command.id, order.error(), place);
+        at_desk([point = command.point](BrokerDesk& desk) { desk.repeat(point); });
+        refused(topic, order.error(), command.point);
+        return answer_refused(topic, command.id, order.error());
     }
     bus::Request request = order->request;
     request.client = writes_->client;
     request.who = who_;
     station.bus->name_client(writes_->client, "mqtt");
-    ++writes_->open;
     auto made = std::make_shared<const Order>(
         Order{station.name, place.point->name, topic, command.id, profile, std::move(*order)});
     station.bus->transact(std::move(request), [writes = std::weak_ptr<Writes>(writes_),
                                                made = std::move(made)](const bus::Answer& answer) {
-        const auto open = writes.lock();
-        if (!open) return;
-        --open->open;
-        open->session->finish(*made, answer);
+        if (const auto open = writes.lock()) open->session->finish(*made, answer);
     });
 }
 
 void BrokerSession::finish(const Order& order, const bus::Answer& answer) {
     const auto result = web::write_result(order.order, answer, *order.profile);
-    const auto point = publisher_.subjects().find_point(order.station, order.point);
-    if (!result && point) publisher_.repeat(*point);
+    const auto point = subjects_.find_point(order.station, order.point);
+    if (!result && point) at_desk([point = *point](BrokerDesk& desk) { desk.repeat(point); });
     if (!result && answer.refusal) return answer_refused(order.topic, order.id, result.error());
-    ++(result ? counters_.writes_ok : counters_.writes_failed);
     json::object body{{"ok", static_cast<bool>(result)}};
     for (const auto& [name, value] : result ? *result : web::json_of(result.error()))
         body[name] = value;
-    publisher_.answer({order.topic, order.id, web::json_text(body)}, false);
-    client_.wake();
+    const auto end = result ? BrokerDesk::WriteEnd::confirmed : BrokerDesk::WriteEnd::failed;
+    at_desk([topic = order.topic, id = order.id, text = web::json_text(body),
+             end](BrokerDesk& desk) { desk.answer(topic, id, text, end); });
 }
 
-mqtt::Counters BrokerSession::counters() const {
-    mqtt::Counters all = client_.counters();
-    all.published += counters_.published;
-    all.dropped += counters_.dropped;
-    all.results_dropped += counters_.results_dropped;
-    all.reconnects += counters_.reconnects;
-    all.writes_ok = counters_.writes_ok;
-    all.writes_refused = counters_.writes_refused;
-    all.writes_failed = counters_.writes_failed;
-    all.broker = settings_.broker();
-    all.certificate_expiry = certificate_expiry_;
-    return all;
-}
-
-Northbound::Northbound(boost::asio::any_io_executor executor, rt::Clock& clock,
-                       TopicRefusals refused)
-    : executor_(std::move(executor)), clock_(clock), refused_(std::move(refused)) {}
+Northbound::Northbound(web::Loops loops, rt::Clock& clock, TopicRefusals refused)
+    : loops_(std::move(loops)), clock_(clock), refused_(std::move(refused)) {}
 
 void Northbound::show(const std::shared_ptr<const Snapshot>& snapshot) {
     if (session_ && session_->fits(*snapshot)) return session_->show(snapshot);
-    std::unique_ptr<BrokerSession> next;
+    std::shared_ptr<BrokerSession> next;
     if (snapshot->config->mqtt)
-        next = std::make_unique<BrokerSession>(executor_, clock_, snapshot, refused_);
+        next = std::make_shared<BrokerSession>(loops_, clock_, snapshot, refused_, serving_);
     if (session_ && next) next->take_over(*session_);
     leave();
     session_ = std::move(next);
     if (session_ && running_) session_->start();
+}
+
+std::function<std::function<void()>()> Northbound::collector() const {
+    return [serving = serving_]() -> std::function<void()> {
+        const auto desk = serving->lock();
+        if (!desk) return {};
+        return [session = desk->session(), counters = desk->counters()] {
+            if (const auto alive = session.lock()) alive->keep(counters);
+        };
+    };
 }
 
 void Northbound::renew(const tls::Material& files) {
@@ -325,10 +320,10 @@ void Northbound::stop() {
 }
 
 void Northbound::leave() {
-    auto leaving = session_ ? session_->stop() : nullptr;
-    if (leaving) closing_ = std::move(leaving);
+    if (!session_) return;
+    session_->stop();
+    leaving_ = session_;
 }
-
 void Northbound::on_bus_event(const std::string& line, const bus::BusEvent& event) {
     if (session_) session_->on_bus_event(line, event);
 }

@@ -1,23 +1,24 @@
 #pragma once
 
-#include <boost/asio/any_io_executor.hpp>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus.hpp"
-#include "panelgate/explain/translations.hpp"
+#include "panelgate/gateway/broker_desk.hpp"
 #include "panelgate/gateway/snapshot.hpp"
-#include "panelgate/mqtt/client.hpp"
 #include "panelgate/mqtt/counters.hpp"
-#include "panelgate/mqtt/publisher.hpp"
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/web/api/point_order.hpp"
+#include "panelgate/web/http/crossing.hpp"
 
 namespace panelgate::gateway {
 
@@ -31,13 +32,15 @@ struct TopicRefusal {
 };
 using TopicRefusals = std::function<void(const TopicRefusal&)>;
 
-/// A plant's session at an MQTT broker: publishes its points and the states of its stations and
-/// lines, and carries out writes of points. The clock outlives it. One thread.
-class BrokerSession {
+/// A plant's session at an MQTT broker: reads the states of its points, stations and lines for the
+/// broker's desk, and carries out writes of points. The clock outlives it. Of the plant's loop.
+class BrokerSession : public std::enable_shared_from_this<BrokerSession> {
   public:
-    /// `snapshot` must have `mqtt:`.
-    BrokerSession(boost::asio::any_io_executor executor, rt::Clock& clock,
-                  std::shared_ptr<const Snapshot> snapshot, TopicRefusals refused);
+    /// `snapshot` must have `mqtt:`. `serving`: of the faces' loop, gets the desk at its start.
+    BrokerSession(web::Loops loops, rt::Clock& clock,
+                  const std::shared_ptr<const Snapshot>& snapshot, TopicRefusals refused,
+                  std::shared_ptr<std::weak_ptr<BrokerDesk>> serving);
+    ~BrokerSession();
 
     /// True if this session can serve the snapshot unchanged: show() is enough.
     bool fits(const Snapshot& snapshot) const;
@@ -50,16 +53,27 @@ class BrokerSession {
     void take_over(BrokerSession& before);
 
     void start();
-    /// Ends the session. The returned object keeps the connection until the broker has got the last
-    /// message; null: there is none.
-    std::unique_ptr<mqtt::GracefulClose> stop();
+    /// Ends the session. No effect if it has ended.
+    void stop();
+    /// True once the broker has got the last message, or is not waited for any more.
+    bool has_left() const { return closed_ && *closed_; }
 
     /// Publishes what has happened on a line.
     void on_bus_event(const std::string& line, const bus::BusEvent& event);
     /// Publishes the points among these wants of a station's polls.
     void on_points(const Station& station, const std::vector<std::size_t>& wants);
 
-    mqtt::Counters counters() const;
+    // What the desk tells:
+    /// Carries out a write of a point (a subject's number), and answers it at the desk.
+    void write(const mqtt::WriteCommand& command, const std::string& topic);
+    /// The desk has refused a write; `point`: a subject's number, if it named one.
+    void refused(const std::string& topic, const web::Problem& why,
+                 std::optional<std::size_t> point);
+    /// The desk's counters.
+    void keep(mqtt::Counters counters);
+
+    /// As the desk told them last.
+    const mqtt::Counters& counters() const { return counters_; }
 
   private:
     /// The source of a subject's state.
@@ -72,7 +86,6 @@ class BrokerSession {
     struct Writes {
         BrokerSession* session;  ///< that gets their results
         bus::ClientId client;
-        std::size_t open = 0;
     };
 
     /// The subjects of a station; its points in the order of the configuration.
@@ -81,44 +94,39 @@ class BrokerSession {
         std::vector<std::size_t> points;
     };
 
+    void at_desk(std::function<void(BrokerDesk&)> work) const;
     std::optional<mqtt::State> seen(std::size_t subject) const;
     void look(std::size_t subject);
+    void look_at_stations(const std::string& line, std::optional<std::uint8_t> id);
     void sweep();
     mqtt::State state_of(const Station& station, const points::Point& point) const;
-    void offer(std::size_t subject, mqtt::State state);
-    void on_command(const mqtt::Command& command);
-    void on_rebirth();
-    void write(const mqtt::WriteCommand& command);
-    /// Tells the client, and the log.
-    void answer_refused(const std::string& topic, const std::string& id, const web::Problem& why);
-    void refuse(const std::string& topic, const std::string& id, const web::Problem& why,
-                const Place& place);
+    void answer_refused(const std::string& topic, const std::string& id,
+                        const web::Problem& why) const;
     void finish(const Order& order, const bus::Answer& answer);
 
+    web::Loops loops_;
     rt::Clock& clock_;
     std::shared_ptr<const Snapshot> snapshot_;  ///< what the places refer to
     mqtt::Settings settings_;
+    mqtt::Subjects subjects_;
     std::vector<Place> places_;  ///< by subject
     std::map<const Station*, Numbers> numbers_;
-    mqtt::Publisher publisher_;
     std::unique_ptr<rt::Alarm> alarm_;  ///< of the sweep
     std::size_t swept_ = 0;
-    std::unique_ptr<rt::Alarm> rebirth_alarm_;  ///< of the pending rebirth
-    TimePoint next_rebirth_{};                  ///< earliest time of the next rebirth
-    bool rebirth_waits_ = false;
-    std::int64_t certificate_expiry_ = 0;
-    mqtt::Counters counters_;         ///< of writes, and of earlier sessions
-    TopicRefusals refused_;           ///< null: nobody wants to know
-    WhoRef who_;                      ///< who writes: whoever may publish at the broker
-    std::shared_ptr<Writes> writes_;  ///< null once another session has taken them over
-    mqtt::Client client_;
+    mqtt::Counters counters_;
+    TopicRefusals refused_;             ///< null: nobody wants to know
+    WhoRef who_;                        ///< who writes: whoever may publish at the broker
+    std::shared_ptr<Writes> writes_;    ///< null once another session has taken them over
+    std::shared_ptr<BrokerDesk> desk_;  ///< of the faces' loop
+    std::shared_ptr<std::weak_ptr<BrokerDesk>> serving_;
+    std::shared_ptr<std::atomic<bool>> closed_;  ///< null until stop()
 };
 
-/// The plant's MQTT service, across all reloads. The clock outlives it. One thread.
+/// The plant's MQTT service, across all reloads. The clock outlives it. Of the plant's loop.
 class Northbound {
   public:
     /// `refused` is told of writes that are refused before they come to a line.
-    Northbound(boost::asio::any_io_executor executor, rt::Clock& clock, TopicRefusals refused = {});
+    Northbound(web::Loops loops, rt::Clock& clock, TopicRefusals refused = {});
 
     /// Serves this snapshot from now on; without `mqtt:` nothing. If broker, points and stations
     /// are the same, the connection stays; else it is made anew, and queued messages are kept.
@@ -127,7 +135,7 @@ class Northbound {
     /// Sends the last message. No effect if it was sent already.
     void stop();
     /// True if the broker has got the last message, or it is not waited for any more.
-    bool left() const { return !closing_ || closing_->done(); }
+    bool left() const { return !leaving_ || leaving_->has_left(); }
 
     /// Files for the next connection to the broker; none is closed.
     void renew(const tls::Material& files);
@@ -136,17 +144,22 @@ class Northbound {
     void on_bus_event(const std::string& line, const bus::BusEvent& event);
     void on_points(const Station& station, const std::vector<std::size_t>& wants);
 
-    /// Nothing without a broker.
+    /// Of the faces' loop: takes the present counters there; the function returned keeps them here,
+    /// in the plant's loop, for counters(). The function is empty without a broker.
+    std::function<std::function<void()>()> collector() const;
+    /// As collected last; nothing without a broker.
     std::optional<mqtt::Counters> counters() const;
 
   private:
     void leave();
 
-    boost::asio::any_io_executor executor_;
+    web::Loops loops_;
     rt::Clock& clock_;
     TopicRefusals refused_;
-    std::unique_ptr<BrokerSession> session_;        ///< null without a broker
-    std::unique_ptr<mqtt::GracefulClose> closing_;  ///< of the previous or the last session
+    std::shared_ptr<BrokerSession> session_;  ///< null without a broker
+    std::shared_ptr<std::weak_ptr<BrokerDesk>> serving_ =
+        std::make_shared<std::weak_ptr<BrokerDesk>>();  ///< of the faces' loop
+    std::shared_ptr<BrokerSession> leaving_;  ///< the previous or the last session, as it ends
     bool running_ = false;
 };
 

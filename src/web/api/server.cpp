@@ -34,6 +34,7 @@ std::shared_ptr<const Site> Server::site_of(Settings settings,
     site->settings = std::move(settings);
     site->crossing = crossing_;
     site->keep_figures = [figures = figures_](const Counters& now) { *figures = now; };
+    site->collect = providers_.collect;
     site->product = "panelgate/" + providers_.version;
     site->now = providers_.now;
     site->record = providers_.record;

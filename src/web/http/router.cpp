@@ -419,13 +419,20 @@ Handling witnessed(HttpRequest request, Crossing::Handler handler, Witness::Reco
     co_return response;
 }
 
+/// Takes what the faces have counted along to the plant, which answers a scrape.
+void take_figures(const std::shared_ptr<const Site>& site, const Shared& shared) {
+    if (site->keep_figures && shared.figures)
+        site->crossing->tell([site, figures = shared.figures()] { site->keep_figures(figures); });
+    auto others = site->collect ? site->collect() : nullptr;
+    if (others) site->crossing->tell(std::move(others));
+}
+
 /// Carries out a request where its handler belongs.
 Handling carry_out(HttpRequest request, const Route* route, Shared* shared) {
     const std::shared_ptr<const Site> site = shared->site;
     if (route->face || !site->crossing)
         return witnessed(std::move(request), route->handler, site->record);
-    if (route->figures && site->keep_figures && shared->figures)
-        site->crossing->tell([site, figures = shared->figures()] { site->keep_figures(figures); });
+    if (route->figures) take_figures(site, *shared);
     return site->crossing->ask(
         std::move(request), [handler = route->handler, record = site->record](HttpRequest asked) {
             return witnessed(std::move(asked), handler, record);

@@ -176,6 +176,7 @@ struct Site {
     Settings settings;
     std::shared_ptr<Crossing> crossing{};  ///< null: handlers run in the sessions' loop
     std::function<void(const Counters&)> keep_figures{};  ///< of the plant's loop; may be empty
+    std::function<std::function<void()>()> collect{};     ///< as Providers::collect
     std::string product;                                  ///< for the Server header: "name/1.2.3"
     std::vector<Route> routes;
     std::function<std::uint64_t()> next_caller;  ///< returns connection ids
