@@ -19,7 +19,7 @@ import harness
 from harness import ROOT
 
 VERSION = re.search(r"project\(panelgate VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text())[1]
-READ = ("CMakeLists.txt", "CHANGELOG.md", "Dockerfile", "LICENSE", "README.md", "deploy", "docs")
+READ = ("CMakeLists.txt", "CHANGELOG.md", "Dockerfile", "LICENSE", "README.md", "SECURITY.md", "deploy", "docs")
 TOOLS = ("git", "dpkg-deb", "apt-ftparchive", "apt-get", "readelf")
 DAY = "1795000000"
 
