@@ -116,7 +116,7 @@ make_apt() {
 make_texts() {
     say "sources, documentation, notes"
     git archive --prefix="$name/" HEAD | gzip -9n >"$out/$name.tar.gz"
-    git archive --prefix="$name-docs/" HEAD docs README.md CHANGELOG.md LICENSE | gzip -9n >"$out/$name-docs.tar.gz"
+    git archive --prefix="$name-docs/" HEAD docs README.md CHANGELOG.md SECURITY.md LICENSE | gzip -9n >"$out/$name-docs.tar.gz"
     notes >"$out/$name-notes.md"
 }
 

@@ -17,6 +17,9 @@ from markdown import Page
 
 README = (ROOT / "README.md").read_text()
 PAGE = Page(README)
+# What is beside the manual, for those who change the program or look after it.
+PAPERS = sorted([*ROOT.glob("*.md"), *(ROOT / "src").rglob("*.md"), *(ROOT / "tests").glob("*.md")])
+WORDS_BELOW_SRC = 9000
 
 
 def blocks(mark):
@@ -45,15 +48,25 @@ class Readme(unittest.TestCase):
         self.assertLessEqual(len(lines), 120)
         self.assertEqual([number for number, line in enumerate(lines, 1) if len(line) > 200], [])
 
-    def test_its_ways_arrive(self):
-        for link in PAGE.links():
-            path, _, anchor = link.partition("#")
-            if re.match("[a-z]+:", link):
-                continue
-            with self.subTest(link=link):
-                self.assertTrue((ROOT / path).exists())
-                if anchor:
-                    self.assertIn(anchor, Page((ROOT / path).read_text()).anchors())
+    def test_ways_of_the_papers_arrive(self):
+        for paper in PAPERS:
+            for link in Page(paper.read_text()).links():
+                path, _, anchor = link.partition("#")
+                if re.match("[a-z]+:", link):
+                    continue
+                with self.subTest(paper=str(paper.relative_to(ROOT)), link=link):
+                    there = paper.parent / path if path else paper
+                    self.assertTrue(there.exists())
+                    if anchor:
+                        self.assertIn(anchor, Page(there.read_text()).anchors())
+
+    def test_readmes_of_the_sources_are_short(self):
+        words = {str(paper): len(paper.read_text().split()) for paper in (ROOT / "src").rglob("README.md")}
+        self.assertLessEqual(sum(words.values()), WORDS_BELOW_SRC, words)
+
+    def test_each_decision_names_what_was_refused(self):
+        _, *decisions = (ROOT / "src/ARCHITECTURE.md").read_text().partition("\n## Decisions\n")[2].split("\n### ")
+        self.assertEqual([text.splitlines()[0] for text in decisions if "Refused: " not in text], [])
 
     def test_scripts_and_files_that_it_names_exist(self):
         named = re.findall(r"\b(?:deploy|tests|config|src)/[\w./-]*\w|\.ci/run", README)

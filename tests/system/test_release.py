@@ -19,7 +19,7 @@ import harness
 from harness import ROOT
 
 VERSION = re.search(r"project\(panelgate VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text())[1]
-READ = ("CMakeLists.txt", "CHANGELOG.md", "Dockerfile", "LICENSE", "README.md", "deploy", "docs")
+READ = ("CMakeLists.txt", "CHANGELOG.md", "Dockerfile", "LICENSE", "README.md", "SECURITY.md", "deploy", "docs")
 TOOLS = ("git", "dpkg-deb", "apt-ftparchive", "apt-get", "readelf")
 DAY = "1795000000"
 
@@ -288,8 +288,17 @@ class Version(unittest.TestCase):
                 self.assertEqual(found, VERSION, page.name)
 
     def test_the_changelog_has_a_place_for_what_comes_next(self):
+        kinds = ["### Added", "### Changed", "### Removed", "### Fixed"]
         headings = re.findall(r"(?m)^##+ .*", (ROOT / "CHANGELOG.md").read_text())
-        self.assertEqual(headings[:4], ["## Unreleased", "### Added", "### Changed", "### Fixed"])
+        self.assertEqual(headings, ["## Unreleased", *kinds, f"## {VERSION}", *kinds])
+
+    def test_the_changelog_is_short(self):
+        _, *versions = (ROOT / "CHANGELOG.md").read_text().split("\n## ")
+        told = [re.findall(r"(?m)^- .*", version) for version in versions]
+        entries = [entry for version in told for entry in version]
+        self.assertEqual([entry for entry in entries if len(entry) > 200], [])
+        self.assertEqual(len(set(entries)), len(entries))
+        self.assertLessEqual(max(map(len, told)), 60)
 
 
 if __name__ == "__main__":
