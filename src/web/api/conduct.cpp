@@ -273,7 +273,6 @@ Handling conduct(HttpRequest request, const Api* api, Handler handler, RoutePoli
     const std::size_t gzip_from = api->providers.settings.gzip_from;
     const bool takes_gzip = accepts_gzip(header(request, "accept-encoding"));
     const std::string if_none_match = header(request, "if-none-match");
-    const auto wait = policy.asks ? wait_of(request) : std::nullopt;
     if (api->directory != nullptr) {
         if (const auto hidden = check_sight(request, *api->directory))
             co_return to_response(*hidden);
@@ -285,10 +284,6 @@ Handling conduct(HttpRequest request, const Api* api, Handler handler, RoutePoli
     if (api->directory != nullptr && is_found_wrong_here(response)) {
         if (const auto hidden = instead_of_telling(path, caller->who(), *api->directory))
             co_return to_response(*hidden);
-    }
-    if (wait) {
-        const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(*wait).count();
-        response.headers.emplace_back("Preference-Applied", "wait=" + std::to_string(seconds));
     }
     if (policy.tagged && response.status == 200) set_tag(response, if_none_match);
     if (!is_packable(response, gzip_from)) co_return response;

@@ -11,8 +11,7 @@ namespace panelgate::web {
 
 /// What a route's answers have in addition to its handler's answer.
 struct RoutePolicy {
-    /// It asks lines: it accepts "Prefer: wait=N", and the answer lists its transactions.
-    bool asks = false;
+    bool asks = false;    ///< it asks lines: the answer lists its transactions
     bool once = false;    ///< a write: it accepts Idempotency-Key
     bool tagged = false;  ///< a status: it has an ETag
 };

@@ -65,18 +65,12 @@ class KeyBook {
     std::size_t bytes_ = 0;                       ///< of the answers
 };
 
-/// N of "Prefer: wait=N" (RFC 7240 4.3), a whole number of seconds. Nothing for any other value,
-/// which is not an error.
-std::optional<Duration> wait_of(std::string_view prefer);
-/// The same from a request's header.
-std::optional<Duration> wait_of(const HttpRequest& request);
-
-/// The time limit of a request over all its transactions: its line's deadline, or the client's
-/// "Prefer: wait", whichever is sooner (P3).
+/// The time limit of a request over all its transactions: the deadline of its line (P3).
 class Patience {
   public:
     /// `now` must outlive it.
-    Patience(const HttpRequest& request, Duration deadline, const std::function<TimePoint()>& now);
+    Patience(Duration deadline, const std::function<TimePoint()>& now)
+        : now_(&now), end_(now() + deadline) {}
 
     /// Time left; zero if it is over.
     Duration left() const;

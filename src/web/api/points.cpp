@@ -213,7 +213,7 @@ Handling get_point(HttpRequest request, const Api* api) {
     const points::Point& point = *found->point;
     if (may_differ(*found)) {
         const Duration deadline = api->directory->line_of(found->station).deadline;
-        const Patience patience(request, deadline, api->providers.now);
+        const Patience patience(deadline, api->providers.now);
         const modbus::Span span{point.table, point.address, point.count()};
         boost::asio::awaitable<Parsed<Reading>> reads =
             read_all(request.caller, &found->station, span, patience);
@@ -230,7 +230,7 @@ Handling get_interpretations(HttpRequest request, const Api* api) {
     if (modbus::is_bit_table(items->span.table) || items->span.count > kMost)
         co_return to_response(problem(422, "interpretations are of 1 to 16 registers"));
     const Duration deadline = api->directory->line_of(items->station).deadline;
-    const Patience patience(request, deadline, api->providers.now);
+    const Patience patience(deadline, api->providers.now);
     bus::Request made{.station = items->station.id, .request = modbus::Request::read(items->span)};
     made.within = patience.left();
     bus::Answer answer = co_await ask(request.caller, items->station.bus, std::move(made));

@@ -24,7 +24,7 @@ Handling read_items(HttpRequest request, Parsed<Items> items, const Api* api) {
     const auto view = prepare_read(*items, *format, api->providers.settings.max_transactions);
     if (!view) co_return to_response(view.error());
     const Duration deadline = api->directory->line_of(items->station).deadline;
-    const Patience patience(request, deadline, api->providers.now);
+    const Patience patience(deadline, api->providers.now);
     boost::asio::awaitable<Parsed<Reading>> reads =
         read_all(request.caller, &items->station, items->span, patience);
     Parsed<Reading> reading = co_await std::move(reads);
@@ -147,7 +147,7 @@ Handling post_read(HttpRequest request, const Api* api) {
     std::vector<boost::asio::awaitable<void>> lines;
     for (auto& [name, entries] : by_line(*reads, line_of)) {
         const LineEntry* line = api->directory->find_line(name);
-        const Patience patience(request, line->deadline, api->providers.now);
+        const Patience patience(line->deadline, api->providers.now);
         lines.push_back(
             read_line(request.caller, line, std::move(entries), patience, &transactions));
     }

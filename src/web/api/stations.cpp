@@ -291,7 +291,7 @@ Handling post_raw(HttpRequest request, const Api* api) {
     }
     bus::Request made = std::move(*planned);
     const bool broadcast = made.station == 0;
-    const Patience patience(request, (*line)->deadline, api->providers.now);
+    const Patience patience((*line)->deadline, api->providers.now);
     made.within = patience.left();
     made.raw = made.verbatim = true;
     bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));

@@ -1,13 +1,10 @@
 #include <algorithm>
-#include <array>
 #include <boost/asio/awaitable.hpp>
 #include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -48,10 +45,6 @@ boost::json::object trace_json(const bus::IncidentHead& incident);
 /// Adds the three lists of the part as members, yielding to the loop. Both pointers must stay valid
 /// until it has finished.
 boost::asio::awaitable<void> add_part(LongAnswer* body, const bus::TracePart* part);
-
-/// Formats a part of a trace for a terminal: a row for each transaction with its times in
-/// milliseconds, its frames below it, and decisions in between, in the order of the line.
-std::string trace_text(const bus::TracePart& part);
 
 /// A capture as a download with this file name.
 HttpResponse pcapng_response(std::string body, const std::string& file_name);
@@ -222,97 +215,6 @@ asio::awaitable<void> add_part(LongAnswer* body, const bus::TracePart* part) {
     co_await std::move(transactions);
 }
 
-namespace {
-
-constexpr const char* kHead =
-    "TIME                              ID STATION REASON      OUTCOME     QUEUE     OUT   THINK"
-    "      IN   TOTAL  CLIENT\n";
-constexpr std::string_view kIndent = "                               ";
-
-/// "12.3", or "-" if one of them did not happen.
-std::string ms(const std::optional<TimePoint>& from, const std::optional<TimePoint>& to) {
-    if (!from || !to) return "-";
-    std::array<char, 32> text{};
-    const int size = std::snprintf(text.data(), text.size(), "%.1f",
-                                   to_milliseconds(std::max(*to - *from, Duration::zero())));
-    return std::string(text.data(), static_cast<std::size_t>(size));
-}
-
-std::string right(std::string text, std::size_t width) {
-    return text.size() < width ? std::string(width - text.size(), ' ') + text : text;
-}
-std::string left(std::string text, std::size_t width) {
-    text.resize(std::max(width, text.size()), ' ');
-    return text;
-}
-
-std::string frame_row(std::string_view mark, ByteView bytes, std::string_view note) {
-    std::string row = std::string(kIndent) + std::string(mark) + ' ' + upper_hex(bytes);
-    if (!note.empty()) row += "  " + std::string(note);
-    return row + '\n';
-}
-
-std::string_view mark_of(FrameKind kind) {
-    switch (direction_of(kind)) {
-        case FrameDirection::sent:
-            return ">";
-        case FrameDirection::received:
-            return "<";
-        case FrameDirection::discarded:
-            break;
-    }
-    return "x";
-}
-
-std::string row(const bus::TraceTransaction& one) {
-    std::string text = rfc3339(one.time) + ' ' + right(std::to_string(one.id), 8) + ' ' +
-                       right(std::to_string(one.station), 7) + ' ' + left(one.reason, 11) + ' ' +
-                       left(std::string(outcome_of(one)), 9);
-    const std::optional<TimePoint> end = one.answered       ? one.answered
-                                         : one.last_byte_in ? one.last_byte_in
-                                                            : one.last_bit_out;
-    for (const std::string& figure :
-         {ms(one.arrived, one.granted), ms(one.first_bit_out, one.last_bit_out),
-          ms(one.last_bit_out, one.first_byte_in), ms(one.first_byte_in, one.last_byte_in),
-          ms(one.arrived, end)})
-        text += right(figure, 8);
-    text += one.client.empty() ? "\n" : "  " + one.client + '\n';
-    text += frame_row(">", one.request, "");
-    if (!one.reply.empty()) text += frame_row("<", one.reply, "");
-    for (const bus::TraceFrame& frame : one.discarded)
-        text += frame_row("x", frame.bytes, note_of(frame));
-    return text;
-}
-
-std::string row(const bus::TraceDecision& one) {
-    return rfc3339(one.time) + "  " + one.text + '\n';
-}
-
-/// A row for a frame whose transaction is not in the part.
-std::string row(const bus::TraceFrame& one) {
-    return rfc3339(one.time) + "    " + std::string(mark_of(one.kind)) + ' ' +
-           upper_hex(one.bytes) + "  " + std::string(note_of(one)) + '\n';
-}
-
-}  // namespace
-
-std::string trace_text(const bus::TracePart& part) {
-    std::vector<std::pair<std::uint64_t, std::string>> rows;
-    std::set<std::uint64_t> shown;
-    for (const bus::TraceTransaction& one : part.transactions) {
-        rows.emplace_back(one.first, row(one));
-        shown.insert(one.id);
-    }
-    for (const bus::TraceFrame& one : part.frames) {
-        if (!shown.contains(one.transaction)) rows.emplace_back(one.sequence, row(one));
-    }
-    for (const bus::TraceDecision& one : part.decisions) rows.emplace_back(one.sequence, row(one));
-    std::ranges::sort(rows);
-    std::string text = kHead;
-    for (const auto& [sequence, line] : rows) text += line;
-    return text;
-}
-
 HttpResponse pcapng_response(std::string body, const std::string& file_name) {
     HttpResponse response;
     response.content_type = "application/x-pcapng";
@@ -377,23 +279,6 @@ Parsed<TracePage> page_of(const HttpRequest& request, const bus::LineView& bus) 
     return trace_since(bus, *number, *most);
 }
 
-bool wants_text(const HttpRequest& request) {
-    const auto accept = request.headers.find("accept");
-    return accept != request.headers.end() && prefers(accept->second, "text/plain");
-}
-
-HttpResponse text_response(std::string body) {
-    HttpResponse response;
-    response.content_type = "text/plain; charset=utf-8";
-    response.body = std::move(body);
-    return response;
-}
-
-HttpResponse varied(HttpResponse response) {
-    response.headers.emplace_back("Vary", "Accept");
-    return response;
-}
-
 }  // namespace
 
 Handling get_trace(HttpRequest request, const Api* api) {
@@ -402,12 +287,11 @@ Handling get_trace(HttpRequest request, const Api* api) {
     auto page = page_of(request, *(*line)->bus);
     if (!page) co_return to_response(page.error());
     Sight(*api->directory, request.caller->who()).mask(**line, page->part);
-    if (wants_text(request)) co_return varied(text_response(trace_text(page->part)));
     LongAnswer body;
     boost::asio::awaitable<void> all = add_part(&body, &page->part);
     co_await std::move(all);
     body.member("next", page->next);
-    co_return varied(body.response());
+    co_return body.response();
 }
 
 namespace {

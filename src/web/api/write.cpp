@@ -48,7 +48,7 @@ HttpResponse refused(const HttpRequest& request, const Problem& why) {
 Handling carry_out(HttpRequest request, Parsed<Writing> writing, const Api* api) {
     if (!writing) co_return refused(request, writing.error());
     const Duration deadline = api->directory->line_of(writing->station).deadline;
-    const Patience patience(request, deadline, api->providers.now);
+    const Patience patience(deadline, api->providers.now);
     boost::asio::awaitable<Parsed<json::object>> writes =
         write(request.caller, &*writing, patience);
     const Parsed<json::object> result = co_await std::move(writes);
@@ -181,7 +181,7 @@ Handling post_write(HttpRequest request, const Api* api) {
     std::vector<boost::asio::awaitable<void>> lines;
     for (auto& [name, entries] : by_line(*writes, line_of)) {
         const Duration deadline = api->directory->find_line(name)->deadline;
-        const Patience patience(request, deadline, api->providers.now);
+        const Patience patience(deadline, api->providers.now);
         lines.push_back(write_line(request.caller, std::move(entries), patience));
     }
     boost::asio::awaitable<void> all = gather(std::move(lines));
@@ -279,7 +279,7 @@ Handling post_broadcast(HttpRequest request, const Api* api) {
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
     const auto written = Verification::of(made.request);
-    const Patience patience(request, (*line)->deadline, api->providers.now);
+    const Patience patience((*line)->deadline, api->providers.now);
     made.within = patience.left();
     const bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));
     if (!*verify || answer.refusal || !answer.pdu) co_return broadcast_answer(answer);

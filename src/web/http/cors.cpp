@@ -30,7 +30,7 @@ void share_with(const std::string& origin, bool preflight, HttpResponse& respons
     }
     headers.emplace_back("Access-Control-Allow-Methods", "GET, HEAD");
     headers.emplace_back("Access-Control-Allow-Headers",
-                         "Authorization, If-None-Match, Last-Event-ID, Prefer");
+                         "Authorization, If-None-Match, Last-Event-ID");
     headers.emplace_back("Access-Control-Max-Age", "600");  // seconds
 }
 

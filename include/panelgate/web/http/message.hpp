@@ -111,8 +111,7 @@ inline constexpr const char* kHeadersRead[] = {
     "authorization",  "origin",         "content-type",    "content-encoding", "sec-fetch-site",
     "sec-fetch-mode", "sec-fetch-dest", "idempotency-key", "last-event-id"};
 /// … and list headers: repeated fields are joined (RFC 9110 5.3).
-inline constexpr const char* kListsRead[] = {"accept", "accept-encoding", "if-none-match",
-                                             "prefer"};
+inline constexpr const char* kListsRead[] = {"accept", "accept-encoding", "if-none-match"};
 
 /// A body shared by several responses, in memory once.
 using SharedText = std::shared_ptr<const std::string>;

@@ -117,23 +117,6 @@ TEST_F(ApiRead, P3IsAnsweredWithinTheLinesDeadlineHoweverManyTransactionsItTakes
     EXPECT_EQ(bus.requests[2].within, 100ms);
 }
 
-TEST_F(ApiRead, P3WaitsNoLongerThanItsClient) {
-    const auto within = [&](const std::string& prefer) {
-        ask("GET", "/api/v1/stations/press/coils/0", "", "Prefer: " + prefer + "\r\n");
-        return bus.requests.back().within;
-    };
-    for (const char* second :
-         {"wait=1", "respond-async, wait=1;x=y", "handling=strict , wait = 1 ; foo=\"bar\"",
-          "respond-async\r\nPrefer: wait=\"1\""})
-        EXPECT_EQ(within(second), 1s) << second;
-    for (const char* none : {"wait=10", "wait=4000000000", "wait=soon", "wait=-1", "wait",
-                             "waiting=1", "respond-async"})
-        EXPECT_EQ(within(none), 2s) << none;
-    EXPECT_EQ(within("wait=0"), 0s);
-    EXPECT_EQ(wait_of("wait=4000000000"), 24h);
-    EXPECT_EQ(wait_of("wait"), std::nullopt);
-}
-
 TEST_F(ApiRead, UsesTheFunctionThatThePanelHas) {
     panel.areas[3].also = {modbus::Table::discrete_inputs, modbus::Table::holding_registers};
     EXPECT_EQ(devices("GDT7").at("table"), "holding-registers");

@@ -155,15 +155,6 @@ TEST_F(ApiManners, WhatIsLongerThanAPacketIsPackedForWhoeverTakesIt) {
     EXPECT_EQ(small.header("Content-Encoding"), "");
 }
 
-TEST_F(ApiManners, APreferenceThatWasHeededIsSaid) {
-    const auto applied = [&](const char* path, const char* headers) {
-        return ask("GET", path, "", headers).header("Preference-Applied");
-    };
-    EXPECT_EQ(applied("/api/v1/stations/press/coils/1", "Prefer: wait=1\r\n"), "wait=1");
-    EXPECT_EQ(applied("/api/v1/stations", "Prefer: wait=1\r\n"), "");
-    EXPECT_EQ(applied("/api/v1/stations/press/coils/1", ""), "");
-}
-
 TEST_F(ApiManners, EveryPathTellsWhatItUnderstandsAndNothingToOtherSites) {
     struct Row {
         const char* method;
