@@ -21,7 +21,6 @@
 #include "panelgate/web/http/query.hpp"
 #include "pcapng.hpp"
 #include "routes.hpp"
-#include "sight.hpp"
 #include "station_path.hpp"
 
 namespace panelgate::web {
@@ -113,14 +112,6 @@ namespace asio = boost::asio;
 namespace json = boost::json;
 namespace {
 
-std::string_view note_of(const bus::TraceFrame& frame) {
-    return frame.hidden ? kHidden : label(frame.kind);
-}
-
-std::string_view outcome_of(const bus::TraceTransaction& transaction) {
-    return transaction.hidden ? kHidden : label(transaction.end);
-}
-
 double seconds(TimePoint at) { return to_seconds(at.time_since_epoch()); }
 
 json::value seconds(const std::optional<TimePoint>& at) {
@@ -160,7 +151,7 @@ json::object trace_json(const bus::TraceFrame& frame) {
     object["station"] = nullptr;
     if (!frame.bytes.empty()) object["station"] = frame.bytes.front();
     object["bytes"] = upper_hex(frame.bytes);
-    object["note"] = note_of(frame);
+    object["note"] = label(frame.kind);
     if (!frame.why.empty()) object["why"] = frame.why;
     if (frame.transaction != 0) object["transaction"] = frame.transaction;
     return object;
@@ -185,7 +176,7 @@ json::object trace_json(const bus::TraceTransaction& transaction) {
     object["reason"] = transaction.reason;
     object["client"] = nullptr;
     if (!transaction.client.empty()) object["client"] = transaction.client;
-    object["outcome"] = outcome_of(transaction);
+    object["outcome"] = label(transaction.end);
     object["arrived"] = seconds(transaction.arrived);
     object["granted"] = seconds(transaction.granted);
     object["first_bit_out"] = seconds(transaction.first_bit_out);
@@ -267,7 +258,7 @@ std::string_view mark_of(FrameKind kind) {
 std::string row(const bus::TraceTransaction& one) {
     std::string text = rfc3339(one.time) + ' ' + right(std::to_string(one.id), 8) + ' ' +
                        right(std::to_string(one.station), 7) + ' ' + left(one.reason, 11) + ' ' +
-                       left(std::string(outcome_of(one)), 9);
+                       left(std::string(label(one.end)), 9);
     const std::optional<TimePoint> end = one.answered       ? one.answered
                                          : one.last_byte_in ? one.last_byte_in
                                                             : one.last_bit_out;
@@ -280,7 +271,7 @@ std::string row(const bus::TraceTransaction& one) {
     text += frame_row(">", one.request, "");
     if (!one.reply.empty()) text += frame_row("<", one.reply, "");
     for (const bus::TraceFrame& frame : one.discarded)
-        text += frame_row("x", frame.bytes, note_of(frame));
+        text += frame_row("x", frame.bytes, label(frame.kind));
     return text;
 }
 
@@ -291,7 +282,7 @@ std::string row(const bus::TraceDecision& one) {
 /// A row for a frame whose transaction is not in the part.
 std::string row(const bus::TraceFrame& one) {
     return rfc3339(one.time) + "    " + std::string(mark_of(one.kind)) + ' ' +
-           upper_hex(one.bytes) + "  " + std::string(note_of(one)) + '\n';
+           upper_hex(one.bytes) + "  " + std::string(label(one.kind)) + '\n';
 }
 
 }  // namespace
@@ -322,18 +313,6 @@ HttpResponse pcapng_response(std::string body, const std::string& file_name) {
     return response;
 }
 
-namespace {
-
-/// A capture has no place for a frame without bytes.
-void mask_capture(const Sight& sight, const LineEntry& line, bus::TracePart& part) {
-    sight.mask(line, part);
-    std::erase_if(part.frames, [](const bus::TraceFrame& frame) { return frame.bytes.empty(); });
-    std::erase_if(part.transactions,
-                  [](const bus::TraceTransaction& one) { return one.request.empty(); });
-}
-
-}  // namespace
-
 /// The whole trace at the time of the request, without entries that come later.
 Handling get_trace_pcapng(HttpRequest request, const Api* api) {
     constexpr std::size_t kOfATurn = 64;  // entries: about 0.1 ms of work
@@ -348,7 +327,6 @@ Handling get_trace_pcapng(HttpRequest request, const Api* api) {
         TracePage page = trace_since(*bus, since, kOfATurn);
         if (page.next <= since) break;
         since = page.next;
-        mask_capture(Sight(*api->directory, request.caller->who()), **line, page.part);
         file.add(page.part);
         body += file.take();
         boost::asio::awaitable<void> turn = yield_turn();
@@ -401,7 +379,6 @@ Handling get_trace(HttpRequest request, const Api* api) {
     if (!line) co_return to_response(line.error());
     auto page = page_of(request, *(*line)->bus);
     if (!page) co_return to_response(page.error());
-    Sight(*api->directory, request.caller->who()).mask(**line, page->part);
     if (wants_text(request)) co_return varied(text_response(trace_text(page->part)));
     LongAnswer body;
     boost::asio::awaitable<void> all = add_part(&body, &page->part);
@@ -435,12 +412,8 @@ Handling get_incidents(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     json::array list;
-    std::vector<bus::IncidentHead> incidents = (*line)->bus->incidents();
-    const Sight sight(*api->directory, request.caller->who());
-    for (bus::IncidentHead& head : incidents) {
-        sight.mask(**line, head);
+    for (const bus::IncidentHead& head : (*line)->bus->incidents())
         list.push_back(trace_json(head));
-    }
     co_return json_response(200, json::object{{"incidents", std::move(list)}});
 }
 
@@ -449,22 +422,17 @@ Handling get_incident(HttpRequest request, const Api* api) {
     if (!line) co_return to_response(line.error());
     const std::string name = (*line)->name;
     const auto wanted = wanted_of(request.arguments[1]);
-    const Sight sight(*api->directory, request.caller->who());
-    const bool sees_all = sight.whole(**line);
-    auto found = wanted ? (*line)->bus->incident(wanted->id, sees_all) : std::nullopt;
+    const auto found = wanted ? (*line)->bus->incident(wanted->id) : std::nullopt;
     if (!found)
         co_return to_response(
             problem(404, "line '" + name + "' keeps no incident '" + request.arguments[1] + "'"));
-    sight.mask(**line, found->head);
     if (wanted->capture) {
-        mask_capture(sight, **line, found->part);
         TracePcapng file(api->providers.version, name);
         file.add(found->part);
         std::string body = file.take();
         body += file.finish();
         co_return pcapng_response(std::move(body), name + '-' + request.arguments[1]);
     }
-    sight.mask(**line, found->part);
     LongAnswer body;
     for (const auto& [member, value] : trace_json(found->head)) body.member(member, value);
     boost::asio::awaitable<void> all = add_part(&body, &found->part);
