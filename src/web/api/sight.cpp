@@ -1,6 +1,7 @@
 #include "sight.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -19,16 +20,6 @@ using modbus::Span;
 
 /// Stands for stations that nobody has listed.
 constexpr std::uint8_t kUnlisted = 0;
-constexpr std::string_view kRelay = "relay ";
-
-/// The name of a relay tells which other station it writes to.
-void hide_relay(std::string& text) {
-    const auto at = text.find(kRelay);
-    if (at == text.npos) return;
-    const auto behind = text.find(" to station ", at);
-    text.erase(at + kRelay.size() - 1,
-               behind == text.npos ? behind : behind - at - kRelay.size() + 1);
-}
 
 /// What hides something of the station.
 access::Verdict hiding(const LineEntry& line, const WhoRef& who, std::uint8_t id) {
@@ -160,45 +151,14 @@ bool Sight::event(const EventTopic& topic) const {
     return topic.type == "line" ? line(*on) : whole(*on);
 }
 
-void Sight::mask(const LineEntry& line, bus::TracePart& part) const {
-    if (whole(line)) return;
-    for (bus::TraceFrame& frame : part.frames) {
-        const bool may_be_anybodys = direction_of(frame.kind) == FrameDirection::discarded;
-        if (!may_be_anybodys && !frame.bytes.empty() && frame.bytes.front() != 0 &&
-            whole(line, frame.bytes.front())) {
-            hide_relay(frame.why);
-            continue;
-        }
-        frame.bytes.clear();
-        frame.why.clear();
-        frame.hidden = true;
-    }
-    // Whether a hidden request was answered is hidden, too.
-    std::erase_if(part.frames, [](const bus::TraceFrame& frame) {
-        return frame.hidden && direction_of(frame.kind) == FrameDirection::received;
-    });
-    for (bus::TraceDecision& decision : part.decisions) decision.text = kHidden;
-    for (bus::TraceTransaction& one : part.transactions) {
-        std::erase_if(one.discarded, [](const auto&) { return true; });
-        hide_relay(one.client);
-        if (one.station != 0 && whole(line, one.station)) continue;
-        one.request.clear();
-        one.reply.clear();
-        one.client.clear();
-        one.reason = kHidden;
-        one.hidden = true;
-        one.first_byte_in = one.last_byte_in = one.answered = std::nullopt;
-        if (!station(line, one.station)) one.station = 0;
-    }
-}
-
-void Sight::mask(const LineEntry& line, bus::IncidentHead& incident) const {
-    if (!incident.station || station(line, *incident.station)) return;
-    incident.station.reset();
-    incident.cause = kHidden;
-}
-
 namespace {
+
+/// True for what tells of all stations of a line at once, and for a search among them.
+bool is_about_all_stations(const std::vector<std::string>& path) {
+    constexpr std::string_view kParts[] = {"trace", "trace.pcapng", "incidents", "history",
+                                           "discover"};
+    return path.size() > 4 && std::ranges::find(kParts, path[4]) != std::end(kParts);
+}
 
 /// /api/v1/lines/{line}/...
 std::optional<Problem> check_line(const HttpRequest& request, const Directory& directory,
@@ -207,7 +167,8 @@ std::optional<Problem> check_line(const HttpRequest& request, const Directory& d
     const bool discovers = request.path.size() > 4 && request.path[4] == "discover";
     if (line == nullptr || (request.method == "POST" && !discovers)) return std::nullopt;
     const Sight sight(directory, discovers ? as_reader(request, Right::discover) : who);
-    if (discovers ? sight.whole(*line) : sight.line(*line)) return std::nullopt;
+    const bool seen = is_about_all_stations(request.path) ? sight.whole(*line) : sight.line(*line);
+    if (seen) return std::nullopt;
     const auto hidden = std::ranges::find_if(directory.stations, [&](const StationEntry& one) {
         return one.line == line->name && !sight.whole(*line, one.id);
     });

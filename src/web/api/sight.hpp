@@ -9,7 +9,6 @@
 
 #include "panelgate/access/line_rules.hpp"
 #include "panelgate/base/who.hpp"
-#include "panelgate/bus/trace.hpp"
 #include "panelgate/points/point.hpp"
 #include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/http/event_hub.hpp"
@@ -17,9 +16,6 @@
 #include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::web {
-
-/// What stands in place of what may not be seen.
-inline constexpr std::string_view kHidden = "hidden";
 
 /// What a client may see of the plant: what the rules of `access` let it read. What is asked of a
 /// panel is judged by its bus; this is for what the gateway knows itself. The directory must
@@ -33,7 +29,8 @@ class Sight {
     bool everything() const;
     /// True if some station of the line may be read, or it has none.
     bool line(const LineEntry& line) const;
-    /// True if every item of every station may be read.
+    /// True if every item of every station may be read: what tells of all stations of the line may
+    /// be shown, as its trace, incidents, history and clients.
     bool whole(const LineEntry& line) const;
     /// True if some item may be read.
     bool station(const LineEntry& line, std::uint8_t id) const;
@@ -47,10 +44,6 @@ class Sight {
     bool event(const EventTopic& topic) const;
     /// By the names of a metric's labels; an empty one is absent.
     bool named(std::string_view line, std::string_view station, std::string_view point) const;
-
-    /// Takes out of a trace what may not be seen: that something was there stays.
-    void mask(const LineEntry& line, bus::TracePart& part) const;
-    void mask(const LineEntry& line, bus::IncidentHead& incident) const;
 
   private:
     bool reads() const;

@@ -142,20 +142,14 @@ json::object describe(const points::HistorySample& sample, const points::Point& 
     return object;
 }
 
-/// `whole`: its reader may know how those fared who asked any of its stations.
-json::object describe(const bus::LineSample& sample, const WallClock& wall, bool whole) {
+json::object describe(const bus::LineSample& sample, const WallClock& wall) {
     json::object object;
     object["time"] = wall.text(sample.at);
     object["load_percent"] = rounded(sample.load_percent);
     object["requests"] = sample.requests;
-    object["errors"] = nullptr;
-    object["latency_ms"] = nullptr;
-    object["wire_ms"] = nullptr;
-    if (whole) {
-        object["errors"] = sample.errors;
-        object["latency_ms"] = rounded(sample.latency_ms);
-        object["wire_ms"] = rounded(sample.wire_ms);
-    }
+    object["errors"] = sample.errors;
+    object["latency_ms"] = rounded(sample.latency_ms);
+    object["wire_ms"] = rounded(sample.wire_ms);
     object["queue_depth"] = sample.queue_depth;
     return object;
 }
@@ -206,10 +200,9 @@ Handling get_line_history(HttpRequest request, const Api* api) {
     if (history == nullptr)
         co_return to_response(problem(404, "no history is kept of '" + (*line)->name + '\''));
     const WallClock wall = wall_of(*api);
-    const bool whole = Sight(*api->directory, request.caller->who()).whole(**line);
-    Table table = table_of(
-        history->samples(wall.now), kLineColumns,
-        [wall, whole](const bus::LineSample& sample) { return describe(sample, wall, whole); });
+    Table table =
+        table_of(history->samples(wall.now), kLineColumns,
+                 [wall](const bus::LineSample& sample) { return describe(sample, wall); });
     table.members["line"] = (*line)->name;
     table.members["every_ms"] = whole_ms(history->width());
     Handling answering = table_answer(std::move(request), std::move(table));

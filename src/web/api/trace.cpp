@@ -18,7 +18,6 @@
 #include "panelgate/web/http/query.hpp"
 #include "pcapng.hpp"
 #include "routes.hpp"
-#include "sight.hpp"
 #include "station_path.hpp"
 
 namespace panelgate::web {
@@ -106,14 +105,6 @@ namespace asio = boost::asio;
 namespace json = boost::json;
 namespace {
 
-std::string_view note_of(const bus::TraceFrame& frame) {
-    return frame.hidden ? kHidden : label(frame.kind);
-}
-
-std::string_view outcome_of(const bus::TraceTransaction& transaction) {
-    return transaction.hidden ? kHidden : label(transaction.end);
-}
-
 double seconds(TimePoint at) { return to_seconds(at.time_since_epoch()); }
 
 json::value seconds(const std::optional<TimePoint>& at) {
@@ -153,7 +144,7 @@ json::object trace_json(const bus::TraceFrame& frame) {
     object["station"] = nullptr;
     if (!frame.bytes.empty()) object["station"] = frame.bytes.front();
     object["bytes"] = upper_hex(frame.bytes);
-    object["note"] = note_of(frame);
+    object["note"] = label(frame.kind);
     if (!frame.why.empty()) object["why"] = frame.why;
     if (frame.transaction != 0) object["transaction"] = frame.transaction;
     return object;
@@ -178,7 +169,7 @@ json::object trace_json(const bus::TraceTransaction& transaction) {
     object["reason"] = transaction.reason;
     object["client"] = nullptr;
     if (!transaction.client.empty()) object["client"] = transaction.client;
-    object["outcome"] = outcome_of(transaction);
+    object["outcome"] = label(transaction.end);
     object["arrived"] = seconds(transaction.arrived);
     object["granted"] = seconds(transaction.granted);
     object["first_bit_out"] = seconds(transaction.first_bit_out);
@@ -224,18 +215,6 @@ HttpResponse pcapng_response(std::string body, const std::string& file_name) {
     return response;
 }
 
-namespace {
-
-/// A capture has no place for a frame without bytes.
-void mask_capture(const Sight& sight, const LineEntry& line, bus::TracePart& part) {
-    sight.mask(line, part);
-    std::erase_if(part.frames, [](const bus::TraceFrame& frame) { return frame.bytes.empty(); });
-    std::erase_if(part.transactions,
-                  [](const bus::TraceTransaction& one) { return one.request.empty(); });
-}
-
-}  // namespace
-
 /// The whole trace at the time of the request, without entries that come later.
 Handling get_trace_pcapng(HttpRequest request, const Api* api) {
     constexpr std::size_t kOfATurn = 64;  // entries: about 0.1 ms of work
@@ -250,7 +229,6 @@ Handling get_trace_pcapng(HttpRequest request, const Api* api) {
         TracePage page = trace_since(*bus, since, kOfATurn);
         if (page.next <= since) break;
         since = page.next;
-        mask_capture(Sight(*api->directory, request.caller->who()), **line, page.part);
         file.add(page.part);
         body += file.take();
         boost::asio::awaitable<void> turn = yield_turn();
@@ -286,7 +264,6 @@ Handling get_trace(HttpRequest request, const Api* api) {
     if (!line) co_return to_response(line.error());
     auto page = page_of(request, *(*line)->bus);
     if (!page) co_return to_response(page.error());
-    Sight(*api->directory, request.caller->who()).mask(**line, page->part);
     LongAnswer body;
     boost::asio::awaitable<void> all = add_part(&body, &page->part);
     co_await std::move(all);
@@ -319,12 +296,8 @@ Handling get_incidents(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     json::array list;
-    std::vector<bus::IncidentHead> incidents = (*line)->bus->incidents();
-    const Sight sight(*api->directory, request.caller->who());
-    for (bus::IncidentHead& head : incidents) {
-        sight.mask(**line, head);
+    for (const bus::IncidentHead& head : (*line)->bus->incidents())
         list.push_back(trace_json(head));
-    }
     co_return json_response(200, json::object{{"incidents", std::move(list)}});
 }
 
@@ -333,22 +306,17 @@ Handling get_incident(HttpRequest request, const Api* api) {
     if (!line) co_return to_response(line.error());
     const std::string name = (*line)->name;
     const auto wanted = wanted_of(request.arguments[1]);
-    const Sight sight(*api->directory, request.caller->who());
-    const bool sees_all = sight.whole(**line);
-    auto found = wanted ? (*line)->bus->incident(wanted->id, sees_all) : std::nullopt;
+    const auto found = wanted ? (*line)->bus->incident(wanted->id) : std::nullopt;
     if (!found)
         co_return to_response(
             problem(404, "line '" + name + "' keeps no incident '" + request.arguments[1] + "'"));
-    sight.mask(**line, found->head);
     if (wanted->capture) {
-        mask_capture(sight, **line, found->part);
         TracePcapng file(api->providers.version, name);
         file.add(found->part);
         std::string body = file.take();
         body += file.finish();
         co_return pcapng_response(std::move(body), name + '-' + request.arguments[1]);
     }
-    sight.mask(**line, found->part);
     LongAnswer body;
     for (const auto& [member, value] : trace_json(found->head)) body.member(member, value);
     boost::asio::awaitable<void> all = add_part(&body, &found->part);
