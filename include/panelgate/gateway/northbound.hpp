@@ -17,7 +17,7 @@
 #include "panelgate/mqtt/publisher.hpp"
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/rt/clock.hpp"
-#include "panelgate/web/api/point_order.hpp"
+#include "panelgate/web/api/render.hpp"
 
 namespace panelgate::gateway {
 

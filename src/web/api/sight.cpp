@@ -1,15 +1,10 @@
 #include "sight.hpp"
 
 #include <algorithm>
-#include <iterator>
-#include <utility>
-#include <vector>
 
+#include "panelgate/base/text.hpp"
 #include "panelgate/base/words.hpp"
-#include "panelgate/modbus/function.hpp"
-#include "panelgate/points/station_points.hpp"
-#include "panelgate/web/http/query.hpp"
-#include "station_path.hpp"
+#include "panelgate/web/api/render.hpp"
 
 namespace panelgate::web {
 
@@ -40,8 +35,7 @@ Problem denied(const LineEntry& line, const WhoRef& who, std::uint8_t id,
     return problem_of(bus::denial(verdict, station));
 }
 
-/// Who changes something by a right that is not reading, where that right is enough for what it
-/// names: as far as rules let him see it.
+/// The client, who may read as well if its own role has this right: as far as rules allow it.
 WhoRef as_reader(const HttpRequest& request, Right right) {
     const WhoRef& who = request.caller->who();
     if (!who->standing.own || !who->standing.may(right)) return who;
@@ -153,62 +147,38 @@ bool Sight::event(const EventTopic& topic) const {
 
 namespace {
 
-/// True for what tells of all stations of a line at once, and for a search among them.
-bool is_about_all_stations(const std::vector<std::string>& path) {
-    constexpr std::string_view kParts[] = {"trace", "trace.pcapng", "incidents", "history",
-                                           "discover"};
-    return path.size() > 4 && std::ranges::find(kParts, path[4]) != std::end(kParts);
-}
-
-/// /api/v1/lines/{line}/...
-std::optional<Problem> check_line(const HttpRequest& request, const Directory& directory,
-                                  const WhoRef& who) {
-    const LineEntry* line = directory.find_line(request.path[3]);
-    const bool discovers = request.path.size() > 4 && request.path[4] == "discover";
-    if (line == nullptr || (request.method == "POST" && !discovers)) return std::nullopt;
-    const Sight sight(directory, discovers ? as_reader(request, Right::discover) : who);
-    const bool seen = is_about_all_stations(request.path) ? sight.whole(*line) : sight.line(*line);
-    if (seen) return std::nullopt;
+std::optional<Problem> check_line(const LineEntry& line, const Directory& directory,
+                                  const Sight& sight, bool whole) {
+    if (whole ? sight.whole(line) : sight.line(line)) return std::nullopt;
     const auto hidden = std::ranges::find_if(directory.stations, [&](const StationEntry& one) {
-        return one.line == line->name && !sight.whole(*line, one.id);
+        return one.line == line.name && !sight.whole(line, one.id);
     });
     const bool none = hidden == directory.stations.end();
-    return denied(*line, sight.who(), none ? kUnlisted : hidden->id, "");
-}
-
-/// What the gateway knows of a station; what is asked of the panel is judged by its bus.
-std::optional<Problem> check_station(const HttpRequest& request, const Directory& directory,
-                                     const Sight& sight) {
-    const auto station = directory.find_station(request.path[3]);
-    if (!station) return std::nullopt;
-    const LineEntry* on = directory.find_line(station->line);
-    if (on == nullptr) return std::nullopt;
-    const LineEntry& line = *on;
-    const bool is_plan = request.path.size() == 7;
-    const bool has_points = request.path.size() > 4 && request.path[4] == "points";
-    if (request.path.size() > 5 && !is_plan && !has_points) return std::nullopt;
-    bool seen = sight.station(line, station->id);
-    if (has_points && request.path.size() > 5 && station->points != nullptr) {
-        const points::Point* const point = station->points->find(request.path[5]);
-        if (point != nullptr) seen = sight.point(*station, *point);
-    }
-    if (seen) return std::nullopt;
-    return denied(line, sight.who(), station->id, station->name);
+    return denied(line, sight.who(), none ? kUnlisted : hidden->id, "");
 }
 
 }  // namespace
 
-std::optional<Problem> check_sight(const HttpRequest& request, const Directory& directory) {
-    const auto& path = request.path;
-    if (path.size() < 4 || path[0] != "api" || !request.caller) return std::nullopt;
-    if (path[2] == "lines") return check_line(request, directory, request.caller->who());
-    if (path[2] == "simulator")
-        return check_station(request, directory,
-                             Sight(directory, as_reader(request, Right::simulator)));
-    const bool reads = request.method == "GET" || request.method == "HEAD";
-    if (path[2] == "stations" && reads)
-        return check_station(request, directory, Sight(directory, request.caller->who()));
-    return std::nullopt;
+std::optional<Problem> check_sight(const HttpRequest& request, const Directory& directory,
+                                   Shown shown, Right right) {
+    if (shown == Shown::nothing) return std::nullopt;
+    const Sight sight(directory, as_reader(request, right));
+    const std::string& name = request.arguments[0];
+    if (shown == Shown::line || shown == Shown::whole_line) {
+        const LineEntry* line = directory.find_line(name);
+        if (line == nullptr) return std::nullopt;
+        return check_line(*line, directory, sight, shown == Shown::whole_line);
+    }
+    const auto station = directory.find_station(name);
+    const LineEntry* line = station ? directory.find_line(station->line) : nullptr;
+    if (line == nullptr) return std::nullopt;
+    const points::Point* const point = shown == Shown::point && station->points != nullptr
+                                           ? station->points->find(request.arguments[1])
+                                           : nullptr;
+    const bool seen =
+        point != nullptr ? sight.point(*station, *point) : sight.station(*line, station->id);
+    if (seen) return std::nullopt;
+    return denied(*line, sight.who(), station->id, station->name);
 }
 
 std::optional<Problem> instead_of_telling(std::string_view station, std::string_view point,

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "panelgate/web/http/query.hpp"
+#include "panelgate/base/text.hpp"
 
 namespace panelgate::web {
 namespace {

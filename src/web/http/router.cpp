@@ -20,7 +20,6 @@
 #include "panelgate/rt/log.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/problem.hpp"
-#include "panelgate/web/http/query.hpp"
 
 namespace panelgate::web {
 
