@@ -43,7 +43,7 @@ void AuditBook::deed(const web::Deed& deed) {
     const bool is_told = std::exchange(refused_, nullptr) == deed.who && deed.who != nullptr;
     const bool discovers = deed.path.ends_with("/discover");
     const bool simulates = deed.path.find("/simulator/") != deed.path.npos;
-    if (deed.status == 401 && deed.shown_token) {
+    if ((deed.status == 401 || deed.status == 429) && deed.shown_token) {
         // Failed log-ins are counted by client alone, so that each client has a place of its own.
         if (is_repeat(
                 deed.who, "login", 1, [&] { return member("outcome", "log-in failed"); }, false))

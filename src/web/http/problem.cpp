@@ -30,6 +30,9 @@ constexpr ProblemKind kKinds[] = {
     {"unprocessable", "The request is understood, and cannot be done as it is.", 422},
     {"outside-limits", "The value is outside the limits of its point.", 0},
     {"too-many", "More items than one request may have.", 0},
+    {"too-many-requests",
+     "Too many wrong tokens came from this address; Retry-After tells when the minute is over.",
+     429},
     {"header-too-large", "The header is longer than the gateway takes.", 431},
     {"internal", "The gateway failed.", 500},
     {"bad-gateway", "What came from the panel is no answer.", 502},
@@ -75,6 +78,8 @@ std::string title_of(unsigned status) {
             return "Misdirected Request";
         case 422:
             return "Unprocessable Content";
+        case 429:
+            return "Too Many Requests";
         case 431:
             return "Request Header Fields Too Large";
         case 500:
