@@ -132,7 +132,8 @@ bool is_foreign_form(const HttpRequest& request) {
     return !header(request, "origin").empty() && !is_json(header(request, "content-type"));
 }
 
-/// Default roles have what the least one has that is needed; others have what they list.
+/// A default role has the rights of the least role that is needed; a role of the configuration has
+/// the rights that its list names.
 bool suffices(const Standing& standing, Role needed, Right right, std::optional<Right> or_right) {
     if (!standing.own) return standing.role >= needed;
     return standing.may(right) || (or_right && standing.may(*or_right));
@@ -357,7 +358,7 @@ void identify(HttpRequest& request, const Site& site) {
                              site.settings.name());
 }
 
-/// What an audit needs of a request that its handler takes away.
+/// Copies the parts of a request that an audit records, before the handler moves the request.
 class Witness {
   public:
     Witness(const HttpRequest& request, const Site& site)
