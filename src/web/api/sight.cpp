@@ -87,7 +87,7 @@ bool Sight::station(const StationEntry& one) const {
 }
 
 bool Sight::whole(const LineEntry& line, std::uint8_t id) const {
-    return !line.access || line.access->reads_all(who_, id);
+    return !line.access || line.access->may_all(who_, id, Act::read);
 }
 
 bool Sight::point(const StationEntry& station, const points::Point& point) const {

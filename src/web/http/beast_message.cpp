@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-#include "admission.hpp"
+#include "origin.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/text.hpp"
 

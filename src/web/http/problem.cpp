@@ -25,6 +25,7 @@ constexpr Status kStatuses[] = {
     {415, "Unsupported Media Type", "unsupported-media-type"},
     {421, "Misdirected Request", "misdirected"},
     {422, "Unprocessable Content", "unprocessable"},
+    {429, "Too Many Requests", "too-many-requests"},
     {431, "Request Header Fields Too Large", "header-too-large"},
     {500, "Internal Server Error", "internal"},
     {502, "Bad Gateway", "bad-gateway"},

@@ -160,8 +160,8 @@ TEST(Problem, IsFormattedAsInRfc9457) {
 }
 
 TEST(Problem, HasATitleAndATypeForEveryStatusThatIsUsed) {
-    for (const unsigned status : {400u, 401u, 403u, 404u, 405u, 409u, 413u, 415u, 421u, 422u, 431u,
-                                  500u, 502u, 503u, 504u}) {
+    for (const unsigned status : {400u, 401u, 403u, 404u, 405u, 409u, 413u, 415u, 421u, 422u, 429u,
+                                  431u, 500u, 502u, 503u, 504u}) {
         const json::object told = json_of(problem(status, ""));
         EXPECT_GT(told.at("type").as_string().size(), std::string("urn:panelgate:problem:").size());
         EXPECT_FALSE(told.at("title").as_string().empty()) << status;
