@@ -27,7 +27,7 @@ ELSEWHERE = {"write": ("", ["line", "station", "client", "certificate", "at", "p
 MEANINGS = {
     "audit anchor": "the audit has come to this record; `panelgate audit verify --log` compares it",
     "audit fails": "the audit's file takes nothing, and what happens to writes meanwhile",
-    "audit file": "a file was found that the audit cannot go on with, and is kept; it was moved away; or the run before did not end in order",
+    "audit file": "a file was found that the audit cannot go on with, and is kept; it was removed, moved away or changed by others; or the run before did not end in order",
     "audit records lost": "the run, or the audit, ended while its file took nothing: so many records were never written",
     "audit recovered": "the audit's file takes records again; what waited is written",
     "bytes behind its replies": "more bytes come after a panel's replies; the line waits for them",

@@ -1,8 +1,6 @@
 #include "panelgate/access/line_rules.hpp"
 
 #include <algorithm>
-#include <cstdlib>
-#include <utility>
 
 #include "ruling.hpp"
 
@@ -28,7 +26,7 @@ std::optional<Span> with_items(std::optional<Span> span) {
     return span;
 }
 
-/// Default roles are what doors want; what an own one lacks is refused wherever it comes in.
+/// Doors judge default roles; the rights of a role of the configuration are judged here.
 bool lacks(const WhoRef& who, Act act) {
     return who && who->standing.own && !who->standing.own->rights.has(right_of(act));
 }
@@ -159,14 +157,10 @@ Verdict LineRules::decide(const Meeting& meeting, Act act, std::uint8_t function
 bool LineRules::may_some(const WhoRef& who, std::uint8_t station, Act act) const {
     if (lacks(who, act)) return false;
     if (is_open() || is_trusted(who)) return true;
-    Meeting& meeting = meet(who, station);
-    if (act == Act::read && meeting.reads_some) return *meeting.reads_some;
-    const bool some = std::ranges::any_of(modbus::kTables, [&](modbus::Table table) {
-        return can_be(act, table) &&
-               meeting.ruling->allows_some(act, function_for(act, table), table);
+    const Ruling& ruling = *meet(who, station).ruling;
+    return std::ranges::any_of(modbus::kTables, [&](modbus::Table table) {
+        return can_be(act, table) && ruling.allows_some(act, function_for(act, table), table);
     });
-    if (act == Act::read) meeting.reads_some = some;
-    return some;
 }
 
 bool LineRules::may_read_some(const WhoRef& who) const {
@@ -175,22 +169,13 @@ bool LineRules::may_read_some(const WhoRef& who) const {
         listed_, [&](std::uint8_t station) { return may_some(who, station, Act::read); });
 }
 
-bool LineRules::reads_all(const WhoRef& who, std::uint8_t station) const {
-    if (lacks(who, Act::read)) return false;
-    if (is_open() || is_trusted(who)) return true;
-    Meeting& meeting = meet(who, station);
-    if (!meeting.reads_all) meeting.reads_all = may_all(who, station, Act::read);
-    return *meeting.reads_all;
-}
-
 bool LineRules::may_all(const WhoRef& who, std::uint8_t station, Act act) const {
     if (lacks(who, act)) return false;
     if (is_open() || is_trusted(who)) return true;
-    const Meeting& meeting = meet(who, station);
+    const Ruling& ruling = *meet(who, station).ruling;
     return std::ranges::all_of(modbus::kTables, [&](modbus::Table table) {
         const Span all{table, 0, modbus::kTableItems};
-        return !can_be(act, table) ||
-               meeting.ruling->decide(act, function_for(act, table), all).allowed;
+        return !can_be(act, table) || ruling.decide(act, function_for(act, table), all).allowed;
     });
 }
 
@@ -206,17 +191,16 @@ std::vector<std::string> LineRules::denying_names() const {
     return names;
 }
 
-LineRules::Meeting& LineRules::meet(const WhoRef& who, std::uint8_t station) const {
+const LineRules::Meeting& LineRules::meet(const WhoRef& who, std::uint8_t station) const {
     Meetings& known = meetings_[station];
-    if (const auto found = known.find(who.get()); found != known.end()) return *found->second;
+    if (const auto found = known.find(who.get()); found != known.end()) return found->second;
     if (met_ >= kMeetings) {
         for (Meetings& all : meetings_) all.clear();
         rulings_.clear();
         met_ = 0;
     }
     ++met_;
-    auto made = std::make_unique<Meeting>(Meeting{who, ruling_for(who, station)});
-    return *known.emplace(who.get(), std::move(made)).first->second;
+    return known.emplace(who.get(), Meeting{who, ruling_for(who, station)}).first->second;
 }
 
 /// Clients whom the same rules match share what these decide.
@@ -238,7 +222,7 @@ std::vector<RuleAtStation> LineRules::rules_for(const WhoRef& who, std::uint8_t 
         if (!rule.stations.empty() && !holds(rule.stations, place)) continue;
         const std::vector<Span>* items = nullptr;
         if (rule.has_range()) {
-            // A notation that this panel does not have names no item of it.
+            // A notation of another panel family names no item of this panel.
             const auto found = rule.items.find(place);
             items = found != rule.items.end() ? &found->second : &unlisted_items_[i];
         }

@@ -26,27 +26,19 @@ bool Ruling::allows(std::size_t rule) const {
 }
 
 Ruling::Decision Ruling::decide(Act act, std::uint8_t function, const modbus::Span& items) const {
-    Index& index = index_of(act, function, items.table);
-    if (items.first >= index.first && items.end() <= index.end) return index.decision;
-    const Pieces& pieces = index.pieces;
+    const Pieces& pieces = pieces_of(act, function, items.table);
     const auto behind = std::ranges::upper_bound(pieces, items.first, {}, &Piece::first);
     auto end = behind;  // the piece before it holds the first item
     while (end != pieces.end() && end->first < items.end()) ++end;
-    const Decision decision = decision_of({behind - 1, end});
-    if (end == behind) {
-        index.first = (behind - 1)->first;
-        index.end = end == pieces.end() ? modbus::kTableItems : end->first;
-        index.decision = decision;
-    }
-    return decision;
+    return decision_of({behind - 1, end});
 }
 
 Ruling::Decision Ruling::decide(Act act, std::uint8_t function) const {
-    return decision_of(index_of(act, function, std::nullopt).pieces);
+    return decision_of(pieces_of(act, function, std::nullopt));
 }
 
 bool Ruling::allows_some(Act act, std::uint8_t function, modbus::Table table) const {
-    return std::ranges::any_of(index_of(act, function, table).pieces, [&](const Piece& piece) {
+    return std::ranges::any_of(pieces_of(act, function, table), [&](const Piece& piece) {
         return piece.first < modbus::kTableItems && allows(piece.rule);
     });
 }
@@ -63,26 +55,22 @@ Ruling::Decision Ruling::decision_of(std::span<const Piece> pieces) const {
     return {allowed, rule < rules_.size() ? rules_[rule].rule : nullptr};
 }
 
-Ruling::Index& Ruling::index_of(Act act, std::uint8_t function,
-                                std::optional<modbus::Table> table) const {
+const Ruling::Pieces& Ruling::pieces_of(Act act, std::uint8_t function,
+                                        std::optional<modbus::Table> table) const {
     const std::uint32_t key = static_cast<std::uint32_t>(act) << 16U |
                               static_cast<std::uint32_t>(function) << 8U |
                               (table ? static_cast<std::uint32_t>(*table) : 0xFFU);
-    for (Index& known : index_)
-        if (known.key == key) return known;
-    Index made{.key = key};
-    made.pieces = table ? make_pieces(act, function, *table)
-                        : Pieces{{0, first_without_items(act, function)}};
-    return index_.emplace_back(std::move(made));
-}
-
-/// A rule about items says nothing of a function without items, unless it names it.
-std::size_t Ruling::first_without_items(Act act, std::uint8_t function) const {
+    const auto [known, is_new] = index_.try_emplace(key);
+    if (!is_new) return known->second;
+    // A rule about items says nothing of a function without items, unless it names it.
     const auto decides = [&](const RuleAtStation& applied) {
         const Rule& rule = *applied.rule;
         return is_about(rule, act, function) && (!rule.has_range() || is_named(rule, function));
     };
-    return static_cast<std::size_t>(std::ranges::find_if(rules_, decides) - rules_.begin());
+    const auto first = std::ranges::find_if(rules_, decides) - rules_.begin();
+    known->second =
+        table ? make_pieces(act, function, *table) : Pieces{{0, static_cast<std::size_t>(first)}};
+    return known->second;
 }
 
 Ruling::Pieces Ruling::make_pieces(Act act, std::uint8_t function, modbus::Table table) const {

@@ -2,9 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "panelgate/access/line_rules.hpp"
@@ -25,7 +25,7 @@ class Ruling {
 
     Ruling(std::vector<RuleAtStation> rules, bool allow_by_default);
 
-    /// Each item is decided by the first rule that matches it; one that is denied denies them all.
+    /// The first rule that matches an item decides the item; a denied item denies the whole act.
     Decision decide(Act act, std::uint8_t function, const modbus::Span& items) const;
     /// With a function that names no items.
     Decision decide(Act act, std::uint8_t function) const;
@@ -39,25 +39,16 @@ class Ruling {
         std::size_t rule = 0;
     };
     using Pieces = std::vector<Piece>;
-    /// What decides an act by a function. Most requests are about items of the piece before: what
-    /// is decided for them stands here, so that the pieces stay out of the caches.
-    struct Index {
-        std::uint32_t key = 0;    ///< act, function, table
-        std::uint32_t first = 1;  ///< of the piece that was asked for last; as yet none
-        std::uint32_t end = 0;
-        Decision decision{};
-        Pieces pieces{};
-    };
 
-    Index& index_of(Act act, std::uint8_t function, std::optional<modbus::Table> table) const;
+    const Pieces& pieces_of(Act act, std::uint8_t function,
+                            std::optional<modbus::Table> table) const;
     Pieces make_pieces(Act act, std::uint8_t function, modbus::Table table) const;
-    std::size_t first_without_items(Act act, std::uint8_t function) const;
     bool allows(std::size_t rule) const;
     Decision decision_of(std::span<const Piece> pieces) const;
 
     std::vector<RuleAtStation> rules_;
     bool allow_by_default_;
-    mutable std::vector<Index> index_;
+    mutable std::map<std::uint32_t, Pieces> index_;  ///< by act, function and table
 };
 
 }  // namespace panelgate::access

@@ -1,12 +1,8 @@
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <algorithm>
-#include <cstdlib>
+#include <array>
 #include <cstring>
-#include <optional>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "panelgate/access/line_rules.hpp"
 #include "panelgate/base/network.hpp"
@@ -80,31 +76,13 @@ bool is_about(const Rule& rule, const Who& who) {
 }
 
 Right right_of(Act act) {
-    switch (act) {
-        case Act::read:
-            return Right::read;
-        case Act::write:
-            return Right::write;
-        case Act::broadcast:
-            return Right::broadcast;
-        case Act::raw:
-            return Right::raw;
-    }
-    std::abort();
+    constexpr std::array kRights{Right::read, Right::write, Right::broadcast, Right::raw};
+    return kRights.at(static_cast<std::size_t>(act));
 }
 
 std::string_view label(Act act) {
-    switch (act) {
-        case Act::read:
-            return "read";
-        case Act::write:
-            return "write";
-        case Act::broadcast:
-            return "broadcast";
-        case Act::raw:
-            return "raw";
-    }
-    std::abort();
+    constexpr std::array<std::string_view, 4> kLabels{"read", "write", "broadcast", "raw"};
+    return kLabels.at(static_cast<std::size_t>(act));
 }
 
 }  // namespace panelgate::access

@@ -1,9 +1,8 @@
 #include "panelgate/audit/chain.hpp"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
-#include <utility>
+
+#include "panelgate/base/text.hpp"
 
 namespace panelgate::audit {
 
@@ -12,56 +11,33 @@ namespace {
 constexpr std::string_view kBegin = "{\"n\":";
 constexpr std::string_view kHash = ",\"hash\":\"";
 constexpr std::string_view kClose = "\"}";
-constexpr std::size_t kSealSize = kHash.size() + 64 + kClose.size();
-bool is_hex(char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); }
+constexpr std::size_t kHashDigits = 64;
+constexpr std::size_t kSealSize = kHash.size() + kHashDigits + kClose.size();
 
 }  // namespace
 
-Hash no_hash() {
-    Hash hash{};
-    hash.fill('0');
-    return hash;
-}
-
-std::optional<Hash> parse_hash(std::string_view text) {
-    Hash hash{};
-    if (text.size() != hash.size() || !std::ranges::all_of(text, is_hex)) return std::nullopt;
-    std::ranges::copy(text, hash.begin());
-    return hash;
-}
-
 void Chain::append(std::string& out, std::string_view body) {
     const std::size_t begin = out.size();
-    std::array<char, 20> digits{};
     ++last_.number;
-    const auto [end, wrong] =
-        std::to_chars(digits.data(), digits.data() + digits.size(), last_.number);
-    out += kBegin;
-    out.append(digits.data(), end);
-    out += ',';
-    out += body;
-    last_.hash = digest_.of(text_of(last_.hash), std::string_view(out).substr(begin));
-    out += kHash;
-    out += text_of(last_.hash);
-    out += kClose;
-    out += '\n';
+    out.append(kBegin).append(std::to_string(last_.number)).append(",").append(body);
+    last_.hash = text_of(digest_.of(last_.hash, std::string_view(out).substr(begin)));
+    out.append(kHash).append(last_.hash).append(kClose).append("\n");
 }
 
 std::optional<Sealed> parse_line(std::string_view line) {
-    if (!line.starts_with(kBegin) || line.size() < kBegin.size() + kSealSize) return std::nullopt;
-    const std::string_view seal = line.substr(line.size() - kSealSize);
-    if (!seal.starts_with(kHash) || !seal.ends_with(kClose)) return std::nullopt;
-    const auto hash = parse_hash(seal.substr(kHash.size(), 64));
+    if (line.size() < kBegin.size() + kSealSize || !line.starts_with(kBegin)) return std::nullopt;
     Sealed record;
     record.text = line.substr(0, line.size() - kSealSize);
+    const std::string_view seal = line.substr(record.text.size());
+    record.hash = seal.substr(kHash.size(), kHashDigits);
+    const bool is_sealed = seal.starts_with(kHash) && seal.ends_with(kClose) &&
+                           record.hash.find_first_not_of("0123456789abcdef") == line.npos;
     const std::string_view rest = record.text.substr(kBegin.size());
-    const auto [end, wrong] =
-        std::from_chars(rest.data(), rest.data() + rest.size(), record.number);
-    const auto used = static_cast<std::size_t>(end - rest.data());
-    const bool is_number = wrong == std::errc{} && record.number > 0 && rest.front() != '0';
-    if (!hash || !is_number || used >= rest.size() || rest[used] != ',') return std::nullopt;
-    record.body = rest.substr(used + 1);
-    record.hash = *hash;
+    const std::size_t comma = std::min(rest.find(','), rest.size());
+    record.number = to_number<std::uint64_t>(rest.substr(0, comma)).value_or(0);
+    const bool is_numbered = record.number > 0 && rest.front() != '0' && comma < rest.size();
+    if (!is_sealed || !is_numbered) return std::nullopt;
+    record.body = rest.substr(comma + 1);
     return record;
 }
 
@@ -73,11 +49,6 @@ std::string_view member_of(std::string_view body, std::string_view key) {
     const std::string_view rest = body.substr(at + sought.size());
     if (rest.starts_with('"')) return rest.substr(1, rest.find('"', 1) - 1);
     return rest.substr(0, rest.find(','));
-}
-
-std::optional<Hash> previous_in(const Sealed& record) {
-    if (member_of(record.body, "kind") != "file") return std::nullopt;
-    return parse_hash(member_of(record.body, "previous"));
 }
 
 Tail parse_tail(std::string_view end) {
@@ -92,7 +63,7 @@ Tail parse_tail(std::string_view end) {
         tail.continuable = false;
         return tail;
     }
-    tail.last = {record->number, record->hash};
+    tail.last = {record->number, std::string(record->hash)};
     tail.ended = member_of(record->body, "kind") == "end";
     return tail;
 }

@@ -342,8 +342,8 @@ TracePart Bus::trace_since(std::uint64_t sequence, std::size_t most) const {
 
 std::vector<IncidentHead> Bus::incidents() const { return state_->book.incidents().heads(); }
 
-std::optional<Incident> Bus::incident(std::uint64_t id, bool marks) {
-    return state_->book.incidents().fetch(id, marks);
+std::optional<Incident> Bus::incident(std::uint64_t id) {
+    return state_->book.incidents().fetch(id);
 }
 
 bool Bus::tells(const WhoRef& who, std::uint8_t station) const {

@@ -461,8 +461,8 @@ std::vector<IncidentHead> ListeningBus::incidents() const {
     return state_->book.incidents().heads();
 }
 
-std::optional<Incident> ListeningBus::incident(std::uint64_t id, bool marks) {
-    return state_->book.incidents().fetch(id, marks);
+std::optional<Incident> ListeningBus::incident(std::uint64_t id) {
+    return state_->book.incidents().fetch(id);
 }
 
 bool ListeningBus::tells(const WhoRef& who, std::uint8_t station) const {

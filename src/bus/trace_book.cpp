@@ -276,10 +276,10 @@ std::vector<IncidentHead> IncidentBook::heads() const {
     return heads;
 }
 
-std::optional<Incident> IncidentBook::fetch(std::uint64_t id, bool marks) {
+std::optional<Incident> IncidentBook::fetch(std::uint64_t id) {
     for (const auto& kept : kept_) {
         if (kept->head.id != id) continue;
-        kept->head.read = kept->head.read || marks;
+        kept->head.read = true;
         return Incident{kept->head, kept->store.part(SIZE_MAX)};
     }
     return std::nullopt;

@@ -153,8 +153,8 @@ class IncidentBook {
 
     /// The oldest first.
     std::vector<IncidentHead> heads() const;
-    /// Returns an incident; `marks` it as read.
-    std::optional<Incident> fetch(std::uint64_t id, bool marks);
+    /// Returns an incident and marks it as read.
+    std::optional<Incident> fetch(std::uint64_t id);
 
   private:
     struct Kept {

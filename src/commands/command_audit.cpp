@@ -26,18 +26,10 @@ namespace {
 
 using Files = std::vector<std::string>;
 
-ExitCode cannot_read(const std::string& file, const std::string& why) {
-    std::cerr << "panelgate: cannot read " << file << ": " << why << '\n';
+/// `what`: "FILE: why".
+ExitCode cannot_read(const std::string& what) {
+    std::cerr << "panelgate: cannot read " << what << '\n';
     return kNoInput;
-}
-
-std::string head_of(const std::string& file) {
-    std::string head;
-    audit::read_lines(file, [&](std::string_view line, bool) {
-        head = line;
-        return false;
-    });
-    return head;
 }
 
 /// Returns the named files, or all files of the chain that a named file belongs to.
@@ -76,7 +68,7 @@ std::optional<Named> named_by(const AuditOptions& options, ExitCode& code) {
     std::error_code unknown;
     for (const std::string& file : named.now()) {
         if (!std::filesystem::is_directory(file, unknown)) continue;
-        code = cannot_read(file, "it is a folder; name the files in it");
+        code = cannot_read(file + ": it is a folder; name the files in it");
         return std::nullopt;
     }
     return named;
@@ -92,7 +84,7 @@ std::optional<audit::Anchors> anchors_of(const Files& logs, ExitCode& code) {
         };
         const std::string why = audit::read_lines(log == "-" ? "/dev/stdin" : log, take);
         if (why.empty()) continue;
-        code = cannot_read(log, why);
+        code = cannot_read(log + ": " + why);
         return std::nullopt;
     }
     return anchors;
@@ -102,7 +94,7 @@ void print_good(const audit::Report& report, std::size_t files, bool has_log) {
     std::cout << "whole: " << report.records << (report.records == 1 ? " record" : " records")
               << " (" << report.first << " to " << report.last.number << ") in " << files
               << (files == 1 ? " file" : " files") << '\n'
-              << "last hash " << panelgate::text_of(report.last.hash) << '\n';
+              << "last hash " << report.last.hash << '\n';
     if (!report.chain.empty()) std::cout << "chain " << report.chain << '\n';
     if (has_log) {
         std::cout << report.anchored << " of them named by the log\n";
@@ -142,22 +134,6 @@ std::vector<std::pair<std::string, ino_t>> identities(const Files& files) {
     return all;
 }
 
-/// Returns the file that cannot be read, and why.
-std::optional<std::pair<std::string, std::string>> read_into(audit::Verifier& verifier,
-                                                             const Files& files) {
-    for (const std::string& file : files) {
-        verifier.begin_file(file);
-        bool wanted = true;
-        std::string why = audit::read_lines(file, [&](std::string_view line, bool whole) {
-            wanted = verifier.take(line, whole);
-            return wanted;
-        });
-        if (!why.empty()) return std::pair(file, std::move(why));
-        if (!wanted) break;
-    }
-    return std::nullopt;
-}
-
 }  // namespace
 
 ExitCode audit_verify(const AuditOptions& options) {
@@ -170,13 +146,12 @@ ExitCode audit_verify(const AuditOptions& options) {
     for (int tries = 1;; ++tries) {
         const Files files = named->now();
         const auto before = identities(files);
-        audit::Verifier verifier(*anchors, named->chain);
-        const auto unread = read_into(verifier, audit::in_order(files, head_of));
-        const audit::Report report = verifier.finish();
+        const audit::Report report = audit::verify(files, *anchors, named->chain);
         // A rotation meanwhile looks as if records were removed, or added.
         const bool has_rotated = before != identities(named->now());
-        if (has_rotated && (unread || report.fault) && tries < kTries) continue;
-        if (unread) return cannot_read(unread->first, unread->second);
+        const bool is_unread = !report.unread.empty();
+        if (has_rotated && (is_unread || report.fault) && tries < kTries) continue;
+        if (is_unread) return cannot_read(report.unread);
         return print_report(report, files.size(), !options.logs.empty());
     }
 }
@@ -206,7 +181,7 @@ std::optional<AuditFilter> filter_of(const AuditOptions& options) {
     AuditFilter filter;
     filter.kind = options.kind;
     filter.client = options.client;
-    const std::vector<std::string> kinds = audit::kind_labels();
+    const std::vector<std::string> kinds(audit::kKinds.begin(), audit::kKinds.end());
     if (!filter.kind.empty() && std::ranges::find(kinds, filter.kind) == kinds.end()) {
         std::cerr << "panelgate: audit: there is no kind '" << filter.kind << '\''
                   << suggestion(filter.kind, kinds) << '\n';
@@ -247,14 +222,16 @@ ExitCode audit_show(const AuditOptions& options) {
     std::string doubt;
     set_station(*filter, options.station, *named, doubt);
     bool any = false;
-    const Files files = named->now();
-    for (const std::string& file : audit::in_order(files, head_of)) {
+    Files files = named->now();
+    std::ranges::sort(files, {}, audit::first_record);
+    for (const std::string& file : files) {
         const std::string why = audit::read_lines(file, [&](std::string_view line, bool) {
             any = print_record(line, *filter, options.json) || any;
             return static_cast<bool>(std::cout);
         });
         // What a rotation drops meanwhile is no longer there to be shown.
-        if (!why.empty() && named->now() == files) return cannot_read(file, why);
+        if (!why.empty() && (named->chain.empty() || std::filesystem::exists(file)))
+            return cannot_read(file + ": " + why);
     }
     if (!any && !doubt.empty())
         std::cerr << "panelgate: audit: " << doubt << ", and no record names it\n";

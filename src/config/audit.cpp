@@ -36,7 +36,12 @@ std::string size_text(std::size_t bytes) {
     return std::to_string(bytes / unit.second) + std::string(unit.first);
 }
 
+/// Keys of former versions.
+constexpr std::array<yaml::Elsewhere, 1> kGone{
+    {{"syslog", {}, {}, "let the machine's syslog read the file, as imfile of rsyslog does"}}};
+
 bool read_size(Reader& in, audit::Settings& settings) {
+    in.elsewhere(kGone);
     const auto typed = in.text("rotate");
     if (!typed) return false;
     const auto bytes = parse_size(*typed);
@@ -78,9 +83,7 @@ const Keys<audit::Settings>& audit_keys() {
             .word("on_failure", &Settings::on_failure, kFailures,
                   "What happens while the disk takes nothing: continue, which may lose records, or "
                   "refuse_writes (exception 06).")
-            .weaker(By::leaving, "refuse_writes")
-            .boolean("syslog", &Settings::syslog,
-                     "Each record goes to the machine's syslog as well (/dev/log, RFC 5424).");
+            .weaker(By::leaving, "refuse_writes");
     return kKeys;
 }
 

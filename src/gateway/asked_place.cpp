@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "panelgate/audit/record.hpp"
 #include "panelgate/base/text.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/profile/notation.hpp"
@@ -117,13 +116,15 @@ AskedPlace asked_place(const Plant& plant, std::string_view path, std::string_vi
     return place;
 }
 
-std::string members_of(const AskedPlace& place) {
-    return audit::members_by([&](audit::Composer& record) {
-        record.text("line", place.line);
-        if (place.station != nullptr)
-            record.text("station", place.station->name).number("id", place.station->id);
-        record.text("at", place.at);
-    });
+audit::Members members_of(const AskedPlace& place) {
+    audit::Members members;
+    audit::add_text(members, "line", place.line);
+    if (place.station != nullptr) {
+        audit::add_text(members, "station", place.station->name);
+        members["id"] = place.station->id;
+    }
+    audit::add_text(members, "at", place.at);
+    return members;
 }
 
 }  // namespace panelgate::gateway

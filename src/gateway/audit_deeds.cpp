@@ -1,11 +1,12 @@
 // What an audit records of clients' deeds besides writes: refusals, log-ins, reloads, tokens.
 #include <algorithm>
+#include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
 #include <boost/json/parse.hpp>
 #include <boost/json/value.hpp>
-#include <span>
 #include <utility>
 
+#include "panelgate/base/text.hpp"
 #include "panelgate/gateway/asked_place.hpp"
 #include "panelgate/gateway/audit_book.hpp"
 #include "panelgate/gateway/northbound.hpp"
@@ -16,8 +17,8 @@ namespace panelgate::gateway {
 
 namespace {
 
-using audit::Kind;
-using audit::member;
+using audit::add_text;
+using audit::Members;
 
 /// The text of a member of a problem (RFC 9457), such as `detail`; "" if it has none.
 std::string text_in(std::string_view body, std::string_view key) {
@@ -27,6 +28,14 @@ std::string text_in(std::string_view body, std::string_view key) {
     const auto* found = object != nullptr ? object->if_contains(key) : nullptr;
     const auto* text = found != nullptr ? found->if_string() : nullptr;
     return text != nullptr ? std::string(*text) : std::string();
+}
+
+/// Adds the first texts of a list.
+void add_some(Members& record, std::string_view key, const std::vector<std::string>& texts) {
+    boost::json::array list;
+    for (const std::string& text : texts)
+        if (list.size() < AuditBook::kChanges) list.emplace_back(as_utf8(text));
+    record[key] = std::move(list);
 }
 
 }  // namespace
@@ -39,72 +48,52 @@ std::function<void(const web::Deed&)> AuditBook::deeds() {
 
 void AuditBook::deed(const web::Deed& deed) {
     if (!trail_) return;
-    // A write has one record: the bus records refusals of its own.
+    // A write has one record: the bus records refusals of its own, the reloader reloads.
     const bool is_told = std::exchange(refused_, nullptr) == deed.who && deed.who != nullptr;
+    const bool lacks_right = deed.status == 401 || deed.status == 403 || deed.status == 429;
+    const bool is_reload = deed.path.ends_with("/reload") && !lacks_right;
     const bool discovers = deed.path.ends_with("/discover");
     const bool simulates = deed.path.find("/simulator/") != deed.path.npos;
-    if (deed.status == 401 && deed.shown_token) {
-        // Failed log-ins are counted by client alone, so that each client has a place of its own.
-        if (is_repeat(
-                deed.who, "login", 1, [&] { return member("outcome", "log-in failed"); }, false))
-            return;
-        begin(Kind::login);
-        add_who(deed.who);
-        composer_.text("outcome", "failed").text("path", deed.path);
-        composer_.text("why", text_in(deed.answer, "detail"));
-    } else if (deed.status >= 400) {
-        if (!is_told) refusal(deed);
-        return;
-    } else if (discovers || simulates) {
-        begin(discovers ? Kind::discovery : Kind::simulator);
-        add_who(deed.who);
-        composer_.members(place_of(deed));
-        composer_.text("method", deed.method).text("path", deed.path).text("body", deed.body);
-    } else {
-        return;  // the bus tells of writes, the reloader of reloads
+    Members details;
+    if (deed.status < 400 && (discovers || simulates)) {
+        Members record = audit::record_of(discovers ? "discovery" : "simulator", rt::wall_now());
+        add_who(record, deed.who);
+        audit::add(record, place_of(deed));
+        add_text(record, "method", deed.method);
+        add_text(record, "path", deed.path);
+        add_text(record, "body", deed.body);
+        trail_->add(record);
+    } else if (lacks_right && deed.status != 403 && deed.shown_token) {
+        add_text(details, "path", deed.path);
+        add_text(details, "why", text_in(deed.answer, "detail"));
+        record_refusal("login", deed.who, {{"outcome", "failed"}}, details);
+    } else if (!is_told && !is_reload &&
+               (lacks_right || deed.status == 409 || deed.status == 422)) {
+        Members what = place_of(deed);
+        add_text(what, "method", deed.method);
+        add_text(what, "path", deed.path);
+        what["outcome"] = "refused";
+        add_text(what, "rule", text_in(deed.answer, "rule"));
+        what["status"] = deed.status;
+        add_text(details, "body", deed.body);
+        add_text(details, "why", text_in(deed.answer, "detail"));
+        record_refusal("refusal", deed.who, what, details);
     }
-    record();
 }
 
-std::string AuditBook::place_of(const web::Deed& deed) const {
-    return snapshot_ ? members_of(asked_place(snapshot_->plant, deed.path, deed.body))
-                     : std::string();
+audit::Members AuditBook::place_of(const web::Deed& deed) const {
+    return snapshot_ ? members_of(asked_place(snapshot_->plant, deed.path, deed.body)) : Members();
 }
 
-/// Records refusals before a bus. A bus records refusals of its own, and the reloader records
-/// reloads.
-void AuditBook::refusal(const web::Deed& deed) {
-    const bool lacks_right = deed.status == 401 || deed.status == 403;
-    const bool is_refusal = lacks_right || deed.status == 409 || deed.status == 422;
-    const bool is_reload = deed.path.ends_with("/reload") && !lacks_right;
-    if (!is_refusal || is_reload) return;
-    const std::string rule = text_in(deed.answer, "rule");
-    Refused refused{deed.who, place_of(deed), std::string(deed.method), std::string(deed.path)};
-    refused.body = deed.body;
-    refused.status = deed.status;
-    refused.rule = rule.empty() ? rule : member("rule", rule);
-    refused.why = text_in(deed.answer, "detail");
-    record_refusal(refused);
-}
-
-void AuditBook::record_refusal(const Refused& refused) {
-    std::string& what = what_;
-    what = refused.method;
-    what += '\t';
-    what += std::to_string(refused.status);
-    what += '\t';
-    what += refused.path;
-    if (is_repeat(refused.who, what, 1, [&] {
-            return refused.place + member("method", refused.method) + member("path", refused.path) +
-                   member("outcome", "refused") + refused.rule;
-        }))
-        return;
-    begin(Kind::refusal);
-    add_who(refused.who);
-    composer_.members(refused.place).text("method", refused.method).text("path", refused.path);
-    composer_.text("body", refused.body).text("outcome", "refused").members(refused.rule);
-    composer_.number("status", refused.status).text("why", refused.why);
-    record();
+/// Records a refusal before a bus, or counts it where the client repeats `what`.
+void AuditBook::record_refusal(std::string_view kind, const WhoRef& who, const Members& what,
+                               const Members& details) {
+    if (is_repeat(who, kind, what)) return;
+    Members record = audit::record_of(kind, rt::wall_now());
+    add_who(record, who);
+    audit::add(record, what);
+    audit::add(record, details);
+    trail_->add(record);
 }
 
 std::function<void(const TopicRefusal&)> AuditBook::topic_refusals() {
@@ -116,41 +105,39 @@ std::function<void(const TopicRefusal&)> AuditBook::topic_refusals() {
         if (refusal.station != nullptr && refusal.point != nullptr)
             place.at = profile::format_notation(*refusal.station->configured->profile,
                                                 refusal.point->table, refusal.point->address);
-        Refused refused{refusal.who, members_of(place), "PUBLISH", std::string(refusal.topic)};
-        refused.status = refusal.why.status;
-        refused.why = refusal.why.detail;
-        record_refusal(refused);
+        Members what = members_of(place);
+        what["method"] = "PUBLISH";
+        add_text(what, "path", refusal.topic);
+        what["outcome"] = "refused";
+        what["status"] = refusal.why.status;
+        record_refusal("refusal", refusal.who, what, {{"why", refusal.why.detail}});
     };
 }
 
 std::function<void(const WhoRef&, std::uint8_t, ByteView)> AuditBook::stray_writes() {
-    return [this, life = std::weak_ptr(alive_)](const WhoRef& who, std::uint8_t unit,
-                                                ByteView pdu) {
-        if (life.expired() || !trail_ || pdu.empty()) return;
-        what_ = "unit\t" + std::to_string(unit) + '\t' + std::to_string(pdu[0]);
-        const auto members = [&](audit::Composer& record) {
-            record.number("unit", unit).number("function", pdu[0]).word("outcome", "refused");
+    return
+        [this, life = std::weak_ptr(alive_)](const WhoRef& who, std::uint8_t unit, ByteView pdu) {
+            if (life.expired() || !trail_ || pdu.empty()) return;
+            record_refusal("refusal", who,
+                           {{"unit", unit}, {"function", pdu[0]}, {"outcome", "refused"}},
+                           {{"pdu", to_hex(pdu, "")},
+                            {"why", "the unit leads to no station that can be written"}});
         };
-        if (is_repeat(who, what_, 1, [&] { return audit::members_by(members); })) return;
-        begin(Kind::refusal);
-        add_who(who);
-        members(composer_);
-        composer_.hex("pdu", pdu).text("why", "the unit leads to no station that can be written");
-        record();
-    };
 }
 
 void AuditBook::reload(const web::ReloadVerdict& verdict) {
     if (!trail_) return;
-    begin(Kind::reload).text("cause", verdict.cause).flag("rollback", verdict.rollback);
-    composer_.text("outcome", label(verdict.outcome)).text("why", verdict.why);
-    const std::span<const std::string> changes(verdict.changes);
-    composer_.texts("changes", changes.first(std::min(changes.size(), kChanges)));
-    if (changes.size() > kChanges) composer_.number("more_changes", changes.size() - kChanges);
-    const std::span<const std::string> weaker(verdict.weaker);
-    if (!weaker.empty()) composer_.texts("weaker", weaker.first(std::min(weaker.size(), kChanges)));
-    if (!verdict.faults.empty()) composer_.number("faults", verdict.faults.size());
-    record();
+    Members record = audit::record_of("reload", rt::wall_now());
+    add_text(record, "cause", verdict.cause);
+    record["rollback"] = verdict.rollback;
+    add_text(record, "outcome", label(verdict.outcome));
+    add_text(record, "why", verdict.why);
+    add_some(record, "changes", verdict.changes);
+    if (verdict.changes.size() > kChanges)
+        record["more_changes"] = verdict.changes.size() - kChanges;
+    if (!verdict.weaker.empty()) add_some(record, "weaker", verdict.weaker);
+    if (!verdict.faults.empty()) record["faults"] = verdict.faults.size();
+    trail_->add(record);
 }
 
 void AuditBook::tokens(const std::vector<web::Token>& before, const std::vector<web::Token>& now) {
@@ -171,15 +158,14 @@ void AuditBook::tokens(const std::vector<web::Token>& before, const std::vector<
             record_token(token, "removed");
 }
 
-void AuditBook::expired(const web::Token& token) {
-    if (trail_) record_token(token, "expired");
-}
-
 void AuditBook::record_token(const web::Token& token, std::string_view event) {
-    begin(Kind::token).text("token", token.name).text("role", token.standing.name());
-    composer_.text("event", event);
-    if (token.expires) composer_.text("expires", web::expiry_text(*token.expires));
-    record();
+    if (!trail_) return;
+    Members record = audit::record_of("token", rt::wall_now());
+    add_text(record, "token", token.name);
+    add_text(record, "role", token.standing.name());
+    record["event"] = event;
+    if (token.expires) record["expires"] = web::expiry_text(*token.expires);
+    trail_->add(record);
 }
 
 }  // namespace panelgate::gateway

@@ -9,7 +9,7 @@
 #include "panelgate/rt/log.hpp"
 #include "panelgate/scan/options.hpp"
 #include "panelgate/scan/report.hpp"
-#include "panelgate/web/api/events.hpp"
+#include "panelgate/web/api/render.hpp"
 
 namespace panelgate::gateway {
 

@@ -13,7 +13,7 @@
 #include "panelgate/points/point.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/tcp_server/dispatch.hpp"
-#include "panelgate/web/api/events.hpp"
+#include "panelgate/web/api/render.hpp"
 
 namespace panelgate::gateway {
 

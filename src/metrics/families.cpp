@@ -176,8 +176,6 @@ void add_audit(Families& out, const Snapshot& snapshot) {
                 audit.lost);
     add_counter(out, "panelgate_audit_failures_total", "Times that writing the audit has failed.",
                 audit.failures);
-    add_counter(out, "panelgate_audit_syslog_lost_total",
-                "Records that syslog did not take; they are in the file.", audit.syslog_lost);
     add_counter(out, "panelgate_audit_rotations_total", "Files of the audit that have been filled.",
                 audit.rotations);
 }

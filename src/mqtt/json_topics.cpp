@@ -3,7 +3,7 @@
 #include <boost/json/object.hpp>
 #include <utility>
 
-#include "panelgate/web/api/point_order.hpp"
+#include "panelgate/web/api/values.hpp"
 #include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::mqtt {

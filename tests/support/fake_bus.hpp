@@ -79,7 +79,7 @@ class FakeBus : public bus::BusClient {
         for (const bus::Incident& one : frozen) heads.push_back(one.head);
         return heads;
     }
-    std::optional<bus::Incident> incident(std::uint64_t id, bool) override {
+    std::optional<bus::Incident> incident(std::uint64_t id) override {
         for (bus::Incident& one : frozen) {
             if (one.head.id != id) continue;
             one.head.read = true;

@@ -41,8 +41,8 @@ struct RuleAtStation {
 };
 class Ruling;
 
-/// The rules as one line's stations meet them. Copies share nothing; single-threaded: judging fills
-/// a cache, so that many rules cost next to nothing. Pure.
+/// The rules at the stations of one line. Judging fills a cache, so that many rules cost next to
+/// nothing; copies have a cache each. Single-threaded. Pure.
 class LineRules {
   public:
     /// Without rules everything is allowed. `settings` is kept. `listed`: the line's stations.
@@ -56,7 +56,7 @@ class LineRules {
         const modbus::Request* asked = nullptr;
         const modbus::Request* sent = nullptr;  ///< null: as asked
         bool raw = false;
-        /// What it does. A function that only its vendor knows may read as well as write.
+        /// The acts of the request. A function of a vendor may read and write.
         Acts acts() const;
     };
     /// The gateway's own requests are allowed. Nobody (null) is somebody without role and address.
@@ -64,7 +64,7 @@ class LineRules {
     Verdict judge(const WhoRef& who, std::uint8_t station, const modbus::Request& request) const {
         return judge(who, {.station = station, .asked = &request});
     }
-    /// One act on some items, or with a function that names none.
+    /// Judges one act on some items, or by a function without items.
     Verdict judge(const WhoRef& who, std::uint8_t station, Act act, std::uint8_t function,
                   const std::optional<modbus::Span>& items) const;
 
@@ -74,8 +74,6 @@ class LineRules {
     bool may_all(const WhoRef& who, std::uint8_t station, Act act) const;
     /// True if some item of a listed station may be read, or there is none.
     bool may_read_some(const WhoRef& who) const;
-    /// may_all() of reads, remembered.
-    bool reads_all(const WhoRef& who, std::uint8_t station) const;
     /// True if both decide alike on any line.
     bool says_the_same(const LineRules& other) const {
         if (settings_ && other.settings_) return *settings_ == *other.settings_;
@@ -92,12 +90,10 @@ class LineRules {
     struct Meeting {
         WhoRef who;  ///< keeps the key's address from being used again
         std::shared_ptr<const Ruling> ruling;
-        std::optional<bool> reads_some{};
-        std::optional<bool> reads_all{};
     };
-    using Meetings = std::unordered_map<const Who*, std::unique_ptr<Meeting>>;
+    using Meetings = std::unordered_map<const Who*, Meeting>;
 
-    Meeting& meet(const WhoRef& who, std::uint8_t station) const;
+    const Meeting& meet(const WhoRef& who, std::uint8_t station) const;
     std::shared_ptr<const Ruling> ruling_for(const WhoRef& who, std::uint8_t station) const;
     std::vector<RuleAtStation> rules_for(const WhoRef& who, std::uint8_t station) const;
     Verdict judge_request(const WhoRef& who, std::uint8_t station, const Question& question) const;

@@ -60,8 +60,8 @@ struct Rule {
     std::vector<Place> stations{};
     std::vector<std::uint8_t> functions{};
     std::string range{};  ///< as typed; empty: every item
-    /// The items that the range names, by station: all that shows this memory where the rule
-    /// denies, and only what shows nothing else where it allows.
+    /// The items of the range, by station. Of a rule that denies: all items that show this memory;
+    /// of a rule that allows: only items that show no other memory.
     std::map<Place, std::vector<modbus::Span>> items{};
     /// The same for a station that is not listed; only of a range by table and address.
     std::optional<modbus::Span> unlisted_items{};
@@ -79,7 +79,8 @@ struct Settings {
 
     bool allow_by_default = true;  ///< where no rule matches
     std::vector<Rule> rules;
-    /// Roles besides the default ones. What one of them lacks is refused before any rule.
+    /// Roles besides the default roles. An act without the right of its role is refused before any
+    /// rule.
     std::vector<OwnRole> roles{};
 
     /// True if nothing is ever refused.

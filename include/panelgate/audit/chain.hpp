@@ -10,15 +10,11 @@
 
 namespace panelgate::audit {
 
-using Hash = HexDigest;
-/// What the first record of a chain follows: 64 times '0'.
-Hash no_hash();
-std::optional<Hash> parse_hash(std::string_view text);
-
-/// Where a chain stands: the number and the hash of its last record. Number 0: no record.
+/// Where a chain stands: the number and the hash of its last record (64 lower-case hex digits).
+/// Number 0: no record; the first record follows 64 times '0'.
 struct Position {
     std::uint64_t number = 0;
-    Hash hash = no_hash();
+    std::string hash = std::string(64, '0');
     friend bool operator==(const Position&, const Position&) = default;
 };
 
@@ -42,16 +38,13 @@ struct Sealed {
     std::uint64_t number = 0;
     std::string_view text;  ///< what the hash covers besides the previous hash
     std::string_view body;  ///< without the number
-    Hash hash{};
+    std::string_view hash;
 };
 /// Takes a line, without its newline, apart. nullopt if it is no record.
 std::optional<Sealed> parse_line(std::string_view line);
 /// The value of a member of a body that is a number, a flag or a text without escapes; "" if there
 /// is none. What is inside of texts is no member: quotes are escaped there.
 std::string_view member_of(std::string_view body, std::string_view key);
-/// Returns the hash that a record of kind `file` says it follows.
-std::optional<Hash> previous_in(const Sealed& record);
-
 /// Where a file's end is, as far as the chain is concerned.
 struct Tail {
     Position last{};          ///< its last whole record; number 0: it has none

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,13 +10,10 @@ namespace panelgate::audit {
 
 /// A full file's name: FILE.000000000001, with the number of its first record.
 std::string rotated_name(const std::string& file, std::uint64_t first);
-/// The number in a full file's name.
-std::optional<std::uint64_t> number_in(const std::string& name, const std::string& file);
 /// The full files of a chain, oldest first, without the one that is written.
 std::vector<std::string> rotated_files(const std::string& file);
-
-/// Longest line that is taken for one: a longer one comes in pieces, and is no record.
-inline constexpr std::size_t kLongestLine = 1024 * 1024;
+/// The number of a file's first record; 0: it has none, or its first line is no record.
+std::uint64_t first_record(const std::string& file);
 
 /// Calls `take` with each line, without its newline; `whole`: it had one. Ends where `take` returns
 /// false. Returns why the file cannot be read, "" if it was.

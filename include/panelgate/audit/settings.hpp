@@ -16,12 +16,8 @@ struct Settings {
     std::size_t rotate = 50 * 1024 * 1024;  ///< bytes of a file; then the next one begins
     std::size_t keep = 20;                  ///< files besides the one that is written
     OnFailure on_failure = OnFailure::keep_on;
-    std::string syslog_socket = "/dev/log";
-    bool syslog = false;                   ///< each record goes to the local syslog as well
     Duration flush = 700ms;                ///< how long a record may wait to be on the disk
     std::size_t buffer = 2 * 1024 * 1024;  ///< bytes that wait while the disk takes nothing
-    std::uint64_t anchor_every = 10'000;   ///< records between two anchors in the log
-    Duration anchor_after = 10min;         ///< the same in time, if there was a record
 
     friend bool operator==(const Settings&, const Settings&) = default;
 };

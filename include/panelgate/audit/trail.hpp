@@ -1,15 +1,17 @@
 #pragma once
 
-#include <atomic>
+#include <condition_variable>
 #include <cstdint>
 #include <functional>
-#include <memory>
+#include <mutex>
 #include <string>
-#include <string_view>
+#include <thread>
 
 #include "panelgate/audit/chain.hpp"
 #include "panelgate/audit/counters.hpp"
+#include "panelgate/audit/record.hpp"
 #include "panelgate/audit/settings.hpp"
+#include "panelgate/audit/writer.hpp"
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::audit {
@@ -22,33 +24,29 @@ struct Notice {
     Position at{};       ///< of an anchor; `text` is its chain's id
 };
 
-/// The audit trail. The loop only appends bodies to a bounded buffer; a thread chains them, writes
-/// them and synchronizes the file, at most Settings::flush later. While the disk takes nothing the
-/// buffer fills, and then what comes is counted as lost, and the count recorded. Used by one thread
-/// besides its own.
+/// The audit trail of one file. The loop only appends records to a bounded buffer; a thread chains
+/// them, writes them and synchronizes the file, at most Settings::flush later. While the disk takes
+/// nothing the buffer fills, and then what comes is counted as lost, and the count recorded. Used
+/// by one thread besides its own.
 class Trail {
   public:
-    /// `tell` is called from the trail's thread. `wall` too: it tells the time of what the trail
-    /// itself records. `start`: further members of the record `start`, such as
-    /// `,"version":"1.0.0"`.
+    /// `tell` and `wall` are called from the trail's thread. `start`: further members of the record
+    /// `start`.
     struct Hooks {
         std::function<void(Notice)> tell;
         std::function<WallTime()> wall;
-        std::string start;
+        Members start;
     };
 
     Trail(const Settings& settings, Hooks hooks);
-    /// As close().
-    ~Trail();
+    ~Trail();  ///< as close()
     Trail(const Trail&) = delete;
     Trail& operator=(const Trail&) = delete;
 
-    /// Adds a record (Composer::body()).
-    void add(std::string_view body);
-    /// From the next write on. Another file begins with a record `start`.
+    void add(const Members& record);
+    /// From the next write on. The file stays.
     void apply(const Settings& settings);
-    /// True while nothing can be written, or there is no room.
-    bool is_failing() const { return failing_.load(std::memory_order_relaxed); }
+    /// With `failing` while nothing can be written.
     Counters counters() const;
     /// How it ended.
     struct End {
@@ -60,9 +58,27 @@ class Trail {
     End close();
 
   private:
-    struct State;
-    std::unique_ptr<State> state_;
-    std::atomic<bool> failing_{false};
+    void run();
+    bool wait(std::unique_lock<std::mutex>& lock);
+    void take_over();
+    void work();
+    void anchor();
+
+    mutable std::mutex mutex_;  ///< of the members down to stop_
+    std::condition_variable wake_;
+    Settings settings_;
+    std::string pending_;     ///< bodies, each with a newline behind it
+    std::uint64_t lost_ = 0;  ///< not yet recorded
+    Counters counters_;
+    bool stop_ = false;
+
+    Hooks hooks_;  ///< of the thread, as what follows
+    Writer writer_;
+    std::string batch_;  ///< bodies that were taken over and are not on the disk
+    bool failing_ = false;
+    std::uint64_t anchored_ = 0;
+    WallTime anchored_at_{};
+    std::thread thread_;
 };
 
 }  // namespace panelgate::audit

@@ -104,7 +104,7 @@ class Bus final : public LineBus {
     TracePart trace(std::size_t last) const override;
     TracePart trace_since(std::uint64_t sequence, std::size_t most) const override;
     std::vector<IncidentHead> incidents() const override;
-    std::optional<Incident> incident(std::uint64_t id, bool marks) override;
+    std::optional<Incident> incident(std::uint64_t id) override;
     bool tells(const WhoRef& who, std::uint8_t station) const override;
     void name_client(ClientId client, std::string name) override;
 

@@ -226,11 +226,9 @@ class LineView {
     }
     /// Returns the recorded incidents, oldest first, at most IncidentSettings::incidents.
     virtual std::vector<IncidentHead> incidents() const { return {}; }
-    /// Returns an incident, nullopt if it is not recorded. `marks` it as read: its reader has seen
-    /// all of it.
-    virtual std::optional<Incident> incident(std::uint64_t id, bool marks) {
+    /// Returns an incident and marks it as read; nullopt if the incident is not recorded.
+    virtual std::optional<Incident> incident(std::uint64_t id) {
         static_cast<void>(id);
-        static_cast<void>(marks);
         return std::nullopt;
     }
     /// True if `who` may read something of this station (0: of the line), by the rules of `access`.

@@ -46,7 +46,6 @@ struct TraceFrame {
     std::string why;                ///< why a sent frame was sent at this time
     WallTime time{};                ///< `at` as wall-clock time
     std::uint64_t transaction = 0;  ///< that it belongs to, or followed; 0: none
-    bool hidden = false;            ///< its reader may see that it was there, and not what
 };
 
 /// Why something was not done, or not at once; one line of text.
@@ -77,7 +76,6 @@ struct TraceTransaction : TransactionFacts {
     Bytes request;
     Bytes reply;  ///< empty: no reply
     std::vector<TraceFrame> discarded;
-    bool hidden = false;  ///< as of a frame
 };
 
 /// Part of a line's trace, oldest first.

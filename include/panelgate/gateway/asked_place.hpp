@@ -3,6 +3,7 @@
 #include <string>
 #include <string_view>
 
+#include "panelgate/audit/record.hpp"
 #include "panelgate/gateway/plant.hpp"
 
 namespace panelgate::gateway {
@@ -17,7 +18,7 @@ struct AskedPlace {
 /// `path`: decoded, "/api/v1/stations/press/points/speed". Pure.
 AskedPlace asked_place(const Plant& plant, std::string_view path, std::string_view body);
 
-/// Its members of a record: `,"line":"floor1","station":"press","id":7,"at":"UW102"`.
-std::string members_of(const AskedPlace& place);
+/// Its members of a record: `"line":"floor1","station":"press","id":7,"at":"UW102"`.
+audit::Members members_of(const AskedPlace& place);
 
 }  // namespace panelgate::gateway

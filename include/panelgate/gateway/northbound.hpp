@@ -17,7 +17,7 @@
 #include "panelgate/mqtt/counters.hpp"
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/rt/clock.hpp"
-#include "panelgate/web/api/point_order.hpp"
+#include "panelgate/web/api/render.hpp"
 #include "panelgate/web/http/crossing.hpp"
 
 namespace panelgate::gateway {

@@ -1,61 +1,22 @@
-#include <boost/asio/associated_executor.hpp>
-#include <boost/asio/async_result.hpp>
-#include <boost/asio/awaitable.hpp>
-#include <boost/asio/post.hpp>
-#include <boost/asio/use_awaitable.hpp>
-#include <boost/json/array.hpp>
-#include <boost/json/object.hpp>
 #include <boost/json/parse.hpp>
-#include <boost/json/value.hpp>
-#include <memory>
-#include <string>
-#include <string_view>
-#include <utility>
 
 #include "answer.hpp"
-#include "body.hpp"
+#include "exchange.hpp"
 #include "page.hpp"
 #include "panelgate/web/api/sources.hpp"
+#include "panelgate/web/api/values.hpp"
 #include "panelgate/web/http/gzip.hpp"
 #include "panelgate/web/http/json_text.hpp"
-#include "panelgate/web/http/message.hpp"
-#include "panelgate/web/http/problem.hpp"
-#include "panelgate/web/http/query.hpp"
 #include "routes.hpp"
 #include "sight.hpp"
 
 namespace panelgate::web {
-
-/// Gets the text of /metrics for this caller, or null if there is none. If the caller leaves, its
-/// scrape is cancelled.
-boost::asio::awaitable<SharedText> scrape(std::shared_ptr<Caller> caller, MetricsSource* source,
-                                          bool gzip);
 
 namespace asio = boost::asio;
 namespace json = boost::json;
 namespace {
 
 using Verdict = std::shared_ptr<const ReloadVerdict>;
-
-/// Resumes the coroutine by post, never from inside the source.
-struct StartReload {
-    template <class Handler>
-    void operator()(Handler handler, ReloadSource* source, ReloadWish wish,
-                    std::string cause) const {
-        auto shared = std::make_shared<Handler>(std::move(handler));
-        source->reload(wish, std::move(cause), [shared](Verdict verdict) {
-            const auto executor = asio::get_associated_executor(*shared);
-            asio::post(executor, [shared, verdict = std::move(verdict)]() mutable {
-                (std::move(*shared))(std::move(verdict));
-            });
-        });
-    }
-};
-
-asio::awaitable<Verdict> reloaded(ReloadSource* source, ReloadWish wish, std::string cause) {
-    return asio::async_initiate<const asio::use_awaitable_t<>, void(Verdict)>(
-        StartReload{}, asio::use_awaitable, source, wish, std::move(cause));
-}
 
 json::array texts(const std::vector<std::string>& list) {
     return json::array(list.begin(), list.end());
@@ -89,10 +50,9 @@ json::object describe(const ReloadVerdict& verdict) {
 Parsed<bool> flag_of(const HttpRequest& request, const json::object& body, const char* name) {
     const auto query = query_flag(request, name);
     if (!query) return query;
-    const json::value* flag = body.if_contains(name);
-    if (flag == nullptr) return query;
-    if (!flag->is_bool()) return problem(400, std::string(name) + " must be true or false");
-    return *query || flag->as_bool();
+    const auto member = flag_member(body, name);
+    if (!member) return member;
+    return *query || *member;
 }
 
 Parsed<ReloadWish> wish_of(const HttpRequest& request) {
@@ -120,31 +80,20 @@ json::object describe_to(const ReloadVerdict& verdict, bool sees_everything) {
     return object;
 }
 
-constexpr std::string_view kNotTold =
-    "what is wrong is not told to a role that does not see all of the plant";
-
 HttpResponse answer_of(const ReloadVerdict& verdict, bool sees_everything) {
-    switch (verdict.outcome) {
-        case ReloadOutcome::applied:
-        case ReloadOutcome::unchanged:
-            break;
-        case ReloadOutcome::invalid: {
-            Problem made = problem(422, "the configuration has faults; nothing has changed",
-                                   "invalid-configuration");
-            made.extensions = describe_to(verdict, sees_everything);
-            return to_response(made);
-        }
-        case ReloadOutcome::failed:
-        case ReloadOutcome::refused: {
-            const bool refused = verdict.outcome == ReloadOutcome::refused;
-            const std::string why = sees_everything ? verdict.why : std::string(kNotTold);
-            Problem made = problem(409, why + "; nothing has changed",
-                                   refused ? "reload-weaker" : "reload-failed");
-            made.extensions = describe_to(verdict, sees_everything);
-            return to_response(made);
-        }
-    }
-    return json_response(200, describe_to(verdict, sees_everything));
+    json::object told = describe_to(verdict, sees_everything);
+    if (verdict.outcome == ReloadOutcome::applied || verdict.outcome == ReloadOutcome::unchanged)
+        return json_response(200, told);
+    const std::string why = sees_everything ? verdict.why
+                                            : "what is wrong is not told to a role that does not "
+                                              "see all of the plant";
+    Problem made = problem(409, why + "; nothing has changed", "reload-failed");
+    if (verdict.outcome == ReloadOutcome::refused) made.kind = "reload-weaker";
+    if (verdict.outcome == ReloadOutcome::invalid)
+        made = problem(422, "the configuration has faults; nothing has changed",
+                       "invalid-configuration");
+    made.extensions = std::move(told);
+    return to_response(made);
 }
 
 }  // namespace
@@ -164,9 +113,13 @@ Handling post_reload(HttpRequest request, const Api* api) {
         source ? source->barred(wish->rollback) : "this program serves a built-in configuration";
     if (!why.empty()) co_return to_response(problem(409, why));
     request.caller->take_effect();
-    // As before it: who may not see something now is not told how it is from now on.
+    // By the rules before the reload: a client that sees nothing now is not told the new state.
     const bool sees_everything = Sight(*api->directory, request.caller->who()).everything();
-    asio::awaitable<Verdict> reloading = reloaded(source, *wish, request.caller->name());
+    std::function<void(std::function<void(Verdict)>)> start =
+        [&](std::function<void(Verdict)> done) {
+            source->reload(*wish, request.caller->name(), std::move(done));
+        };
+    asio::awaitable<Verdict> reloading = result_of<Verdict>(std::move(start));
     const Verdict verdict = co_await std::move(reloading);
     co_return answer_of(*verdict, sees_everything);
 }
@@ -223,8 +176,7 @@ std::string stations_seen(const Directory& directory, const Sight& sight) {
 
 }  // namespace
 
-/// The configuration is the same for all clients of a role who see the same stations, so it is
-/// rendered once for all of them.
+/// The configuration is rendered once for all clients of a role that see the same stations.
 Handling get_configuration(HttpRequest request, const Api* api) {
     if (!api->providers.configuration)
         co_return to_response(problem(404, "this program shows no configuration"));
@@ -245,19 +197,6 @@ Handling get_configuration(HttpRequest request, const Api* api) {
     HttpResponse response = co_await std::move(giving);
     co_return response;
 }
-
-namespace {
-
-HttpResponse text_response(unsigned status, std::string body,
-                           std::string_view content_type = "text/plain; charset=utf-8") {
-    HttpResponse response;
-    response.status = status;
-    response.content_type = content_type;
-    response.body = std::move(body);
-    return response;
-}
-
-}  // namespace
 
 Handling get_openapi(HttpRequest request, const Api*) {
     static const auto kept = std::make_shared<KeptAnswer>(openapi_text(), "application/json");
@@ -288,9 +227,15 @@ Handling get_metrics(HttpRequest request, const Api* api) {
     const Sight sight(*api->directory, request.caller->who());
     const bool all = sight.everything();
     const bool gzip = all && accepts_gzip(request.headers["accept-encoding"]);
-    boost::asio::awaitable<SharedText> making =
-        scrape(request.caller, api->providers.metrics, gzip);
-    SharedText text = co_await std::move(making);
+    MetricsSource* const source = api->providers.metrics;
+    const std::uint64_t id = request.caller->id();
+    request.caller->at_leaving(source, [source, id] { source->cancel(id); });
+    std::function<void(std::function<void(SharedText)>)> start =
+        [source, id, gzip](std::function<void(SharedText)> done) {
+            source->scrape(id, gzip, std::move(done));
+        };
+    asio::awaitable<SharedText> scraping = result_of<SharedText>(std::move(start));
+    SharedText text = co_await std::move(scraping);
     if (!text)
         co_return to_response(passing_problem(503, "the metrics cannot be made now; try again", 1));
     HttpResponse response = text_response(200, {}, api->providers.metrics_type);
@@ -302,41 +247,6 @@ Handling get_metrics(HttpRequest request, const Api* api) {
     response.headers.emplace_back("Vary", "Accept-Encoding");
     if (gzip) response.headers.emplace_back("Content-Encoding", "gzip");
     co_return response;
-}
-
-namespace {
-
-/// Resumes the coroutine by post, so that the source is not called again from inside its own
-/// completion.
-struct StartScrape {
-    template <class Handler>
-    void operator()(Handler handler, MetricsSource* source, std::uint64_t caller, bool gzip) const {
-        auto shared = std::make_shared<Handler>(std::move(handler));
-        source->scrape(caller, gzip, [shared](SharedText text) {
-            const auto executor = asio::get_associated_executor(*shared);
-            asio::post(executor, [shared, text = std::move(text)]() mutable {
-                (std::move(*shared))(std::move(text));
-            });
-        });
-    }
-};
-
-asio::awaitable<SharedText> start_scrape(MetricsSource* source, std::uint64_t caller, bool gzip) {
-    return asio::async_initiate<const asio::use_awaitable_t<>, void(SharedText)>(
-        StartScrape{}, asio::use_awaitable, source, caller, gzip);
-}
-
-}  // namespace
-
-asio::awaitable<SharedText> scrape(std::shared_ptr<Caller> caller, MetricsSource* source,
-                                   bool gzip) {
-    SharedText text;
-    if (caller->has_left()) co_return text;
-    const std::uint64_t id = caller->id();
-    caller->at_leaving(source, [source, id] { source->cancel(id); });
-    asio::awaitable<SharedText> pending = start_scrape(source, id, gzip);
-    text = co_await std::move(pending);
-    co_return text;
 }
 
 }  // namespace panelgate::web

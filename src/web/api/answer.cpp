@@ -1,196 +1,74 @@
 #include "answer.hpp"
 
 #include <algorithm>
-#include <boost/asio/awaitable.hpp>
-#include <boost/asio/post.hpp>
+#include <array>
 #include <boost/asio/this_coro.hpp>
-#include <boost/asio/use_awaitable.hpp>
-#include <boost/json/object.hpp>
-#include <charconv>
-#include <chrono>
-#include <cstddef>
-#include <cstdlib>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
+#include <cstdio>
 
-#include "conduct.hpp"
-#include "panelgate/base/text.hpp"
-#include "panelgate/modbus/function.hpp"
+#include "panelgate/profile/notation.hpp"
+#include "panelgate/web/api/render.hpp"
 #include "panelgate/web/http/gzip.hpp"
 #include "panelgate/web/http/json_text.hpp"
-#include "station_path.hpp"
 
 namespace panelgate::web {
 
 namespace json = boost::json;
-namespace {
-
-unsigned status_of(Fault fault) {
-    switch (fault) {
-        case Fault::denied:
-            return 403;
-        case Fault::malformed:
-            return 400;
-        case Fault::not_routed:
-            return 404;
-        case Fault::busy:
-        case Fault::expired:
-        case Fault::cancelled:
-            return 503;
-        case Fault::line_down:
-        case Fault::line_lost:
-        case Fault::damaged:
-        case Fault::wrong:
-            return 502;
-        case Fault::timeout:
-        case Fault::offline:
-            return 504;
-    }
-    std::abort();
-}
-
-/// The text for a request that was not transmitted must not sound as if it had been.
-const char* detail_of(Fault fault, bool transmitted) {
-    switch (fault) {
-        case Fault::denied:
-            return "no request may carry this function here";
-        case Fault::malformed:
-            return "the request contradicts its function code";
-        case Fault::not_routed:
-            return "no line has this station";
-        case Fault::busy:
-            return "the line's queue is full; try again";
-        case Fault::expired:
-            return "the line could not take the request before its deadline";
-        case Fault::line_down:
-            return "the line is down";
-        case Fault::line_lost:
-            return "the line was lost while the request was on its way";
-        case Fault::timeout:
-            return transmitted ? "the station did not answer in time"
-                               : "nothing was sent: its deadline passed while a reply of the "
-                                 "station was outstanding";
-        case Fault::damaged:
-            return transmitted ? "only damaged replies came back"
-                               : "nothing was sent: the station's replies come damaged";
-        case Fault::wrong:
-            return transmitted ? "the station sent good frames that do not answer the request"
-                               : "nothing was sent: the station's replies do not fit";
-        case Fault::offline:
-            return transmitted ? "the station is silent; it is probed from time to time"
-                               : "nothing was sent: the station is silent; it is probed from time "
-                                 "to time";
-        case Fault::cancelled:
-            return "its client had gone, or the gateway is stopping";
-    }
-    std::abort();
-}
-
-/// The panel manual's meaning of an exception code, or "".
-std::string meaning_of(std::uint8_t code, const profile::PanelProfile& profile) {
-    for (const profile::ExceptionMeaning& exception : profile.exceptions) {
-        if (exception.code == code) return exception.meaning;
-    }
-    return {};
-}
-
-}  // namespace
 
 HttpResponse json_response(unsigned status, const json::value& body) {
+    return text_response(status, json_text(body) + "\n", "application/json");
+}
+
+HttpResponse text_response(unsigned status, std::string body, std::string_view content_type) {
     HttpResponse response;
     response.status = status;
-    response.body = json_text(body) + "\n";
+    response.content_type = content_type;
+    response.body = std::move(body);
     return response;
 }
 
-Problem problem_of(Fault fault, bool transmitted) {
-    Problem made = problem(status_of(fault), detail_of(fault, transmitted), label(fault));
-    made.extensions["modbus_exception"] = static_cast<std::uint8_t>(modbus::to_exception(fault));
-    made.extensions["transmitted"] = transmitted;
-    if (made.status == 503) made.headers.emplace_back("Retry-After", "1");
-    return made;
+bool wants_csv(std::string_view accept) {
+    const auto csv = accept.find("text/csv");
+    return csv != accept.npos && csv < accept.find("application/json");
 }
 
-Problem problem_of_exception(std::uint8_t code, const profile::PanelProfile& profile) {
-    std::string detail = "the panel answered exception " + std::to_string(code) + ": ";
-    detail += modbus::describe_exception(code);
-    const std::string meaning = meaning_of(code, profile);
-    if (!meaning.empty()) detail += " (" + meaning + ")";
-    Problem made = problem(code >= 1 && code <= 4 ? 422 : 502, std::move(detail), "exception");
-    made.extensions["modbus_exception"] = code;
-    made.extensions["transmitted"] = true;
-    return made;
+/// As a technician writes the item `behind` the first; "" if the panel is not known.
+std::string notation_of(const Target& target, std::size_t behind) {
+    const auto address = static_cast<std::uint16_t>(target.span.first + behind);
+    if (target.area != nullptr) return profile::format_notation(*target.area, address);
+    if (target.station.unknown_panel) return "";
+    return profile::format_notation(*target.station.profile, target.span.table, address);
 }
 
-Problem problem_of(const bus::Answer& answer) {
-    if (answer.refusal) return problem_of(*answer.refusal);
-    Problem made = problem_of(answer.pdu.error(), answer.transmitted);
-    if (!answer.why.empty()) made.detail = "the line is down: " + answer.why;
-    return made;
-}
-
-std::optional<Problem> problem_of(const bus::Answer& answer, const profile::PanelProfile& profile) {
-    if (answer.refusal || !answer.pdu) return problem_of(answer);
-    const auto code = modbus::exception_of(*answer.pdu);
-    if (code) return problem_of_exception(*code, profile);
-    return std::nullopt;
-}
-
-HttpResponse broadcast_answer(const bus::Answer& answer) {
-    if (answer.refusal || !answer.pdu) return to_response(problem_of(answer));
+json::object describe(const Target& target, const View& view, const Reading& reading) {
+    const std::string notation = notation_of(target, 0);
+    json::array values = values_of(view, reading.items);
     json::object body;
-    body["transmitted"] = true;
-    body["confirmed"] = false;
-    return json_response(202, body);
-}
-
-std::int64_t whole_ms(Duration duration) {
-    return std::chrono::duration_cast<std::chrono::milliseconds>(duration).count();
-}
-
-std::string upper_hex(ByteView bytes, std::string_view separator) {
-    std::string text = to_hex(bytes, separator);
-    for (char& c : text) c = c >= 'a' ? static_cast<char>(c - 'a' + 'A') : c;
-    return text;
-}
-
-namespace {
-
-/// Removes and returns the part before the separator; the rest stays in `text`.
-std::string_view next(std::string_view& text, char separator) {
-    const auto at = std::min(text.find(separator), text.size());
-    const std::string_view part = text.substr(0, at);
-    text.remove_prefix(std::min(at + 1, text.size()));
-    return trimmed(part);
-}
-
-/// The weight ("q=") among these parameters; 1 if there is none.
-double weight_of(std::string_view parameters) {
-    while (!parameters.empty()) {
-        const std::string_view one = next(parameters, ';');
-        if (!one.starts_with("q=") && !one.starts_with("Q=")) continue;
-        double weight = 0;
-        std::from_chars(one.data() + 2, one.data() + one.size(), weight);
-        return weight;
+    body["station"] = target.station.name;
+    body["table"] = label(target.span.table);
+    body["address"] = target.span.first;
+    body["notation"] = nullptr;
+    if (!notation.empty()) body["notation"] = notation;
+    if (!notation.empty() && values.size() > 1) {
+        json::array notations;
+        for (std::size_t i = 0; i < values.size(); ++i)
+            notations.emplace_back(notation_of(target, i * target.span.count / values.size()));
+        body["notations"] = std::move(notations);
     }
-    return 1;
+    body["values"] = std::move(values);
+    if (view.raw) body["raw"] = json::array(reading.items.begin(), reading.items.end());
+    body["age_ms"] = whole_ms(reading.age);
+    body["source"] = reading.cached ? "cache" : "bus";
+    if (reading.transactions > 1) body["transactions"] = reading.transactions;
+    return body;
 }
 
-}  // namespace
-
-bool prefers(std::string_view accept, std::string_view type) {
-    double wanted = 0;
-    double other = 0;
-    while (!accept.empty()) {
-        std::string_view item = next(accept, ',');
-        const std::string_view one = next(item, ';');
-        const double weight = weight_of(item);
-        if (one == type) wanted = weight;
-        if (one == "application/json") other = weight;
-    }
-    return wanted > 0 && wanted >= other;
+points::PointReading point_reading(const points::Point& point, const Reading& reading) {
+    points::PointReading made;
+    made.value = points::decode(point, reading.items);
+    made.label = points::label_of(point, reading.items);
+    made.quality = made.value ? points::Quality::good : points::Quality::bad;
+    made.age = reading.age;
+    return made;
 }
 
 namespace {
@@ -211,8 +89,6 @@ std::string field_of(const json::object& object, std::string_view column) {
 
 }  // namespace
 
-bool prefers_csv(std::string_view accept) { return prefers(accept, "text/csv"); }
-
 std::string csv_line(std::span<const std::string_view> fields) {
     std::string line;
     for (const std::string_view& field : fields) {
@@ -229,23 +105,16 @@ std::string csv_line(const json::object& object, std::span<const std::string_vie
     return csv_line(fields);
 }
 
-HttpResponse csv_response(std::string body) {
-    HttpResponse response;
-    response.content_type = "text/csv; charset=utf-8; header=present";
-    response.body = std::move(body);
-    return response;
+boost::asio::awaitable<void> yield_turn() {
+    const auto executor = co_await boost::asio::this_coro::executor;
+    co_await boost::asio::post(executor, boost::asio::use_awaitable);
 }
 
-namespace {
-
-constexpr std::size_t kPackedOfATurn = 16 * 1024;  ///< bytes: about 0.3 ms of work
-
-}  // namespace
-
 boost::asio::awaitable<std::string> packed(std::string body) {
+    constexpr std::size_t kOfATurn = 16 * 1024;  // bytes: about 0.3 ms of work
     Gzip gzip;
     for (std::string_view left = body; !left.empty();) {
-        const std::string_view piece = left.substr(0, kPackedOfATurn);
+        const std::string_view piece = left.substr(0, kOfATurn);
         gzip.add(piece);
         left.remove_prefix(piece.size());
         boost::asio::awaitable<void> turn = yield_turn();
@@ -253,9 +122,6 @@ boost::asio::awaitable<std::string> packed(std::string body) {
     }
     co_return gzip.finish();
 }
-
-/// About 0.1 ms of work.
-constexpr std::size_t kEntriesOfATurn = 16;
 
 void LongAnswer::begin_member(std::string_view name) {
     if (!std::exchange(is_first_, false)) text_ += ',';
@@ -288,30 +154,24 @@ LongAnswer& LongAnswer::member(std::string_view name, const json::value& value) 
 }
 
 bool LongAnswer::is_turn_over() {
-    if (entries_ < kEntriesOfATurn) return false;
+    constexpr std::size_t kOfATurn = 16;  // entries: about 0.1 ms of work
+    if (entries_ < kOfATurn) return false;
     entries_ = 0;
     return true;
 }
 
 HttpResponse LongAnswer::response() {
-    HttpResponse response;
-    response.body = std::move(text_) + "}\n";
-    return response;
-}
-
-boost::asio::awaitable<void> yield_turn() {
-    const auto executor = co_await boost::asio::this_coro::executor;
-    co_await boost::asio::post(executor, boost::asio::use_awaitable);
+    return text_response(200, std::move(text_) + "}\n", "application/json");
 }
 
 Handling table_answer(HttpRequest request, Table table) {
-    const bool as_csv = prefers_csv(request.headers["accept"]);
+    const bool as_csv = !table.columns.empty() && wants_csv(request.headers["accept"]);
     LongAnswer body;
     for (const auto& [name, value] : table.members) body.member(name, value);
     std::string lines = csv_line(table.columns);
     body.begin_list(table.name);
     for (std::size_t i = 0; i < table.count; ++i) {
-        const boost::json::object one = table.entry(i);
+        const json::object one = table.entry(i);
         if (as_csv) {
             lines += csv_line(one, table.columns);
             body.add(nullptr);  // only to count entries for is_turn_over()
@@ -324,8 +184,11 @@ Handling table_answer(HttpRequest request, Table table) {
         if (request.caller->has_left()) co_return HttpResponse{};
     }
     body.end_list();
-    HttpResponse response = as_csv ? csv_response(std::move(lines)) : body.response();
-    response.headers.emplace_back("Vary", "Accept");
+    for (const auto& [name, value] : table.behind) body.member(name, value);
+    HttpResponse response = body.response();
+    if (as_csv)
+        response = text_response(200, std::move(lines), "text/csv; charset=utf-8; header=present");
+    if (!table.columns.empty()) response.headers.emplace_back("Vary", "Accept");
     co_return response;
 }
 
@@ -350,6 +213,48 @@ boost::asio::awaitable<HttpResponse> KeptAnswer::give(std::shared_ptr<KeptAnswer
     response.shared_body = self->packed_;
     response.headers.emplace_back("Content-Encoding", "gzip");
     co_return response;
+}
+
+namespace {
+
+/// The end of the value of a member that ends in _ms, or of `time`; `at` if neither begins there.
+std::size_t end_of_age(std::string_view body, std::size_t at) {
+    constexpr std::string_view kAge = "_ms\":";
+    constexpr std::string_view kTime = "\"time\":\"";
+    if (body.substr(at).starts_with(kTime))
+        return std::min(body.find('"', at + kTime.size()), body.size() - 1) + 1;
+    if (!body.substr(at).starts_with(kAge)) return at;
+    at += kAge.size();
+    while (at < body.size() && body[at] != ',' && body[at] != '}') ++at;
+    return at;
+}
+
+}  // namespace
+
+std::string tag_of(std::string_view body) {
+    std::uint64_t hash = 14695981039346656037u;  // FNV-1a
+    for (std::size_t at = 0; at < body.size();) {
+        const std::size_t behind = end_of_age(body, at);
+        if (behind != at) {
+            at = behind;
+            continue;
+        }
+        hash = (hash ^ static_cast<unsigned char>(body[at])) * 1099511628211u;
+        ++at;
+    }
+    std::array<char, 32> text{};
+    const int size = std::snprintf(text.data(), text.size(), "W/\"%016llx\"",
+                                   static_cast<unsigned long long>(hash));
+    return std::string(text.data(), static_cast<std::size_t>(size));
+}
+
+bool add_etag(HttpResponse& response, std::string_view if_none_match, const std::string& tag) {
+    response.headers.emplace_back("ETag", tag);
+    // Strong or weak, the text in quotes is the same.
+    const std::string_view quoted = std::string_view(tag).substr(tag.find('"'));
+    const bool known = if_none_match == "*" || if_none_match.find(quoted) != if_none_match.npos;
+    if (known) response.status = 304;
+    return known;
 }
 
 }  // namespace panelgate::web

@@ -4,60 +4,42 @@
 #include <boost/json/object.hpp>
 #include <boost/json/value.hpp>
 #include <cstddef>
-#include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
-#include "panelgate/base/bytes.hpp"
-#include "panelgate/base/fault.hpp"
-#include "panelgate/base/time.hpp"
-#include "panelgate/bus/bus_client.hpp"
-#include "panelgate/profile/panel_profile.hpp"
+#include "exchange.hpp"
+#include "panelgate/points/station_points.hpp"
+#include "panelgate/web/api/values.hpp"
 #include "panelgate/web/http/message.hpp"
-#include "panelgate/web/http/problem.hpp"
+#include "target.hpp"
 
 namespace panelgate::web {
 
 HttpResponse json_response(unsigned status, const boost::json::value& body);
+HttpResponse text_response(unsigned status, std::string body,
+                           std::string_view content_type = "text/plain; charset=utf-8");
 
-/// The problem for a bus request without a reply (502 line down or damaged, 503 busy, 504 no reply
-/// in time).
-Problem problem_of(Fault fault, bool transmitted);
-/// The problem for a panel's exception reply, with its manual's meaning: 422 for codes 1-4, 502
-/// above.
-Problem problem_of_exception(std::uint8_t code, const profile::PanelProfile& profile);
-/// The problem for an answer without a reply from a panel: refused by the gateway, or a fault.
-Problem problem_of(const bus::Answer& answer);
-/// The problem for an answer: as above, or an exception reply. Nothing if it carries the requested
-/// data.
-std::optional<Problem> problem_of(const bus::Answer& answer, const profile::PanelProfile& profile);
+/// As a technician writes the item `behind` the first; "" if the panel is not known.
+std::string notation_of(const Target& target, std::size_t behind);
+/// {"station","table","address","notation","values",["raw"],"age_ms","source",["transactions"]}
+boost::json::object describe(const Target& target, const View& view, const Reading& reading);
+/// A point as its items have just been read.
+points::PointReading point_reading(const points::Point& point, const Reading& reading);
 
-/// The answer to a broadcast: 202, because no station replies to one.
-HttpResponse broadcast_answer(const bus::Answer& answer);
-
-/// The duration in whole milliseconds, rounded towards zero, for members that end in _ms.
-std::int64_t whole_ms(Duration duration);
-/// "1F 01 FF"
-std::string upper_hex(ByteView bytes, std::string_view separator = " ");
-
-/// True if this Accept header prefers `type` to JSON (RFC 9110 12.5.1; false for "").
-bool prefers(std::string_view accept, std::string_view type);
-
-/// True if this Accept header prefers text/csv to JSON (RFC 9110 12.5.1; false for "").
-bool prefers_csv(std::string_view accept);
-
+/// True if this Accept header names text/csv, and JSON not before it. Weights are not read.
+bool wants_csv(std::string_view accept);
 /// One CSV record (RFC 4180) of these fields.
 std::string csv_line(std::span<const std::string_view> fields);
 /// The same from an object's members: null and missing ones become empty fields.
 std::string csv_line(const boost::json::object& object, std::span<const std::string_view> columns);
-HttpResponse csv_response(std::string body);
 
 /// Packs a body with gzip, in pieces that yield to the loop.
 boost::asio::awaitable<std::string> packed(std::string body);
+/// Yields to the loop. If the caller leaves meanwhile, what its request refers to may be gone.
+boost::asio::awaitable<void> yield_turn();
 
 /// Builds the text of a large JSON object of lists and members in pieces: its caller yields to the
 /// loop whenever is_turn_over().
@@ -80,20 +62,17 @@ class LongAnswer {
     std::size_t entries_ = 0;
 };
 
-/// Yields to the loop. If the caller leaves meanwhile, what its request refers to may be gone.
-boost::asio::awaitable<void> yield_turn();
-
-/// A list of flat objects. What `entry` refers to outlives the request, or `entry` owns it.
+/// A list of objects. What `entry` refers to outlives the request, or `entry` owns it.
 struct Table {
-    boost::json::object members;                ///< JSON members before the list
-    std::string_view name;                      ///< of the list
-    std::span<const std::string_view> columns;  ///< of text/csv
+    boost::json::object members{};                ///< JSON members before the list
+    std::string_view name;                        ///< of the list
+    std::span<const std::string_view> columns{};  ///< of text/csv; none: only JSON
     std::size_t count = 0;
-    std::function<boost::json::object(std::size_t)> entry;  ///< 0 to count - 1
+    std::function<boost::json::object(std::size_t)> entry{};  ///< 0 to count - 1
+    boost::json::object behind{};                             ///< JSON members behind the list
 };
-
-/// Renders the table as JSON, or as text/csv if the client prefers that, in pieces that yield to
-/// the loop.
+/// Renders the table as JSON, or as text/csv if it has columns and the client wants that, in pieces
+/// that yield to the loop.
 Handling table_answer(HttpRequest request, Table table);
 
 /// A long answer that is the same for all clients: text, tag and gzip are made once and then
@@ -113,5 +92,12 @@ class KeptAnswer {
     std::string tag_;
     std::string_view content_type_;
 };
+
+/// A weak validator (RFC 9110 8.8.1) of a body. It ignores what only time changes: members that end
+/// in _ms, and `time`.
+std::string tag_of(std::string_view body);
+/// Adds the ETag to the response. Returns true and sets status 304 if this If-None-Match names the
+/// tag (RFC 9110 13.1.2): the response then has no body.
+bool add_etag(HttpResponse& response, std::string_view if_none_match, const std::string& tag);
 
 }  // namespace panelgate::web

@@ -1,66 +1,13 @@
-#include "panelgate/web/api/events.hpp"
-
 #include <algorithm>
 #include <iterator>
 #include <sstream>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
 
-#include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/http/event_hub.hpp"
-#include "panelgate/web/http/json_text.hpp"
-#include "panelgate/web/http/message.hpp"
-#include "panelgate/web/http/problem.hpp"
-#include "points.hpp"
 #include "routes.hpp"
 #include "sight.hpp"
-#include "station_path.hpp"
+#include "target.hpp"
 
 namespace panelgate::web {
-
-/// The events that a request asks for, from the queries types, line, station and point, each a
-/// comma-separated list. 400 for an unknown type, and if no event of these types could match; 404
-/// for an unknown line, station or point.
-Parsed<EventFilter> event_filter_of(const HttpRequest& request, const Directory& directory);
-
-namespace json = boost::json;
-
-std::string point_event(const bus::StationRef& station, const points::Point& point,
-                        const points::PointReading& reading) {
-    json::object object = point_json(point, reading);
-    object["line"] = station.line;
-    object["station"] = station.name;
-    return json_text(object);
-}
-
-std::string line_event(std::string_view line, std::string_view state, std::string_view why) {
-    json::object object{{"line", line}, {"state", state}};
-    if (!why.empty()) object["why"] = why;
-    return json_text(object);
-}
-
-std::string station_event(std::string_view line, std::string_view station, std::string_view what) {
-    return json_text(json::object{{"line", line}, {"station", station}, {"event", what}});
-}
-
-std::string discovery_event(std::string_view line, std::string_view state, std::size_t asked,
-                            std::size_t of, std::size_t found) {
-    return json_text(json::object{
-        {"line", line}, {"state", state}, {"asked", asked}, {"of", of}, {"found", found}});
-}
-
-std::string transaction_event(std::string_view line, std::string_view station,
-                              std::uint8_t function, std::string_view outcome, Duration took) {
-    json::object object{{"line", line},
-                        {"station", nullptr},
-                        {"function", function},
-                        {"outcome", outcome},
-                        {"duration_ms", to_milliseconds(took)}};
-    if (!station.empty()) object["station"] = station;
-    return json_text(object);
-}
 
 namespace {
 
@@ -143,8 +90,9 @@ Parsed<void> check(const EventFilter& filter) {
                                               : "only events of the type point name a point");
 }
 
-}  // namespace
-
+/// The events that a request asks for, from the queries types, line, station and point, each a
+/// comma-separated list. 400 for an unknown type, and if no event of these types could match; 404
+/// for an unknown line, station or point.
 Parsed<EventFilter> event_filter_of(const HttpRequest& request, const Directory& directory) {
     EventFilter filter;
     if (const auto types = add_types(filter, request); !types) return types.error();
@@ -152,6 +100,8 @@ Parsed<EventFilter> event_filter_of(const HttpRequest& request, const Directory&
     if (const auto checked = check(filter); !checked) return checked.error();
     return filter;
 }
+
+}  // namespace
 
 Handling get_events(HttpRequest request, const Api* api) {
     auto filter = event_filter_of(request, *api->directory);

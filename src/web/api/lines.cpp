@@ -1,25 +1,15 @@
-#include <boost/json/array.hpp>
-#include <boost/json/object.hpp>
+#include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <cstdlib>
-#include <map>
-#include <optional>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
 
 #include "answer.hpp"
-#include "body.hpp"
-#include "panelgate/base/fault.hpp"
-#include "panelgate/bus/bus_client.hpp"
+#include "exchange.hpp"
+#include "panelgate/web/api/render.hpp"
 #include "panelgate/web/api/sources.hpp"
-#include "panelgate/web/http/json_text.hpp"
-#include "panelgate/web/http/message.hpp"
+#include "panelgate/web/api/values.hpp"
 #include "routes.hpp"
 #include "sight.hpp"
-#include "station_path.hpp"
+#include "target.hpp"
 
 namespace panelgate::web {
 
@@ -101,18 +91,14 @@ bus::LineStatus status_of(const LineEntry& line, const Sight& sight) {
 
 Handling get_lines(HttpRequest request, const Api* api) {
     const Sight sight(*api->directory, request.caller->who());
-    LongAnswer body;
-    body.begin_list("lines");
-    for (std::size_t i = 0; i < api->directory->lines.size(); ++i) {
-        const LineEntry& line = api->directory->lines[i];
-        if (sight.line(line)) body.add(describe(line, status_of(line, sight)));
-        if (!body.is_turn_over()) continue;
-        boost::asio::awaitable<void> turn = yield_turn();
-        co_await std::move(turn);
-        if (request.caller->has_left()) co_return HttpResponse{};
-    }
-    body.end_list();
-    co_return body.response();
+    std::vector<const LineEntry*> seen;
+    for (const LineEntry& line : api->directory->lines)
+        if (sight.line(line)) seen.push_back(&line);
+    Table table{.name = "lines", .count = seen.size()};
+    table.entry = [seen = std::move(seen), sight](std::size_t i) {
+        return describe(*seen[i], status_of(*seen[i], sight));
+    };
+    return table_answer(std::move(request), std::move(table));
 }
 
 Handling get_line(HttpRequest request, const Api* api) {
@@ -250,54 +236,172 @@ Handling delete_discovery(HttpRequest request, const Api* api) {
 
 namespace {
 
-Parsed<StationEntry> find_simulated(const Directory& directory, const std::string& name) {
-    auto station = find_station(directory, name);
-    if (station && !station->simulated)
-        return problem(404, "station '" + name + "' is not simulated");
-    return station;
+/// The function that most of the line's listed panels accept as a broadcast; in a tie the preferred
+/// one.
+std::uint8_t broadcast_function(const Directory& directory, const LineEntry& line,
+                                const std::vector<std::uint8_t>& functions) {
+    const auto takers = [&](std::uint8_t function) {
+        return std::ranges::count_if(directory.stations, [&](const StationEntry& station) {
+            if (station.line != line.name) return false;
+            const auto* rule = station.profile->find_function(function);
+            return rule != nullptr && rule->broadcast;
+        });
+    };
+    return *std::ranges::max_element(functions, {}, takers);
 }
 
-/// The body's members as numbers; true is 1 and false is 0.
-Parsed<std::map<std::string, double>> numbers_of(const json::object& body) {
-    std::map<std::string, double> numbers;
-    for (const auto& [key, value] : body) {
-        if (!value.is_number() && !value.is_bool())
-            return problem(400, "the fault '" + excerpt(std::string(key)) +
-                                    "' must be a number, true or false");
-        numbers[key] = value.is_bool() ? (value.get_bool() ? 1 : 0) : value.to_number<double>();
+Parsed<bus::Request> broadcast_request(const Directory& directory, const LineEntry& line,
+                                       const json::object& body) {
+    const auto word = string_member(body, "table");
+    if (!word) return word.error();
+    const auto table = parse_table(*word, 400);
+    if (!table) return table.error();
+    if (!is_writable(*table)) return problem(422, *word + " cannot be written", "not-writable");
+    const auto address = number_member(body, "address", 0, 0xFFFF);
+    if (!address) return address.error();
+    const auto cells = cells_of(body, *table);
+    if (!cells) return cells.error();
+
+    const auto functions = write_functions(*table, cells->size());
+    const std::uint8_t function = broadcast_function(directory, line, functions);
+    const unsigned limit = directory.generic->max_count(function);
+    if (cells->size() > limit || *address + static_cast<std::int64_t>(cells->size()) > 0x10000) {
+        return problem(422, "at most " + std::to_string(limit) +
+                                " values in one broadcast, up to address 65535");
     }
-    return numbers;
+    return request_to(0, encode_write(function, static_cast<std::uint16_t>(*address), *cells));
 }
 
-HttpResponse faults_of(const StationEntry& station) {
-    json::object faults;
-    for (const auto& [name, value] : station.simulated->faults()) faults[name] = value;
+/// The answer to a broadcast: 202, because no station replies to one.
+HttpResponse broadcast_answer(const bus::Answer& answer) {
+    if (answer.refusal || !answer.pdu) return to_response(problem_of(answer));
+    return json_response(202, json::object{{"transmitted", true}, {"confirmed", false}});
+}
+
+/// Reads back from each listed station of the line, one after the other, while there is time; the
+/// rest is reported as not read. "confirmed": all of these stations have the new values.
+Handling read_everywhere(HttpRequest request, const Api* api, const LineEntry* line,
+                         Verification written, Patience patience) {
+    json::array stations;
+    bool all = true;
+    for (const StationEntry& station : api->directory->stations) {
+        if (station.line != line->name) continue;
+        json::object result{{"station", station.name}};
+        boost::asio::awaitable<bool> reads =
+            read_back(request.caller, &station, &written, patience, &result);
+        const bool holds = co_await std::move(reads);
+        all = all && holds;
+        stations.push_back(std::move(result));
+    }
+    json::object body{{"transmitted", true}, {"confirmed", all && !stations.empty()}};
+    body["stations"] = std::move(stations);
+    co_return json_response(200, body);
+}
+
+}  // namespace
+
+Handling post_broadcast(HttpRequest request, const Api* api) {
+    const auto line = find_line(*api->directory, request.arguments[0]);
+    if (!line) co_return to_response(line.error());
+    const auto body = parse_object(request.body, {"table", "address", "values", "verify"});
+    if (!body) co_return to_response(body.error());
+    const auto verify = flag_member(*body, "verify");
+    if (!verify) co_return to_response(verify.error());
+    // An invalid request is reported first; a valid one is for the bus to refuse, which counts and
+    // logs it.
+    auto planned = broadcast_request(*api->directory, **line, *body);
+    if (!planned) co_return to_response(planned.error());
+    bus::Request made = std::move(*planned);
+    const auto written = Verification::of(made.request);
+    const Patience patience((*line)->deadline, api->providers.now);
+    const bus::Answer answer =
+        co_await ask(request.caller, (*line)->bus, std::move(made), patience);
+    if (!*verify || answer.refusal || !answer.pdu) co_return broadcast_answer(answer);
+    boost::asio::awaitable<HttpResponse> reading =
+        read_everywhere(std::move(request), api, *line, *written, patience);
+    co_return co_await std::move(reading);
+}
+
+namespace {
+
+Parsed<void> check_raw_station(const Directory& directory, const LineEntry& line, std::uint8_t id,
+                               bool may) {
+    const std::string name = line.name + ":" + std::to_string(id);
+    if (id != 0 && !directory.find_station(name))
+        return problem(404, "there is no station '" + name + "'", "unknown-station");
+    if (id != 0 && may) return {};
+    if (const auto refusal = line.bus->write_refusal(id)) return problem_of(*refusal);
+    return {};
+}
+
+/// No station answers a broadcast, so a broadcast can only write.
+Problem no_broadcast() {
+    Problem made = problem_of(Fault::denied, false);
+    made.detail =
+        "refused here, nothing was sent: station 0 is all stations of the line, of which none "
+        "answers: a broadcast can write (05, 06, 15, 16), but not read";
+    return made;
+}
+
+Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& line,
+                                 const json::object& body) {
+    const auto station = number_member(body, "station", 0, modbus::kMaxListedStation);
+    if (!station) return station.error();
+    const auto hex = string_member(body, "pdu");
+    if (!hex) return hex.error();
+    auto pdu = from_hex(*hex);
+    if (!pdu || pdu->empty() || pdu->size() > modbus::kMaxPdu) {
+        return problem(400, "pdu must be 1 to 253 bytes as pairs of hex digits");
+    }
+    const auto id = static_cast<std::uint8_t>(*station);
+    const bool reads = modbus::is_pure_read(*pdu);  // also if it is malformed
+    const bool spreads = modbus::is_broadcastable(pdu->front());
+    auto made = request_to(id, std::move(*pdu));
+    if (id == 0 && !spreads && (made || reads)) return no_broadcast();
+    const auto allowed = check_raw_station(directory, line, id, reads || made);
+    if (!allowed) return allowed.error();
+    return made;
+}
+
+/// Reports a request that is invalid or refused before the bus is asked: the bus counts and logs
+/// it.
+void count_refused(Caller& caller, bus::RequestPort& bus, const json::object& body) {
+    const auto station = number_member(body, "station", 0, modbus::kMaxListedStation);
+    const auto hex = string_member(body, "pdu");
+    const auto pdu = hex ? from_hex(*hex) : std::nullopt;
+    if (!station || !pdu || pdu->empty() || pdu->size() > modbus::kMaxPdu) return;
+    introduce(caller, &bus);
+    bus.count_refused(static_cast<std::uint8_t>(*station), *pdu, caller.who());
+}
+
+/// A panel's exception reply is a normal answer here.
+HttpResponse raw_answer(const bus::Answer& answer) {
+    if (answer.refusal || !answer.pdu) return to_response(problem_of(answer));
     json::object body;
-    body["station"] = station.name;
-    body["faults"] = std::move(faults);
+    body["pdu"] = upper_hex(*answer.pdu, "");
+    if (const auto code = modbus::exception_of(*answer.pdu)) body["exception"] = *code;
     return json_response(200, body);
 }
 
 }  // namespace
 
-Handling get_simulated(HttpRequest request, const Api* api) {
-    const auto station = find_simulated(*api->directory, request.arguments[0]);
-    if (!station) co_return to_response(station.error());
-    co_return faults_of(*station);
-}
-
-Handling put_simulated(HttpRequest request, const Api* api) {
-    const auto station = find_simulated(*api->directory, request.arguments[0]);
-    if (!station) co_return to_response(station.error());
-    const auto body = parse_object(request.body);
+Handling post_raw(HttpRequest request, const Api* api) {
+    const auto line = find_line(*api->directory, request.arguments[0]);
+    if (!line) co_return to_response(line.error());
+    const auto body = parse_object(request.body, {"station", "pdu"});
     if (!body) co_return to_response(body.error());
-    const auto numbers = numbers_of(*body);
-    if (!numbers) co_return to_response(numbers.error());
-    if (const auto wrong = station->simulated->set_faults(*numbers))
-        co_return to_response(problem(400, *wrong));
-    log_client(*request.caller, "simulator faults set",
-               {{"station", station->name}, {"faults", json_text(*body)}});
-    co_return faults_of(*station);
+    auto planned = raw_request(*api->directory, **line, *body);
+    if (!planned) {
+        count_refused(*request.caller, *(*line)->bus, *body);
+        co_return to_response(planned.error());
+    }
+    bus::Request made = std::move(*planned);
+    const bool broadcast = made.station == 0;
+    const Patience patience((*line)->deadline, api->providers.now);
+    made.raw = made.verbatim = true;
+    const bus::Answer answer =
+        co_await ask(request.caller, (*line)->bus, std::move(made), patience);
+    co_return broadcast ? broadcast_answer(answer) : raw_answer(answer);
 }
 
 }  // namespace panelgate::web

@@ -2,15 +2,9 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <span>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
 
-#include "conduct.hpp"
+#include "answer.hpp"
 #include "panelgate/web/http/gzip.hpp"
-#include "panelgate/web/http/problem.hpp"
 #include "routes.hpp"
 
 namespace panelgate::web {

@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cstddef>
 #include <iterator>
-#include <string_view>
-#include <utility>
 
-#include "answer.hpp"
+#include "panelgate/base/bytes.hpp"
 #include "panelgate/base/words.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/web/api/render.hpp"
 
 namespace panelgate::web {
 
@@ -19,12 +18,17 @@ constexpr std::uint32_t kInterface = 1;
 constexpr std::uint32_t kPacket = 6;
 constexpr std::uint32_t kByteOrder = 0x1A2B3C4D;
 
+constexpr std::uint16_t kExportedPdu = 252;    ///< LINKTYPE_WIRESHARK_UPPER_PDU
+constexpr std::size_t kLongestComment = 1000;  ///< bytes
+
 constexpr std::uint16_t kEndOfOptions = 0;
 constexpr std::uint16_t kComment = 1;
 constexpr std::uint16_t kPacketFlags = 2;
 constexpr std::uint16_t kInterfaceName = 2;
 constexpr std::uint16_t kApplication = 4;
 constexpr std::uint16_t kTimeResolution = 9;
+constexpr std::uint64_t kReceived = 1;  ///< values of epb_flags
+constexpr std::uint64_t kSent = 2;
 constexpr char kMicroseconds = 6;  ///< 10 to the -6
 
 void put(std::string& text, std::uint64_t value, int bytes) {
@@ -50,50 +54,13 @@ void put_block(std::string& text, std::uint32_t type, const std::string& body) {
     put(text, body.size() + kAround, 4);
 }
 
-}  // namespace
-
-Pcapng::Pcapng(std::string_view application, std::string_view interface, std::uint16_t link) {
-    std::string section;
-    put(section, kByteOrder, 4);
-    put(section, 1, 2);  // version 1.0
-    put(section, 0, 2);
-    put(section, UINT64_MAX, 8);  // section length unknown
-    put_option(section, kApplication, application);
-    put_option(section, kEndOfOptions, {});
-    put_block(text_, kSection, section);
-
-    std::string described;
-    put(described, link, 2);
-    put(described, 0, 2);
-    put(described, 0, 4);  // snapshot length: no limit
-    put_option(described, kInterfaceName, interface);
-    put_option(described, kTimeResolution, std::string_view(&kMicroseconds, 1));
-    put_option(described, kEndOfOptions, {});
-    put_block(text_, kInterface, described);
-}
-
-void Pcapng::add(const Packet& packet) {
-    const auto time = static_cast<std::uint64_t>(packet.time.time_since_epoch().count());
-    std::string body;
-    put(body, 0, 4);  // the interface
-    put(body, time >> 32, 4);
-    put(body, time, 4);
-    put(body, packet.bytes.size(), 4);
-    put(body, packet.bytes.size(), 4);
-    body += packet.bytes;
-    pad(body);
-    std::string flags;
-    put(flags, static_cast<std::uint64_t>(packet.way), 4);
-    put_option(body, kPacketFlags, flags);
-    for (const std::string& comment : packet.comments)
-        put_option(body, kComment, std::string_view(comment).substr(0, kLongestComment));
-    put_option(body, kEndOfOptions, {});
-    put_block(text_, kPacket, body);
-}
-
-namespace {
-
-using Form = ExportedFrame::Form;
+/// How a frame is exported. The addresses are as if the master were 127.0.0.1 and station 31 were
+/// 127.0.1.31.
+enum class Form : std::uint8_t {
+    rtu,    ///< Modbus RTU
+    tcp,    ///< translated to Modbus/TCP, without the CRC
+    bytes,  ///< raw bytes
+};
 
 /// wireshark/exported_pdu.h
 enum class Tag : std::uint16_t {
@@ -130,28 +97,29 @@ void put_tag(Writer& out, Tag tag, std::string_view text) {
         out.u8(i < text.size() ? static_cast<std::uint8_t>(text[i]) : 0);
 }
 
-}  // namespace
-
-std::string exported_pdu(const ExportedFrame& frame) {
-    const std::uint32_t station = kStation + (frame.adu.empty() ? 0 : frame.adu.front());
-    Writer out(80 + frame.adu.size());
-    put_tag(out, Tag::dissector, dissector_of(frame.form));
-    put_tag(out, Tag::ipv4_source, frame.request ? kMaster : station);
-    put_tag(out, Tag::ipv4_destination, frame.request ? station : kMaster);
+/// The frame (address to CRC) as an exported PDU: the dissector to use, addresses and ports, bytes.
+std::string exported_pdu(ByteView adu, Form form, bool request) {
+    const std::uint32_t station = kStation + (adu.empty() ? 0 : adu.front());
+    Writer out(80 + adu.size());
+    put_tag(out, Tag::dissector, dissector_of(form));
+    put_tag(out, Tag::ipv4_source, request ? kMaster : station);
+    put_tag(out, Tag::ipv4_destination, request ? station : kMaster);
     put_tag(out, Tag::port_type, kTcp);
-    put_tag(out, Tag::source_port, frame.request ? kMastersPort : kStationsPort);
-    put_tag(out, Tag::destination_port, frame.request ? kStationsPort : kMastersPort);
+    put_tag(out, Tag::source_port, request ? kMastersPort : kStationsPort);
+    put_tag(out, Tag::destination_port, request ? kStationsPort : kMastersPort);
     put_tag(out, Tag::end, std::string_view());
-    ByteView bytes = frame.adu;
-    if (frame.form == Form::tcp) {
-        bytes = bytes.first(bytes.size() - kCrc);
-        out.u16(0).u16(0).u16(static_cast<unsigned>(bytes.size()));
+    if (form == Form::tcp) {
+        adu = adu.first(adu.size() - kCrc);
+        out.u16(0).u16(0).u16(static_cast<unsigned>(adu.size()));
     }
-    out.raw(bytes);
+    out.raw(adu);
     const Bytes text = out.take();
     return {text.begin(), text.end()};
 }
 
+/// True if Wireshark's Modbus RTU dissector recognizes this valid frame as a request or reply. It
+/// goes by function and length alone (packet-mbtcp.c, 4.0), and does not know broadcasts or frames
+/// shorter than five bytes.
 bool is_seen_by_rtu(ByteView adu, bool request) {
     constexpr std::size_t kShort = 8;  ///< a request to read, a confirmed write of several
     if (adu.size() < 5 || adu[0] == 0) return false;
@@ -173,8 +141,6 @@ bool is_seen_by_rtu(ByteView adu, bool request) {
     }
 }
 
-namespace {
-
 bool is_request(FrameKind kind) {
     return direction_of(kind) == FrameDirection::sent || kind == FrameKind::heard_request ||
            kind == FrameKind::foreign_request || kind == FrameKind::echo;
@@ -192,34 +158,65 @@ std::vector<std::string> comments_on(const bus::TraceFrame& frame) {
 
 }  // namespace
 
-TracePcapng::TracePcapng(std::string_view version, std::string_view line)
-    : file_("panelgate " + std::string(version), line, kExportedPdu) {}
+TracePcapng::TracePcapng(std::string_view version, std::string_view line) {
+    std::string section;
+    put(section, kByteOrder, 4);
+    put(section, 1, 2);  // version 1.0
+    put(section, 0, 2);
+    put(section, UINT64_MAX, 8);  // section length unknown
+    put_option(section, kApplication, "panelgate " + std::string(version));
+    put_option(section, kEndOfOptions, {});
+    put_block(text_, kSection, section);
+
+    std::string described;
+    put(described, kExportedPdu, 2);
+    put(described, 0, 2);
+    put(described, 0, 4);  // snapshot length: no limit
+    put_option(described, kInterfaceName, line);
+    put_option(described, kTimeResolution, std::string_view(&kMicroseconds, 1));
+    put_option(described, kEndOfOptions, {});
+    put_block(text_, kInterface, described);
+}
 
 /// Damaged frames are exported as plain bytes. A reply is exported like its request, or Wireshark
 /// would not match them.
-ExportedFrame TracePcapng::exported(const bus::TraceFrame& frame) {
-    ExportedFrame made;
-    made.adu = frame.bytes;
-    made.request = is_request(frame.kind);
-    if (frame.kind == FrameKind::damaged || frame.bytes.size() < modbus::kMinAdu) return made;
-    const bool seen = is_seen_by_rtu(frame.bytes, made.request);
-    if (made.request) as_tcp_ = !seen;
-    made.form =
-        seen && (made.request || !as_tcp_) ? ExportedFrame::Form::rtu : ExportedFrame::Form::tcp;
-    return made;
-}
-
-Pcapng::Packet TracePcapng::packet_of(const bus::TraceFrame& frame) {
-    Pcapng::Packet packet;
+TracePcapng::Packet TracePcapng::packet_of(const bus::TraceFrame& frame) {
+    const bool request = is_request(frame.kind);
+    Form form = Form::bytes;
+    if (frame.kind != FrameKind::damaged && frame.bytes.size() >= modbus::kMinAdu) {
+        const bool seen = is_seen_by_rtu(frame.bytes, request);
+        if (request) as_tcp_ = !seen;
+        form = seen && (request || !as_tcp_) ? Form::rtu : Form::tcp;
+    }
+    Packet packet;
     packet.time = frame.time;
-    packet.way =
-        direction_of(frame.kind) == FrameDirection::sent ? Pcapng::Way::out : Pcapng::Way::in;
-    const ExportedFrame shown = exported(frame);
-    packet.bytes = exported_pdu(shown);
+    packet.sent = direction_of(frame.kind) == FrameDirection::sent;
+    packet.bytes = exported_pdu(frame.bytes, form, request);
     packet.comments = comments_on(frame);
-    if (shown.form == ExportedFrame::Form::tcp)
+    if (form == Form::tcp)
         packet.comments.push_back("on the wire, as RTU: " + upper_hex(frame.bytes));
     return packet;
+}
+
+void TracePcapng::write_last() {
+    if (!last_) return;
+    const auto time = static_cast<std::uint64_t>(last_->time.time_since_epoch().count());
+    std::string body;
+    put(body, 0, 4);  // the interface
+    put(body, time >> 32, 4);
+    put(body, time, 4);
+    put(body, last_->bytes.size(), 4);
+    put(body, last_->bytes.size(), 4);
+    body += last_->bytes;
+    pad(body);
+    std::string flags;
+    put(flags, last_->sent ? kSent : kReceived, 4);
+    put_option(body, kPacketFlags, flags);
+    for (const std::string& comment : last_->comments)
+        put_option(body, kComment, std::string_view(comment).substr(0, kLongestComment));
+    put_option(body, kEndOfOptions, {});
+    put_block(text_, kPacket, body);
+    last_.reset();
 }
 
 void TracePcapng::add(const bus::TracePart& part) {
@@ -230,23 +227,17 @@ void TracePcapng::add(const bus::TracePart& part) {
     };
     for (const bus::TraceFrame& frame : part.frames) {
         decide_until(frame.sequence);
-        add(packet_of(frame));
+        write_last();
+        last_ = packet_of(frame);
+        std::ranges::move(std::exchange(decided_, {}), std::back_inserter(last_->comments));
     }
     decide_until(UINT64_MAX);
 }
 
-void TracePcapng::add(Pcapng::Packet packet) {
-    std::ranges::move(std::exchange(decided_, {}), std::back_inserter(packet.comments));
-    if (last_) file_.add(*last_);
-    last_ = std::move(packet);
-}
-
 std::string TracePcapng::finish() {
-    if (last_) {
-        std::ranges::move(std::exchange(decided_, {}), std::back_inserter(last_->comments));
-        file_.add(*std::exchange(last_, std::nullopt));
-    }
-    return file_.take();
+    if (last_) std::ranges::move(std::exchange(decided_, {}), std::back_inserter(last_->comments));
+    write_last();
+    return take();
 }
 
 }  // namespace panelgate::web

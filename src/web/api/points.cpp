@@ -1,67 +1,16 @@
-#include "points.hpp"
-
-#include <boost/json/array.hpp>
 #include <cmath>
-#include <cstdint>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <variant>
-#include <vector>
 
 #include "answer.hpp"
-#include "key_book.hpp"
-#include "panelgate/base/decimal.hpp"
-#include "panelgate/base/time.hpp"
-#include "panelgate/modbus/request.hpp"
-#include "panelgate/modbus/response.hpp"
-#include "panelgate/points/station_points.hpp"
+#include "exchange.hpp"
+#include "panelgate/web/api/render.hpp"
 #include "panelgate/web/http/json_text.hpp"
-#include "panelgate/web/http/query.hpp"
-#include "reading.hpp"
 #include "routes.hpp"
 #include "sight.hpp"
-#include "station_path.hpp"
+#include "target.hpp"
 
 namespace panelgate::web {
 
 namespace json = boost::json;
-
-namespace {
-
-struct Maker {
-    json::value operator()(const auto& value) const { return json::value(value); }
-    json::value operator()(const Decimal& value) const { return exact_number(value.text()); }
-};
-
-}  // namespace
-
-json::value json_of(const points::Value& value) { return std::visit(Maker(), value); }
-
-json::object point_json(const points::Point& point, const points::PointReading& reading) {
-    json::object object;
-    object["name"] = point.name;
-    object["value"] = nullptr;
-    if (reading.value) object["value"] = json_of(*reading.value);
-    if (reading.label) object["label"] = *reading.label;
-    object["unit"] = point.unit;
-    object["quality"] = label(reading.quality);
-    object["age_ms"] = nullptr;
-    if (reading.age) {
-        object["age_ms"] = whole_ms(*reading.age);
-    }
-    return object;
-}
-
-points::PointReading point_reading(const points::Point& point, const Reading& reading) {
-    points::PointReading made;
-    made.value = points::decode(point, reading.items);
-    made.label = points::label_of(point, reading.items);
-    made.quality = made.value ? points::Quality::good : points::Quality::bad;
-    made.age = reading.age;
-    return made;
-}
-
 namespace {
 
 using points::Point;
@@ -132,21 +81,6 @@ std::vector<Owned> points_of_all(const Directory& directory, const Sight& sight)
     return all;
 }
 
-json::array describe(const std::vector<points::Interpretation>& all) {
-    json::array list;
-    for (const points::Interpretation& one : all) {
-        json::object object;
-        object["type"] = label(one.type);
-        object["word_order"] = label(one.order);
-        json::array values;
-        for (const std::string& value : one.values)
-            values.push_back(value.empty() ? json::value(nullptr) : json::value(value));
-        object["values"] = std::move(values);
-        list.push_back(std::move(object));
-    }
-    return list;
-}
-
 }  // namespace
 
 Handling get_points(HttpRequest request, const Api* api) {
@@ -154,7 +88,7 @@ Handling get_points(HttpRequest request, const Api* api) {
     if (!station) co_return to_response(station.error());
     const auto raw = query_flag(request, "raw");
     if (!raw) co_return to_response(raw.error());
-    if (*raw && prefers_csv(request.headers["accept"]))
+    if (*raw && wants_csv(request.headers["accept"]))
         co_return to_response(problem(400, "raw is for JSON, not for text/csv"));
     const points::StationPoints* const all = station->points;
     const Sight sight(*api->directory, request.caller->who());
@@ -190,59 +124,25 @@ Handling get_all_points(HttpRequest request, const Api* api) {
     co_return co_await std::move(answering);
 }
 
-namespace {
-
-/// True behind a write: then the panel's own value is asked for, where the line has no other
-/// master.
-bool may_differ(const PointOfStation& of) {
-    return of.station.points->is_outdated(*of.point) && !of.station.bus->status().listens;
-}
-
-json::object describe(const Api& api, const Point& point, const Reading& reading, bool raw) {
-    return describe(api, api.providers.now(), point, point_reading(point, reading),
-                    raw ? &reading.items : nullptr);
-}
-
-}  // namespace
-
 Handling get_point(HttpRequest request, const Api* api) {
     const auto found = find_point(*api->directory, request.arguments[0], request.arguments[1]);
     if (!found) co_return to_response(found.error());
     const auto raw = query_flag(request, "raw");
     if (!raw) co_return to_response(raw.error());
-    const points::Point& point = *found->point;
-    if (may_differ(*found)) {
-        const Duration deadline = api->directory->line_of(found->station).deadline;
-        const Patience patience(request, deadline, api->providers.now);
-        const modbus::Span span{point.table, point.address, point.count()};
+    const Point& point = *found->point;
+    const StationEntry& station = found->station;
+    // Behind a write the panel's own value is asked for, where the line has no other master.
+    if (station.points->is_outdated(point) && !station.bus->status().listens) {
+        const Patience patience(api->directory->line_of(station).deadline, api->providers.now);
         boost::asio::awaitable<Parsed<Reading>> reads =
-            read_all(request.caller, &found->station, span, patience);
+            read_all(request.caller, &station, found->span, patience);
         const Parsed<Reading> reading = co_await std::move(reads);
-        if (reading) co_return json_response(200, describe(*api, point, *reading, *raw));
+        if (reading)
+            co_return json_response(
+                200, describe(*api, api->providers.now(), point, point_reading(point, *reading),
+                              *raw ? &reading->items : nullptr));
     }
-    co_return json_response(200, describe(*api, *found->station.points, point, *raw));
-}
-
-Handling get_interpretations(HttpRequest request, const Api* api) {
-    auto items = items_of_table_path(request, *api->directory);
-    if (!items) co_return to_response(items.error());
-    constexpr unsigned kMost = 16;  // registers: for one value, not for a memory dump
-    if (modbus::is_bit_table(items->span.table) || items->span.count > kMost)
-        co_return to_response(problem(422, "interpretations are of 1 to 16 registers"));
-    const Duration deadline = api->directory->line_of(items->station).deadline;
-    const Patience patience(request, deadline, api->providers.now);
-    bus::Request made{.station = items->station.id, .request = modbus::Request::read(items->span)};
-    made.within = patience.left();
-    bus::Answer answer = co_await ask(request.caller, items->station.bus, std::move(made));
-    const auto failed = problem_of(answer, *items->station.profile);
-    if (failed) co_return to_response(*failed);
-    const auto registers = modbus::registers_of(*answer.pdu);
-    json::object body;
-    body["station"] = items->station.name;
-    body["address"] = items->span.first;
-    body["raw"] = json::array(registers.begin(), registers.end());
-    body["interpretations"] = describe(points::interpretations(registers));
-    co_return json_response(200, body);
+    co_return json_response(200, describe(*api, *station.points, point, *raw));
 }
 
 Handling get_relays(HttpRequest request, const Api* api) {
@@ -260,14 +160,10 @@ Handling get_relays(HttpRequest request, const Api* api) {
         object["read_failures"] = relay.read_failures;
         object["write_failures"] = relay.write_failures;
         object["last_write_ms"] = nullptr;
-        if (relay.last_write) {
-            object["last_write_ms"] = whole_ms(now - *relay.last_write);
-        }
+        if (relay.last_write) object["last_write_ms"] = whole_ms(now - *relay.last_write);
         list.push_back(std::move(object));
     }
-    json::object body;
-    body["relays"] = std::move(list);
-    co_return json_response(200, body);
+    co_return json_response(200, json::object{{"relays", std::move(list)}});
 }
 
 }  // namespace panelgate::web

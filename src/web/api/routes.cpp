@@ -1,17 +1,23 @@
 #include "routes.hpp"
 
 #include <algorithm>
-#include <boost/json/object.hpp>
 #include <iterator>
-#include <optional>
-#include <string_view>
-#include <utility>
 
-#include "conduct.hpp"
+#include "answer.hpp"
+#include "once.hpp"
+#include "panelgate/web/http/gzip.hpp"
+#include "sight.hpp"
 
 namespace panelgate::web {
 
 namespace {
+
+/// What the answers of a route have in addition to its handler's answer.
+struct RoutePolicy {
+    bool asks = false;    ///< it asks lines: the answer lists its transactions
+    bool once = false;    ///< a write: it accepts Idempotency-Key
+    bool tagged = false;  ///< a status: it has an ETag
+};
 
 constexpr Role kFree = Role::none;
 constexpr Role kSee = Role::viewer;
@@ -23,6 +29,12 @@ constexpr std::string_view kReading = "count type order length raw";
 /// A page contains no data of the plant: every client gets it, and its token requests the data.
 constexpr Role kPage = Role::none;
 constexpr bool kProbe = true;
+
+constexpr Shown kShowsNone = Shown::nothing;
+constexpr Shown kShowsLine = Shown::line;
+constexpr Shown kShowsAll = Shown::whole_line;
+constexpr Shown kShowsStation = Shown::station;
+constexpr Shown kShowsPoint = Shown::point;
 
 constexpr RoutePolicy kPlain{};
 constexpr RoutePolicy kTagged{.tagged = true};
@@ -36,6 +48,7 @@ struct Row {
     std::string_view pattern;
     Handler handler;
     Role needed;
+    Shown shows = Shown::nothing;  ///< of what the path names
     RoutePolicy policy = {};
     std::string_view queries = {};  ///< separated by blanks
     bool probe = false;
@@ -50,49 +63,52 @@ constexpr Row kRows[] = {
     {"GET", "/docs/{}", get_manual, kPage},
     {"GET", "/docs/{}/{}", get_manual, kPage},
     {"GET", "/openapi.json", get_openapi, kSee},
-    {"GET", "/healthz", get_healthz, kFree, kPlain, {}, kProbe},
-    {"GET", "/readyz", get_readyz, kFree, kPlain, {}, kProbe},
+    {"GET", "/healthz", get_healthz, kFree, kShowsNone, kPlain, {}, kProbe},
+    {"GET", "/readyz", get_readyz, kFree, kShowsNone, kPlain, {}, kProbe},
     {"GET", "/metrics", get_metrics, kSee},
     {"GET", "/api/v1/version", get_version, kSee},
     {"GET", "/api/v1/configuration", get_configuration, kSee},
     {"GET", "/api/v1/reload", get_reload, kSee},
-    {"POST", "/api/v1/reload", post_reload, kAdmin, kOnce, "rollback weaker"},
-    {"GET", "/api/v1/lines", get_lines, kSee, kTagged},
-    {"GET", "/api/v1/lines/{}", get_line, kSee, kTagged},
-    {"GET", "/api/v1/lines/{}/trace", get_trace, kSee, kPlain, "last since"},
-    {"GET", "/api/v1/lines/{}/history", get_line_history, kSee},
-    {"GET", "/api/v1/lines/{}/trace.pcapng", get_trace_pcapng, kSee},
-    {"GET", "/api/v1/lines/{}/incidents", get_incidents, kSee, kTagged},
-    {"GET", "/api/v1/lines/{}/incidents/{}", get_incident, kSee},
-    {"POST", "/api/v1/lines/{}/broadcast", post_broadcast, kEngineer, kWrites},
-    {"POST", "/api/v1/lines/{}/raw", post_raw, kEngineer, kWrites},
-    {"GET", "/api/v1/lines/{}/discover", get_discovery, kSee},
-    {"POST", "/api/v1/lines/{}/discover", post_discover, kEngineer, kOnce},
-    {"DELETE", "/api/v1/lines/{}/discover", delete_discovery, kEngineer, kOnce},
-    {"POST", "/api/v1/read", post_read, kSee, kAsks},
-    {"POST", "/api/v1/write", post_write, kChange, kWrites},
-    {"GET", "/api/v1/stations", get_stations, kSee, kTagged},
-    {"GET", "/api/v1/stations/{}", get_station, kSee, kTagged},
-    {"GET", "/api/v1/simulator/{}", get_simulated, kSee},
-    {"PUT", "/api/v1/simulator/{}", put_simulated, kEngineer},
-    {"GET", "/api/v1/events", get_events, kSee, kPlain, "types line station point"},
-    {"GET", "/api/v1/relays", get_relays, kSee, kTagged},
-    {"GET", "/api/v1/points", get_all_points, kSee, kTagged},
-    {"GET", "/api/v1/stations/{}/points", get_points, kSee, kTagged, "raw"},
-    {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee, kMayAsk, "raw"},
-    {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange, kWrites, "round"},
-    {"GET", "/api/v1/stations/{}/points/{}/history", get_point_history, kSee},
-    {"GET", "/api/v1/stations/{}/{}/{}/interpretations", get_interpretations, kSee, kAsks, "count"},
+    {"POST", "/api/v1/reload", post_reload, kAdmin, kShowsNone, kOnce, "rollback weaker"},
+    {"GET", "/api/v1/lines", get_lines, kSee, kShowsNone, kTagged},
+    {"GET", "/api/v1/lines/{}", get_line, kSee, kShowsLine, kTagged},
+    {"GET", "/api/v1/lines/{}/trace", get_trace, kSee, kShowsAll, kPlain, "last since"},
+    {"GET", "/api/v1/lines/{}/history", get_line_history, kSee, kShowsAll},
+    {"GET", "/api/v1/lines/{}/trace.pcapng", get_trace_pcapng, kSee, kShowsAll},
+    {"GET", "/api/v1/lines/{}/incidents", get_incidents, kSee, kShowsAll, kTagged},
+    {"GET", "/api/v1/lines/{}/incidents/{}", get_incident, kSee, kShowsAll},
+    {"POST", "/api/v1/lines/{}/broadcast", post_broadcast, kEngineer, kShowsNone, kWrites},
+    {"POST", "/api/v1/lines/{}/raw", post_raw, kEngineer, kShowsNone, kWrites},
+    {"GET", "/api/v1/lines/{}/discover", get_discovery, kSee, kShowsAll},
+    {"POST", "/api/v1/lines/{}/discover", post_discover, kEngineer, kShowsAll, kOnce},
+    {"DELETE", "/api/v1/lines/{}/discover", delete_discovery, kEngineer, kShowsAll, kOnce},
+    {"POST", "/api/v1/read", post_read, kSee, kShowsNone, kAsks},
+    {"POST", "/api/v1/write", post_write, kChange, kShowsNone, kWrites},
+    {"GET", "/api/v1/stations", get_stations, kSee, kShowsNone, kTagged},
+    {"GET", "/api/v1/stations/{}", get_station, kSee, kShowsStation, kTagged},
+    {"GET", "/api/v1/simulator/{}", get_simulated, kSee, kShowsStation},
+    {"PUT", "/api/v1/simulator/{}", put_simulated, kEngineer, kShowsStation},
+    {"GET", "/api/v1/events", get_events, kSee, kShowsNone, kPlain, "types line station point"},
+    {"GET", "/api/v1/relays", get_relays, kSee, kShowsNone, kTagged},
+    {"GET", "/api/v1/points", get_all_points, kSee, kShowsNone, kTagged},
+    {"GET", "/api/v1/stations/{}/points", get_points, kSee, kShowsStation, kTagged, "raw"},
+    {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee, kShowsPoint, kMayAsk, "raw"},
+    {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange, kShowsNone, kWrites, "round"},
+    {"GET", "/api/v1/stations/{}/points/{}/history", get_point_history, kSee, kShowsPoint},
+    {"GET", "/api/v1/stations/{}/{}/{}/interpretations", get_interpretations, kSee, kShowsStation,
+     kAsks, "count"},
     // Before the table routes: "devices" is not a table.
-    {"GET", "/api/v1/stations/{}/devices/{}/plan", get_device_plan, kSee, kTagged, "count values"},
-    {"GET", "/api/v1/stations/{}/{}/{}/plan", get_table_plan, kSee, kTagged, "count values"},
-    {"GET", "/api/v1/stations/{}/devices/{}", get_device, kSee, kAsks, kReading},
-    {"PUT", "/api/v1/stations/{}/devices/{}", put_device, kChange, kWrites},
-    {"GET", "/api/v1/stations/{}/{}/{}", get_table, kSee, kAsks, kReading},
-    {"PUT", "/api/v1/stations/{}/{}/{}", put_table, kChange, kWrites},
+    {"GET", "/api/v1/stations/{}/devices/{}/plan", get_device_plan, kSee, kShowsStation, kTagged,
+     "count values"},
+    {"GET", "/api/v1/stations/{}/{}/{}/plan", get_table_plan, kSee, kShowsStation, kTagged,
+     "count values"},
+    {"GET", "/api/v1/stations/{}/devices/{}", get_device, kSee, kShowsNone, kAsks, kReading},
+    {"PUT", "/api/v1/stations/{}/devices/{}", put_device, kChange, kShowsNone, kWrites},
+    {"GET", "/api/v1/stations/{}/{}/{}", get_table, kSee, kShowsNone, kAsks, kReading},
+    {"PUT", "/api/v1/stations/{}/{}/{}", put_table, kChange, kShowsNone, kWrites},
 };
 
-/// What a role of the configuration has to have for it.
+/// The right that a role of the configuration needs for the route.
 Right right_for(const Row& row) {
     if (row.needed == kSee) return Right::read;
     if (row.needed == kChange) return Right::write;
@@ -102,7 +118,7 @@ Right right_for(const Row& row) {
     return row.pattern.ends_with("/discover") ? Right::discover : Right::simulator;
 }
 
-/// Who may do something is told how it went.
+/// A role that may change something may also read how the change went.
 std::optional<Right> other_right_for(const Row& row) {
     if (row.needed != kSee) return std::nullopt;
     if (row.pattern.ends_with("/discover")) return Right::discover;
@@ -110,6 +126,9 @@ std::optional<Right> other_right_for(const Row& row) {
     if (row.pattern.ends_with("/reload")) return Right::reload;
     return std::nullopt;
 }
+
+/// The right by which a role of the configuration sees what the path names.
+Right sight_right(const Row& row) { return other_right_for(row).value_or(right_for(row)); }
 
 std::vector<std::string_view> words_of(std::string_view text) {
     std::vector<std::string_view> words;
@@ -121,13 +140,101 @@ std::vector<std::string_view> words_of(std::string_view text) {
     return words;
 }
 
+/// "17, 18", or "floor1:17, floor2:3" for several lines. A transaction that several parts of a
+/// request share is listed once.
+std::string text_of(const std::vector<Caller::Cost>& costs, const Directory& directory) {
+    constexpr std::size_t kLongest = 4000;  // characters: clients accept headers of 8,192
+    const bool one_line = std::ranges::all_of(
+        costs, [&](const Caller::Cost& cost) { return cost.line == costs.front().line; });
+    std::string text;
+    for (auto cost = costs.begin(); cost != costs.end(); ++cost) {
+        if (std::find(costs.begin(), cost, *cost) != cost) continue;
+        std::string one = std::to_string(cost->transaction);
+        const auto line = std::ranges::find(directory.lines, cost->line, &LineEntry::bus);
+        if (!one_line && line != directory.lines.end()) one.insert(0, line->name + ':');
+        if (text.size() + one.size() + 2 > kLongest) break;
+        text += (text.empty() ? "" : ", ") + one;
+    }
+    return text;
+}
+
+/// The handler's answer, with a Panelgate-Transactions header if it asked lines.
+Handling costed(HttpRequest request, const Api* api, Handler handler) {
+    const std::shared_ptr<Caller> caller = request.caller;
+    caller->take_costs();
+    Handling work = handler(std::move(request), api);
+    HttpResponse response = co_await std::move(work);
+    if (caller->has_left()) co_return response;
+    const std::vector<Caller::Cost> costs = caller->take_costs();
+    if (!costs.empty())
+        response.headers.emplace_back("Panelgate-Transactions", text_of(costs, *api->directory));
+    co_return response;
+}
+
+Handling handled(HttpRequest request, const Api* api, const Row& row) {
+    if (row.policy.once)
+        return once(api->keys, std::move(request), api->providers.now,
+                    [api, handler = row.handler](HttpRequest one) {
+                        return costed(std::move(one), api, handler);
+                    });
+    if (row.policy.asks) return costed(std::move(request), api, row.handler);
+    return row.handler(std::move(request), api);
+}
+
+bool has_header(const HttpResponse& response, std::string_view name) {
+    return std::ranges::any_of(response.headers,
+                               [&](const auto& header) { return header.first == name; });
+}
+
+/// True if the gateway itself found a fault: a bus would have judged the client as well.
+bool is_found_wrong_here(const HttpResponse& response) {
+    return response.status >= 400 && response.status < 500 && response.status != 403 &&
+           !has_header(response, "Panelgate-Transactions") &&
+           response.body.find("\"modbus_exception\":") == std::string::npos;
+}
+
+/// Runs the handler and applies the route's policy; packs the answer with gzip where that pays and
+/// the client accepts it.
+Handling conduct(HttpRequest request, const Api* api, const Row* row) {
+    const std::shared_ptr<Caller> caller = request.caller;
+    const Directory* const directory = api->directory;
+    const std::size_t gzip_from = api->providers.settings.gzip_from;
+    const bool takes_gzip = accepts_gzip(request.headers["accept-encoding"]);
+    const std::string if_none_match = request.headers["if-none-match"];
+    const std::vector<std::string> path = request.path;
+    if (directory != nullptr) {
+        if (const auto hidden = check_sight(request, *directory, row->shows, sight_right(*row)))
+            co_return to_response(*hidden);
+    }
+    Handling work = handled(std::move(request), api, *row);
+    HttpResponse response = co_await std::move(work);
+    if (caller->has_left()) co_return response;
+    if (directory != nullptr && is_found_wrong_here(response)) {
+        if (const auto hidden = instead_of_telling(path, caller->who(), *directory))
+            co_return to_response(*hidden);
+    }
+    if (row->policy.tagged && response.status == 200 &&
+        add_etag(response, if_none_match, tag_of(response.body)))
+        response.body.clear();
+    if (response.events || response.shared_body || response.body.size() < gzip_from ||
+        has_header(response, "Content-Encoding"))
+        co_return response;
+    add_vary(response, "Accept-Encoding");
+    if (!takes_gzip) co_return response;
+    response.made = response.body.size();
+    boost::asio::awaitable<std::string> packing = packed(std::move(response.body));
+    response.body = co_await std::move(packing);
+    response.headers.emplace_back("Content-Encoding", "gzip");
+    co_return response;
+}
+
 }  // namespace
 
 std::vector<Route> routes(std::shared_ptr<const Api> api) {
     std::vector<Route> made;
     for (const Row& row : kRows) {
         const auto call = [api, &row](HttpRequest request) {
-            return conduct(std::move(request), api.get(), row.handler, row.policy);
+            return conduct(std::move(request), api.get(), &row);
         };
         const bool face = std::ranges::find(kOfFaces, row.handler) != std::end(kOfFaces);
         made.push_back({row.verb, row.pattern, row.needed, call, words_of(row.queries), row.probe,

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "key_book.hpp"
+#include "once.hpp"
 #include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/api/server.hpp"
 #include "panelgate/web/http/message.hpp"

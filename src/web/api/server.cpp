@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "key_book.hpp"
+#include "once.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/tls/context.hpp"
 #include "panelgate/web/http/listener.hpp"

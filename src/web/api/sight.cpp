@@ -1,14 +1,10 @@
 #include "sight.hpp"
 
 #include <algorithm>
-#include <utility>
-#include <vector>
 
+#include "panelgate/base/text.hpp"
 #include "panelgate/base/words.hpp"
-#include "panelgate/modbus/function.hpp"
-#include "panelgate/points/station_points.hpp"
-#include "panelgate/web/http/query.hpp"
-#include "station_path.hpp"
+#include "panelgate/web/api/render.hpp"
 
 namespace panelgate::web {
 
@@ -19,16 +15,6 @@ using modbus::Span;
 
 /// Stands for stations that nobody has listed.
 constexpr std::uint8_t kUnlisted = 0;
-constexpr std::string_view kRelay = "relay ";
-
-/// The name of a relay tells which other station it writes to.
-void hide_relay(std::string& text) {
-    const auto at = text.find(kRelay);
-    if (at == text.npos) return;
-    const auto behind = text.find(" to station ", at);
-    text.erase(at + kRelay.size() - 1,
-               behind == text.npos ? behind : behind - at - kRelay.size() + 1);
-}
 
 /// What hides something of the station.
 access::Verdict hiding(const LineEntry& line, const WhoRef& who, std::uint8_t id) {
@@ -49,8 +35,7 @@ Problem denied(const LineEntry& line, const WhoRef& who, std::uint8_t id,
     return problem_of(bus::denial(verdict, station));
 }
 
-/// Who changes something by a right that is not reading, where that right is enough for what it
-/// names: as far as rules let him see it.
+/// The client, who may read as well if its own role has this right: as far as rules allow it.
 WhoRef as_reader(const HttpRequest& request, Right right) {
     const WhoRef& who = request.caller->who();
     if (!who->standing.own || !who->standing.may(right)) return who;
@@ -102,7 +87,7 @@ bool Sight::station(const StationEntry& one) const {
 }
 
 bool Sight::whole(const LineEntry& line, std::uint8_t id) const {
-    return !line.access || line.access->reads_all(who_, id);
+    return !line.access || line.access->may_all(who_, id, Act::read);
 }
 
 bool Sight::point(const StationEntry& station, const points::Point& point) const {
@@ -160,94 +145,40 @@ bool Sight::event(const EventTopic& topic) const {
     return topic.type == "line" ? line(*on) : whole(*on);
 }
 
-void Sight::mask(const LineEntry& line, bus::TracePart& part) const {
-    if (whole(line)) return;
-    for (bus::TraceFrame& frame : part.frames) {
-        const bool may_be_anybodys = direction_of(frame.kind) == FrameDirection::discarded;
-        if (!may_be_anybodys && !frame.bytes.empty() && frame.bytes.front() != 0 &&
-            whole(line, frame.bytes.front())) {
-            hide_relay(frame.why);
-            continue;
-        }
-        frame.bytes.clear();
-        frame.why.clear();
-        frame.hidden = true;
-    }
-    // Whether a hidden request was answered is hidden, too.
-    std::erase_if(part.frames, [](const bus::TraceFrame& frame) {
-        return frame.hidden && direction_of(frame.kind) == FrameDirection::received;
-    });
-    for (bus::TraceDecision& decision : part.decisions) decision.text = kHidden;
-    for (bus::TraceTransaction& one : part.transactions) {
-        std::erase_if(one.discarded, [](const auto&) { return true; });
-        hide_relay(one.client);
-        if (one.station != 0 && whole(line, one.station)) continue;
-        one.request.clear();
-        one.reply.clear();
-        one.client.clear();
-        one.reason = kHidden;
-        one.hidden = true;
-        one.first_byte_in = one.last_byte_in = one.answered = std::nullopt;
-        if (!station(line, one.station)) one.station = 0;
-    }
-}
-
-void Sight::mask(const LineEntry& line, bus::IncidentHead& incident) const {
-    if (!incident.station || station(line, *incident.station)) return;
-    incident.station.reset();
-    incident.cause = kHidden;
-}
-
 namespace {
 
-/// /api/v1/lines/{line}/...
-std::optional<Problem> check_line(const HttpRequest& request, const Directory& directory,
-                                  const WhoRef& who) {
-    const LineEntry* line = directory.find_line(request.path[3]);
-    const bool discovers = request.path.size() > 4 && request.path[4] == "discover";
-    if (line == nullptr || (request.method == "POST" && !discovers)) return std::nullopt;
-    const Sight sight(directory, discovers ? as_reader(request, Right::discover) : who);
-    if (discovers ? sight.whole(*line) : sight.line(*line)) return std::nullopt;
+std::optional<Problem> check_line(const LineEntry& line, const Directory& directory,
+                                  const Sight& sight, bool whole) {
+    if (whole ? sight.whole(line) : sight.line(line)) return std::nullopt;
     const auto hidden = std::ranges::find_if(directory.stations, [&](const StationEntry& one) {
-        return one.line == line->name && !sight.whole(*line, one.id);
+        return one.line == line.name && !sight.whole(line, one.id);
     });
     const bool none = hidden == directory.stations.end();
-    return denied(*line, sight.who(), none ? kUnlisted : hidden->id, "");
-}
-
-/// What the gateway knows of a station; what is asked of the panel is judged by its bus.
-std::optional<Problem> check_station(const HttpRequest& request, const Directory& directory,
-                                     const Sight& sight) {
-    const auto station = directory.find_station(request.path[3]);
-    if (!station) return std::nullopt;
-    const LineEntry* on = directory.find_line(station->line);
-    if (on == nullptr) return std::nullopt;
-    const LineEntry& line = *on;
-    const bool is_plan = request.path.size() == 7;
-    const bool has_points = request.path.size() > 4 && request.path[4] == "points";
-    if (request.path.size() > 5 && !is_plan && !has_points) return std::nullopt;
-    bool seen = sight.station(line, station->id);
-    if (has_points && request.path.size() > 5 && station->points != nullptr) {
-        const points::Point* const point = station->points->find(request.path[5]);
-        if (point != nullptr) seen = sight.point(*station, *point);
-    }
-    if (seen) return std::nullopt;
-    return denied(line, sight.who(), station->id, station->name);
+    return denied(line, sight.who(), none ? kUnlisted : hidden->id, "");
 }
 
 }  // namespace
 
-std::optional<Problem> check_sight(const HttpRequest& request, const Directory& directory) {
-    const auto& path = request.path;
-    if (path.size() < 4 || path[0] != "api" || !request.caller) return std::nullopt;
-    if (path[2] == "lines") return check_line(request, directory, request.caller->who());
-    if (path[2] == "simulator")
-        return check_station(request, directory,
-                             Sight(directory, as_reader(request, Right::simulator)));
-    const bool reads = request.method == "GET" || request.method == "HEAD";
-    if (path[2] == "stations" && reads)
-        return check_station(request, directory, Sight(directory, request.caller->who()));
-    return std::nullopt;
+std::optional<Problem> check_sight(const HttpRequest& request, const Directory& directory,
+                                   Shown shown, Right right) {
+    if (shown == Shown::nothing) return std::nullopt;
+    const Sight sight(directory, as_reader(request, right));
+    const std::string& name = request.arguments[0];
+    if (shown == Shown::line || shown == Shown::whole_line) {
+        const LineEntry* line = directory.find_line(name);
+        if (line == nullptr) return std::nullopt;
+        return check_line(*line, directory, sight, shown == Shown::whole_line);
+    }
+    const auto station = directory.find_station(name);
+    const LineEntry* line = station ? directory.find_line(station->line) : nullptr;
+    if (line == nullptr) return std::nullopt;
+    const points::Point* const point = shown == Shown::point && station->points != nullptr
+                                           ? station->points->find(request.arguments[1])
+                                           : nullptr;
+    const bool seen =
+        point != nullptr ? sight.point(*station, *point) : sight.station(*line, station->id);
+    if (seen) return std::nullopt;
+    return denied(*line, sight.who(), station->id, station->name);
 }
 
 std::optional<Problem> instead_of_telling(std::string_view station, std::string_view point,

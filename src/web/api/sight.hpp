@@ -9,7 +9,6 @@
 
 #include "panelgate/access/line_rules.hpp"
 #include "panelgate/base/who.hpp"
-#include "panelgate/bus/trace.hpp"
 #include "panelgate/points/point.hpp"
 #include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/http/event_hub.hpp"
@@ -18,12 +17,8 @@
 
 namespace panelgate::web {
 
-/// What stands in place of what may not be seen.
-inline constexpr std::string_view kHidden = "hidden";
-
-/// What a client may see of the plant: what the rules of `access` let it read. What is asked of a
-/// panel is judged by its bus; this is for what the gateway knows itself. The directory must
-/// outlive it.
+/// What a client may see of what the gateway itself knows of the plant, by the rules of `access`.
+/// Requests to a panel are judged by its bus. The directory must outlive the object.
 class Sight {
   public:
     Sight(const Directory& directory, WhoRef who) : directory_(directory), who_(std::move(who)) {}
@@ -33,7 +28,8 @@ class Sight {
     bool everything() const;
     /// True if some station of the line may be read, or it has none.
     bool line(const LineEntry& line) const;
-    /// True if every item of every station may be read.
+    /// True if every item of every station may be read: what tells of all stations of the line may
+    /// be shown, as its trace, incidents, history and clients.
     bool whole(const LineEntry& line) const;
     /// True if some item may be read.
     bool station(const LineEntry& line, std::uint8_t id) const;
@@ -48,10 +44,6 @@ class Sight {
     /// By the names of a metric's labels; an empty one is absent.
     bool named(std::string_view line, std::string_view station, std::string_view point) const;
 
-    /// Takes out of a trace what may not be seen: that something was there stays.
-    void mask(const LineEntry& line, bus::TracePart& part) const;
-    void mask(const LineEntry& line, bus::IncidentHead& incident) const;
-
   private:
     bool reads() const;
     const StationEntry* find(std::string_view line, std::string_view station) const;
@@ -60,15 +52,20 @@ class Sight {
     WhoRef who_;
 };
 
-/// Returns why the path of this request names something that its client may not see: 403 with the
-/// rule. Requests that go to a bus are judged there, and counted.
-std::optional<Problem> check_sight(const HttpRequest& request, const Directory& directory);
+/// What the answers of a route show of the line, station or point that its path names. Answers for
+/// which a bus is asked show nothing more: that bus judges the request, and counts it.
+enum class Shown : std::uint8_t { nothing, line, whole_line, station, point };
+/// Returns why the client of this request may not see what its path names: 403 with the rule. A
+/// role of the configuration that has this right may see what it reads by the rules, too.
+std::optional<Problem> check_sight(const HttpRequest& request, const Directory& directory,
+                                   Shown shown, Right right);
 
-/// What is wrong with a request is not told to who may neither read nor write what it names: 403 in
-/// its place. `point`: by name; empty: none. Nothing if it may be told.
+/// Returns 403 for a client that may neither read nor write this station, or this point of the
+/// station: such a client is not told what is wrong with its request. `point`: by name; empty:
+/// none.
 std::optional<Problem> instead_of_telling(std::string_view station, std::string_view point,
                                           const WhoRef& who, const Directory& directory);
-/// The same for the answer to a request whose path this was, which has not reached a bus.
+/// The same for a request with this path that has not reached a bus.
 std::optional<Problem> instead_of_telling(const std::vector<std::string>& path, const WhoRef& who,
                                           const Directory& directory);
 

@@ -1,24 +1,13 @@
-#include <boost/json/array.hpp>
-#include <boost/json/object.hpp>
 #include <cmath>
-#include <optional>
-#include <span>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
 
 #include "answer.hpp"
-#include "body.hpp"
-#include "key_book.hpp"
 #include "panelgate/bus/line_history.hpp"
-#include "panelgate/modbus/function.hpp"
-#include "panelgate/modbus/request.hpp"
-#include "panelgate/points/station_points.hpp"
-#include "reading.hpp"
+#include "panelgate/web/api/render.hpp"
+#include "panelgate/web/api/values.hpp"
+#include "panelgate/web/http/json_text.hpp"
 #include "routes.hpp"
 #include "sight.hpp"
-#include "station_path.hpp"
+#include "target.hpp"
 
 namespace panelgate::web {
 
@@ -87,18 +76,12 @@ json::array describe_polls(const points::StationPoints* points, TimePoint now) {
 
 Handling get_stations(HttpRequest request, const Api* api) {
     const Sight sight(*api->directory, request.caller->who());
-    LongAnswer body;
-    body.begin_list("stations");
-    for (std::size_t i = 0; i < api->directory->stations.size(); ++i) {
-        const StationEntry& station = api->directory->stations[i];
-        if (sight.station(station)) body.add(describe(station));
-        if (!body.is_turn_over()) continue;
-        boost::asio::awaitable<void> turn = yield_turn();
-        co_await std::move(turn);
-        if (request.caller->has_left()) co_return HttpResponse{};
-    }
-    body.end_list();
-    co_return body.response();
+    std::vector<const StationEntry*> seen;
+    for (const StationEntry& station : api->directory->stations)
+        if (sight.station(station)) seen.push_back(&station);
+    Table table{.name = "stations", .count = seen.size()};
+    table.entry = [seen = std::move(seen)](std::size_t i) { return describe(*seen[i]); };
+    return table_answer(std::move(request), std::move(table));
 }
 
 Handling get_station(HttpRequest request, const Api* api) {
@@ -142,20 +125,14 @@ json::object describe(const points::HistorySample& sample, const points::Point& 
     return object;
 }
 
-/// `whole`: its reader may know how those fared who asked any of its stations.
-json::object describe(const bus::LineSample& sample, const WallClock& wall, bool whole) {
+json::object describe(const bus::LineSample& sample, const WallClock& wall) {
     json::object object;
     object["time"] = wall.text(sample.at);
     object["load_percent"] = rounded(sample.load_percent);
     object["requests"] = sample.requests;
-    object["errors"] = nullptr;
-    object["latency_ms"] = nullptr;
-    object["wire_ms"] = nullptr;
-    if (whole) {
-        object["errors"] = sample.errors;
-        object["latency_ms"] = rounded(sample.latency_ms);
-        object["wire_ms"] = rounded(sample.wire_ms);
-    }
+    object["errors"] = sample.errors;
+    object["latency_ms"] = rounded(sample.latency_ms);
+    object["wire_ms"] = rounded(sample.wire_ms);
     object["queue_depth"] = sample.queue_depth;
     return object;
 }
@@ -206,10 +183,9 @@ Handling get_line_history(HttpRequest request, const Api* api) {
     if (history == nullptr)
         co_return to_response(problem(404, "no history is kept of '" + (*line)->name + '\''));
     const WallClock wall = wall_of(*api);
-    const bool whole = Sight(*api->directory, request.caller->who()).whole(**line);
-    Table table = table_of(
-        history->samples(wall.now), kLineColumns,
-        [wall, whole](const bus::LineSample& sample) { return describe(sample, wall, whole); });
+    Table table =
+        table_of(history->samples(wall.now), kLineColumns,
+                 [wall](const bus::LineSample& sample) { return describe(sample, wall); });
     table.members["line"] = (*line)->name;
     table.members["every_ms"] = whole_ms(history->width());
     Handling answering = table_answer(std::move(request), std::move(table));
@@ -218,84 +194,54 @@ Handling get_line_history(HttpRequest request, const Api* api) {
 
 namespace {
 
-Parsed<void> check_raw_station(const Directory& directory, const LineEntry& line, std::uint8_t id,
-                               bool may) {
-    if (id == 0) return check_may_write(*line.bus, 0);
-    const std::string name = line.name + ":" + std::to_string(id);
-    const auto station = directory.find_station(name);
-    if (!station) return problem(404, "there is no station '" + name + "'", "unknown-station");
-    if (may) return {};
-    return check_may_write(*line.bus, id);
+Parsed<StationEntry> find_simulated(const Directory& directory, const std::string& name) {
+    auto station = find_station(directory, name);
+    if (station && !station->simulated)
+        return problem(404, "station '" + name + "' is not simulated");
+    return station;
 }
 
-/// No station answers a broadcast, so a broadcast can only write.
-Problem no_broadcast() {
-    Problem made = problem_of(Fault::denied, false);
-    made.detail =
-        "refused here, nothing was sent: station 0 is all stations of the line, of which none "
-        "answers: a broadcast can write (05, 06, 15, 16), but not read";
-    return made;
-}
-
-Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& line,
-                                 const json::object& body) {
-    const auto station = number_member(body, "station", 0, modbus::kMaxListedStation);
-    if (!station) return station.error();
-    const auto hex = string_member(body, "pdu");
-    if (!hex) return hex.error();
-    auto pdu = from_hex(*hex);
-    if (!pdu || pdu->empty() || pdu->size() > modbus::kMaxPdu) {
-        return problem(400, "pdu must be 1 to 253 bytes as pairs of hex digits");
+/// The body's members as numbers; true is 1 and false is 0.
+Parsed<std::map<std::string, double>> numbers_of(const json::object& body) {
+    std::map<std::string, double> numbers;
+    for (const auto& [key, value] : body) {
+        if (!value.is_number() && !value.is_bool())
+            return problem(400, "the fault '" + excerpt(std::string(key)) +
+                                    "' must be a number, true or false");
+        numbers[key] = value.is_bool() ? (value.get_bool() ? 1 : 0) : value.to_number<double>();
     }
-    const auto id = static_cast<std::uint8_t>(*station);
-    const bool reads = modbus::is_pure_read(*pdu);  // also if it is malformed
-    const bool spreads = modbus::is_broadcastable(pdu->front());
-    auto made = request_to(id, std::move(*pdu));
-    if (id == 0 && !spreads && (made || reads)) return no_broadcast();
-    const auto allowed = check_raw_station(directory, line, id, reads || made);
-    if (!allowed) return allowed.error();
-    return made;
+    return numbers;
 }
 
-/// Reports a request that is invalid or refused before the bus is asked: the bus counts and logs
-/// it.
-void count_refused(Caller& caller, bus::RequestPort& bus, const json::object& body) {
-    const auto station = number_member(body, "station", 0, modbus::kMaxListedStation);
-    const auto hex = string_member(body, "pdu");
-    const auto pdu = hex ? from_hex(*hex) : std::nullopt;
-    if (!station || !pdu || pdu->empty() || pdu->size() > modbus::kMaxPdu) return;
-    introduce(caller, &bus);
-    bus.count_refused(static_cast<std::uint8_t>(*station), *pdu, caller.who());
-}
-
-/// A panel's exception reply is a normal answer here.
-HttpResponse raw_answer(const bus::Answer& answer) {
-    if (answer.refusal || !answer.pdu) return to_response(problem_of(answer));
+HttpResponse faults_of(const StationEntry& station) {
+    json::object faults;
+    for (const auto& [name, value] : station.simulated->faults()) faults[name] = value;
     json::object body;
-    body["pdu"] = upper_hex(*answer.pdu, "");
-    if (const auto code = modbus::exception_of(*answer.pdu)) body["exception"] = *code;
+    body["station"] = station.name;
+    body["faults"] = std::move(faults);
     return json_response(200, body);
 }
 
 }  // namespace
 
-Handling post_raw(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api->directory, request.arguments[0]);
-    if (!line) co_return to_response(line.error());
-    const auto body = parse_object(request.body, {"station", "pdu"});
+Handling get_simulated(HttpRequest request, const Api* api) {
+    const auto station = find_simulated(*api->directory, request.arguments[0]);
+    if (!station) co_return to_response(station.error());
+    co_return faults_of(*station);
+}
+
+Handling put_simulated(HttpRequest request, const Api* api) {
+    const auto station = find_simulated(*api->directory, request.arguments[0]);
+    if (!station) co_return to_response(station.error());
+    const auto body = parse_object(request.body);
     if (!body) co_return to_response(body.error());
-    auto planned = raw_request(*api->directory, **line, *body);
-    if (!planned) {
-        count_refused(*request.caller, *(*line)->bus, *body);
-        co_return to_response(planned.error());
-    }
-    bus::Request made = std::move(*planned);
-    const bool broadcast = made.station == 0;
-    const Patience patience(request, (*line)->deadline, api->providers.now);
-    made.within = patience.left();
-    made.raw = made.verbatim = true;
-    bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));
-    co_return broadcast ? broadcast_answer(answer) : raw_answer(answer);
+    const auto numbers = numbers_of(*body);
+    if (!numbers) co_return to_response(numbers.error());
+    if (const auto wrong = station->simulated->set_faults(*numbers))
+        co_return to_response(problem(400, *wrong));
+    log_client(*request.caller, "simulator faults set",
+               {{"station", station->name}, {"faults", json_text(*body)}});
+    co_return faults_of(*station);
 }
 
 }  // namespace panelgate::web

@@ -1,125 +1,65 @@
 #include <algorithm>
-#include <array>
-#include <boost/asio/awaitable.hpp>
-#include <boost/json/array.hpp>
-#include <boost/json/object.hpp>
-#include <cstddef>
-#include <cstdint>
-#include <cstdio>
-#include <optional>
-#include <set>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
 
 #include "answer.hpp"
-#include "panelgate/base/time.hpp"
-#include "panelgate/bus/bus_client.hpp"
+#include "panelgate/base/text.hpp"
 #include "panelgate/bus/trace.hpp"
-#include "panelgate/web/http/message.hpp"
-#include "panelgate/web/http/query.hpp"
+#include "panelgate/web/api/render.hpp"
 #include "pcapng.hpp"
 #include "routes.hpp"
-#include "sight.hpp"
-#include "station_path.hpp"
+#include "target.hpp"
 
 namespace panelgate::web {
+
+namespace asio = boost::asio;
+namespace json = boost::json;
+namespace {
 
 struct TracePage {
     bus::TracePart part;
     std::uint64_t next = 0;  ///< for the next page: trace_since(next)
 };
 
+/// The sequence numbers of all entries, ascending.
+std::vector<std::uint64_t> numbers_of(const bus::TracePart& part) {
+    std::vector<std::uint64_t> numbers;
+    const auto add = [&](const auto& entries) {
+        for (const auto& entry : entries) numbers.push_back(entry.sequence);
+    };
+    add(part.frames);
+    add(part.decisions);
+    add(part.transactions);
+    std::ranges::sort(numbers);
+    return numbers;
+}
+
 /// The last frames, decisions and transactions, at most `most` of each.
-TracePage last_of_trace(const bus::LineView& bus, std::size_t most);
+TracePage last_of_trace(const bus::LineView& bus, std::size_t most) {
+    TracePage page{.part = bus.trace(most)};
+    const auto numbers = numbers_of(page.part);
+    page.next = numbers.empty() ? 0 : numbers.back();
+    return page;
+}
+
 /// The first entries after this sequence number, at most `most` in total; a transaction counts by
 /// the number of its end. If there are none, `next` is the newest number, so that a client recovers
 /// after a restart.
-TracePage trace_since(const bus::LineView& bus, std::uint64_t since, std::size_t most);
-
-/// Trace entries as JSON. Instants are seconds of the gateway's monotonic clock; `time` is
-/// wall-clock time.
-boost::json::object trace_json(const bus::TraceFrame& frame);
-boost::json::object trace_json(const bus::TraceDecision& decision);
-boost::json::object trace_json(const bus::TraceTransaction& transaction);
-boost::json::object trace_json(const bus::IncidentHead& incident);
-
-/// Adds the three lists of the part as members, yielding to the loop. Both pointers must stay valid
-/// until it has finished.
-boost::asio::awaitable<void> add_part(LongAnswer* body, const bus::TracePart* part);
-
-/// Formats a part of a trace for a terminal: a row for each transaction with its times in
-/// milliseconds, its frames below it, and decisions in between, in the order of the line.
-std::string trace_text(const bus::TracePart& part);
-
-/// A capture as a download with this file name.
-HttpResponse pcapng_response(std::string body, const std::string& file_name);
-
-namespace {
-
-template <class Entry>
-std::uint64_t last_of(const std::vector<Entry>& entries) {
-    return entries.empty() ? 0 : entries.back().sequence;
-}
-
-std::uint64_t last_number(const bus::TracePart& part) {
-    return std::max({last_of(part.frames), last_of(part.decisions), last_of(part.transactions)});
-}
-
-template <class Entry>
-void add_numbers(std::vector<std::uint64_t>& numbers, const std::vector<Entry>& entries) {
-    for (const Entry& entry : entries) numbers.push_back(entry.sequence);
-}
-
-template <class Entry>
-void cut_behind(std::vector<Entry>& entries, std::uint64_t last) {
-    std::erase_if(entries, [last](const Entry& entry) { return entry.sequence > last; });
-}
-
-/// Keeps the oldest `most` entries.
-void cut(bus::TracePart& part, std::size_t most) {
-    std::vector<std::uint64_t> numbers;
-    add_numbers(numbers, part.frames);
-    add_numbers(numbers, part.decisions);
-    add_numbers(numbers, part.transactions);
-    if (numbers.size() <= most || most == 0) return;
-    std::ranges::sort(numbers);
-    const std::uint64_t last = numbers[most - 1];
-    cut_behind(part.frames, last);
-    cut_behind(part.decisions, last);
-    cut_behind(part.transactions, last);
-}
-
-}  // namespace
-
-TracePage last_of_trace(const bus::LineView& bus, std::size_t most) {
-    TracePage page;
-    page.part = bus.trace(most);
-    page.next = last_number(page.part);
-    return page;
-}
-
 TracePage trace_since(const bus::LineView& bus, std::uint64_t since, std::size_t most) {
-    TracePage page;
-    page.part = bus.trace_since(since, most);
-    cut(page.part, most);
-    page.next = last_number(page.part);
-    if (page.next == 0) page.next = std::min(since, last_of_trace(bus, 1).next);
+    TracePage page{.part = bus.trace_since(since, most)};
+    const auto numbers = numbers_of(page.part);
+    if (numbers.empty()) {
+        page.next = std::min(since, last_of_trace(bus, 1).next);
+        return page;
+    }
+    page.next = numbers[std::min(most, numbers.size()) - 1];
+    const auto is_behind = [&](const auto& entry) { return entry.sequence > page.next; };
+    std::erase_if(page.part.frames, is_behind);
+    std::erase_if(page.part.decisions, is_behind);
+    std::erase_if(page.part.transactions, is_behind);
     return page;
 }
 
-namespace asio = boost::asio;
-namespace json = boost::json;
-namespace {
-
-std::string_view note_of(const bus::TraceFrame& frame) {
-    return frame.hidden ? kHidden : label(frame.kind);
-}
-
-std::string_view outcome_of(const bus::TraceTransaction& transaction) {
-    return transaction.hidden ? kHidden : label(transaction.end);
-}
+// Trace entries as JSON. Instants are seconds of the gateway's monotonic clock; `time` is
+// wall-clock time.
 
 double seconds(TimePoint at) { return to_seconds(at.time_since_epoch()); }
 
@@ -128,30 +68,7 @@ json::value seconds(const std::optional<TimePoint>& at) {
     return seconds(*at);
 }
 
-json::array discarded(const bus::TraceTransaction& transaction) {
-    json::array list;
-    for (const bus::TraceFrame& frame : transaction.discarded)
-        list.push_back(
-            json::object{{"note", label(frame.kind)}, {"bytes", upper_hex(frame.bytes)}});
-    return list;
-}
-
-template <class Entry>
-asio::awaitable<void> add_list(LongAnswer* body, std::string_view name,
-                               const std::vector<Entry>* entries) {
-    body->begin_list(name);
-    for (const Entry& entry : *entries) {
-        body->add(trace_json(entry));
-        if (!body->is_turn_over()) continue;
-        asio::awaitable<void> turn = yield_turn();
-        co_await std::move(turn);
-    }
-    body->end_list();
-}
-
-}  // namespace
-
-json::object trace_json(const bus::TraceFrame& frame) {
+json::object json_of(const bus::TraceFrame& frame) {
     json::object object;
     object["sequence"] = frame.sequence;
     object["time"] = rfc3339(frame.time);
@@ -160,22 +77,20 @@ json::object trace_json(const bus::TraceFrame& frame) {
     object["station"] = nullptr;
     if (!frame.bytes.empty()) object["station"] = frame.bytes.front();
     object["bytes"] = upper_hex(frame.bytes);
-    object["note"] = note_of(frame);
+    object["note"] = label(frame.kind);
     if (!frame.why.empty()) object["why"] = frame.why;
     if (frame.transaction != 0) object["transaction"] = frame.transaction;
     return object;
 }
 
-json::object trace_json(const bus::TraceDecision& decision) {
-    json::object object;
-    object["sequence"] = decision.sequence;
-    object["time"] = rfc3339(decision.time);
-    object["at"] = seconds(decision.at);
-    object["text"] = decision.text;
-    return object;
+json::object json_of(const bus::TraceDecision& decision) {
+    return {{"sequence", decision.sequence},
+            {"time", rfc3339(decision.time)},
+            {"at", seconds(decision.at)},
+            {"text", decision.text}};
 }
 
-json::object trace_json(const bus::TraceTransaction& transaction) {
+json::object json_of(const bus::TraceTransaction& transaction) {
     json::object object;
     object["id"] = transaction.id;
     object["sequence"] = transaction.first;
@@ -185,7 +100,7 @@ json::object trace_json(const bus::TraceTransaction& transaction) {
     object["reason"] = transaction.reason;
     object["client"] = nullptr;
     if (!transaction.client.empty()) object["client"] = transaction.client;
-    object["outcome"] = outcome_of(transaction);
+    object["outcome"] = label(transaction.end);
     object["arrived"] = seconds(transaction.arrived);
     object["granted"] = seconds(transaction.granted);
     object["first_bit_out"] = seconds(transaction.first_bit_out);
@@ -196,14 +111,16 @@ json::object trace_json(const bus::TraceTransaction& transaction) {
     object["request"] = upper_hex(transaction.request);
     object["reply"] = nullptr;
     if (!transaction.reply.empty()) object["reply"] = upper_hex(transaction.reply);
-    object["discarded"] = discarded(transaction);
+    json::array discarded;
+    for (const bus::TraceFrame& frame : transaction.discarded)
+        discarded.push_back(
+            json::object{{"note", label(frame.kind)}, {"bytes", upper_hex(frame.bytes)}});
+    object["discarded"] = std::move(discarded);
     return object;
 }
 
-json::object trace_json(const bus::IncidentHead& incident) {
-    json::object object;
-    object["id"] = incident.id;
-    object["time"] = rfc3339(incident.time);
+json::object json_of(const bus::IncidentHead& incident) {
+    json::object object{{"id", incident.id}, {"time", rfc3339(incident.time)}};
     object["station"] = nullptr;
     if (incident.station) object["station"] = *incident.station;
     object["cause"] = incident.cause;
@@ -213,123 +130,53 @@ json::object trace_json(const bus::IncidentHead& incident) {
     return object;
 }
 
-asio::awaitable<void> add_part(LongAnswer* body, const bus::TracePart* part) {
-    asio::awaitable<void> frames = add_list(body, "frames", &part->frames);
+template <class Entry>
+asio::awaitable<void> add_list(LongAnswer* body, std::string_view name,
+                               const std::vector<Entry>* entries) {
+    body->begin_list(name);
+    for (const Entry& entry : *entries) {
+        body->add(json_of(entry));
+        if (!body->is_turn_over()) continue;
+        asio::awaitable<void> turn = yield_turn();
+        co_await std::move(turn);
+    }
+    body->end_list();
+}
+
+/// Answers these members, the three lists of the part, and `behind`, yielding to the loop.
+Handling answer_part(json::object members, bus::TracePart part, json::object behind) {
+    LongAnswer body;
+    for (const auto& [name, value] : members) body.member(name, value);
+    asio::awaitable<void> frames = add_list(&body, "frames", &part.frames);
     co_await std::move(frames);
-    asio::awaitable<void> decisions = add_list(body, "decisions", &part->decisions);
+    asio::awaitable<void> decisions = add_list(&body, "decisions", &part.decisions);
     co_await std::move(decisions);
-    asio::awaitable<void> transactions = add_list(body, "transactions", &part->transactions);
+    asio::awaitable<void> transactions = add_list(&body, "transactions", &part.transactions);
     co_await std::move(transactions);
+    for (const auto& [name, value] : behind) body.member(name, value);
+    co_return body.response();
 }
 
-namespace {
-
-constexpr const char* kHead =
-    "TIME                              ID STATION REASON      OUTCOME     QUEUE     OUT   THINK"
-    "      IN   TOTAL  CLIENT\n";
-constexpr std::string_view kIndent = "                               ";
-
-/// "12.3", or "-" if one of them did not happen.
-std::string ms(const std::optional<TimePoint>& from, const std::optional<TimePoint>& to) {
-    if (!from || !to) return "-";
-    std::array<char, 32> text{};
-    const int size = std::snprintf(text.data(), text.size(), "%.1f",
-                                   to_milliseconds(std::max(*to - *from, Duration::zero())));
-    return std::string(text.data(), static_cast<std::size_t>(size));
-}
-
-std::string right(std::string text, std::size_t width) {
-    return text.size() < width ? std::string(width - text.size(), ' ') + text : text;
-}
-std::string left(std::string text, std::size_t width) {
-    text.resize(std::max(width, text.size()), ' ');
-    return text;
-}
-
-std::string frame_row(std::string_view mark, ByteView bytes, std::string_view note) {
-    std::string row = std::string(kIndent) + std::string(mark) + ' ' + upper_hex(bytes);
-    if (!note.empty()) row += "  " + std::string(note);
-    return row + '\n';
-}
-
-std::string_view mark_of(FrameKind kind) {
-    switch (direction_of(kind)) {
-        case FrameDirection::sent:
-            return ">";
-        case FrameDirection::received:
-            return "<";
-        case FrameDirection::discarded:
-            break;
-    }
-    return "x";
-}
-
-std::string row(const bus::TraceTransaction& one) {
-    std::string text = rfc3339(one.time) + ' ' + right(std::to_string(one.id), 8) + ' ' +
-                       right(std::to_string(one.station), 7) + ' ' + left(one.reason, 11) + ' ' +
-                       left(std::string(outcome_of(one)), 9);
-    const std::optional<TimePoint> end = one.answered       ? one.answered
-                                         : one.last_byte_in ? one.last_byte_in
-                                                            : one.last_bit_out;
-    for (const std::string& figure :
-         {ms(one.arrived, one.granted), ms(one.first_bit_out, one.last_bit_out),
-          ms(one.last_bit_out, one.first_byte_in), ms(one.first_byte_in, one.last_byte_in),
-          ms(one.arrived, end)})
-        text += right(figure, 8);
-    text += one.client.empty() ? "\n" : "  " + one.client + '\n';
-    text += frame_row(">", one.request, "");
-    if (!one.reply.empty()) text += frame_row("<", one.reply, "");
-    for (const bus::TraceFrame& frame : one.discarded)
-        text += frame_row("x", frame.bytes, note_of(frame));
-    return text;
-}
-
-std::string row(const bus::TraceDecision& one) {
-    return rfc3339(one.time) + "  " + one.text + '\n';
-}
-
-/// A row for a frame whose transaction is not in the part.
-std::string row(const bus::TraceFrame& one) {
-    return rfc3339(one.time) + "    " + std::string(mark_of(one.kind)) + ' ' +
-           upper_hex(one.bytes) + "  " + std::string(note_of(one)) + '\n';
-}
-
-}  // namespace
-
-std::string trace_text(const bus::TracePart& part) {
-    std::vector<std::pair<std::uint64_t, std::string>> rows;
-    std::set<std::uint64_t> shown;
-    for (const bus::TraceTransaction& one : part.transactions) {
-        rows.emplace_back(one.first, row(one));
-        shown.insert(one.id);
-    }
-    for (const bus::TraceFrame& one : part.frames) {
-        if (!shown.contains(one.transaction)) rows.emplace_back(one.sequence, row(one));
-    }
-    for (const bus::TraceDecision& one : part.decisions) rows.emplace_back(one.sequence, row(one));
-    std::ranges::sort(rows);
-    std::string text = kHead;
-    for (const auto& [sequence, line] : rows) text += line;
-    return text;
-}
-
+/// A capture as a download with this file name.
 HttpResponse pcapng_response(std::string body, const std::string& file_name) {
-    HttpResponse response;
-    response.content_type = "application/x-pcapng";
-    response.body = std::move(body);
+    HttpResponse response = text_response(200, std::move(body), "application/x-pcapng");
     response.headers.emplace_back("Content-Disposition",
                                   "attachment; filename=\"" + file_name + '"');
     return response;
 }
 
-namespace {
-
-/// A capture has no place for a frame without bytes.
-void mask_capture(const Sight& sight, const LineEntry& line, bus::TracePart& part) {
-    sight.mask(line, part);
-    std::erase_if(part.frames, [](const bus::TraceFrame& frame) { return frame.bytes.empty(); });
-    std::erase_if(part.transactions,
-                  [](const bus::TraceTransaction& one) { return one.request.empty(); });
+/// The page that the queries ask for.
+Parsed<TracePage> page_of(const HttpRequest& request, const bus::LineView& bus) {
+    constexpr unsigned kUsual = 100;  // entries of each kind
+    constexpr unsigned kMost = 500;
+    const auto since = request.query.find("since");
+    const bool follows = since != request.query.end();
+    const auto most = query_number(request, "last", 1, kMost, follows ? kMost : kUsual);
+    if (!most) return most.error();
+    if (!follows) return last_of_trace(bus, *most);
+    const auto number = to_number<std::uint64_t>(since->second);
+    if (!number) return problem(400, "since must be a sequence number: the value of `next`, or 0");
+    return trace_since(bus, *number, *most);
 }
 
 }  // namespace
@@ -348,10 +195,9 @@ Handling get_trace_pcapng(HttpRequest request, const Api* api) {
         TracePage page = trace_since(*bus, since, kOfATurn);
         if (page.next <= since) break;
         since = page.next;
-        mask_capture(Sight(*api->directory, request.caller->who()), **line, page.part);
         file.add(page.part);
         body += file.take();
-        boost::asio::awaitable<void> turn = yield_turn();
+        asio::awaitable<void> turn = yield_turn();
         co_await std::move(turn);
         if (request.caller->has_left()) co_return HttpResponse{};
     }
@@ -359,117 +205,47 @@ Handling get_trace_pcapng(HttpRequest request, const Api* api) {
     co_return pcapng_response(std::move(body), name + ".pcapng");
 }
 
-namespace {
-
-constexpr unsigned kDefaultTrace = 100;  ///< entries of each kind
-constexpr unsigned kMaxTrace = 500;
-
-/// The page that the queries ask for.
-Parsed<TracePage> page_of(const HttpRequest& request, const bus::LineView& bus) {
-    const auto since = request.query.find("since");
-    const bool follows = since != request.query.end();
-    const auto most =
-        query_number(request, "last", 1, kMaxTrace, follows ? kMaxTrace : kDefaultTrace);
-    if (!most) return most.error();
-    if (!follows) return last_of_trace(bus, *most);
-    const auto number = to_number<std::uint64_t>(since->second);
-    if (!number) return problem(400, "since must be a sequence number: the value of `next`, or 0");
-    return trace_since(bus, *number, *most);
-}
-
-bool wants_text(const HttpRequest& request) {
-    const auto accept = request.headers.find("accept");
-    return accept != request.headers.end() && prefers(accept->second, "text/plain");
-}
-
-HttpResponse text_response(std::string body) {
-    HttpResponse response;
-    response.content_type = "text/plain; charset=utf-8";
-    response.body = std::move(body);
-    return response;
-}
-
-HttpResponse varied(HttpResponse response) {
-    response.headers.emplace_back("Vary", "Accept");
-    return response;
-}
-
-}  // namespace
-
 Handling get_trace(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     auto page = page_of(request, *(*line)->bus);
     if (!page) co_return to_response(page.error());
-    Sight(*api->directory, request.caller->who()).mask(**line, page->part);
-    if (wants_text(request)) co_return varied(text_response(trace_text(page->part)));
-    LongAnswer body;
-    boost::asio::awaitable<void> all = add_part(&body, &page->part);
-    co_await std::move(all);
-    body.member("next", page->next);
-    co_return varied(body.response());
+    json::object behind{{"next", page->next}};
+    Handling answering = answer_part({}, std::move(page->part), std::move(behind));
+    co_return co_await std::move(answering);
 }
-
-namespace {
-
-constexpr std::string_view kCapture = ".pcapng";
-
-/// Parsed from "7" or "7.pcapng".
-struct Wanted {
-    std::uint64_t id = 0;
-    bool capture = false;
-};
-std::optional<Wanted> wanted_of(std::string_view text) {
-    Wanted wanted;
-    wanted.capture = text.ends_with(kCapture);
-    if (wanted.capture) text.remove_suffix(kCapture.size());
-    const auto id = to_number<std::uint64_t>(text);
-    if (!id) return std::nullopt;
-    wanted.id = *id;
-    return wanted;
-}
-
-}  // namespace
 
 Handling get_incidents(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     json::array list;
-    std::vector<bus::IncidentHead> incidents = (*line)->bus->incidents();
-    const Sight sight(*api->directory, request.caller->who());
-    for (bus::IncidentHead& head : incidents) {
-        sight.mask(**line, head);
-        list.push_back(trace_json(head));
-    }
+    for (const bus::IncidentHead& head : (*line)->bus->incidents()) list.push_back(json_of(head));
     co_return json_response(200, json::object{{"incidents", std::move(list)}});
 }
 
+/// The incident "7", or its capture "7.pcapng".
 Handling get_incident(HttpRequest request, const Api* api) {
+    constexpr std::string_view kCapture = ".pcapng";
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     const std::string name = (*line)->name;
-    const auto wanted = wanted_of(request.arguments[1]);
-    const Sight sight(*api->directory, request.caller->who());
-    const bool sees_all = sight.whole(**line);
-    auto found = wanted ? (*line)->bus->incident(wanted->id, sees_all) : std::nullopt;
+    std::string_view wanted = request.arguments[1];
+    const bool is_capture = wanted.ends_with(kCapture);
+    if (is_capture) wanted.remove_suffix(kCapture.size());
+    const auto id = to_number<std::uint64_t>(wanted);
+    auto found = id ? (*line)->bus->incident(*id) : std::nullopt;
     if (!found)
         co_return to_response(
             problem(404, "line '" + name + "' keeps no incident '" + request.arguments[1] + "'"));
-    sight.mask(**line, found->head);
-    if (wanted->capture) {
-        mask_capture(sight, **line, found->part);
+    if (is_capture) {
         TracePcapng file(api->providers.version, name);
         file.add(found->part);
         std::string body = file.take();
         body += file.finish();
         co_return pcapng_response(std::move(body), name + '-' + request.arguments[1]);
     }
-    sight.mask(**line, found->part);
-    LongAnswer body;
-    for (const auto& [member, value] : trace_json(found->head)) body.member(member, value);
-    boost::asio::awaitable<void> all = add_part(&body, &found->part);
-    co_await std::move(all);
-    co_return body.response();
+    Handling answering = answer_part(json_of(found->head), std::move(found->part), {});
+    co_return co_await std::move(answering);
 }
 
 }  // namespace panelgate::web

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-#include "admission.hpp"
+#include "origin.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/text.hpp"
 
@@ -52,8 +52,8 @@ std::optional<std::string> take_authority(std::string_view& target) {
 
 }  // namespace
 
-std::optional<Target> parse_target(std::string_view target) {
-    Target parsed;
+std::optional<RequestTarget> parse_target(std::string_view target) {
+    RequestTarget parsed;
     parsed.authority = take_authority(target);
     if (!parsed.authority && !target.starts_with('/')) return std::nullopt;
     target = next_part(target, '#');
@@ -80,13 +80,13 @@ namespace http = boost::beast::http;
 namespace {
 
 /// Returns the authority of an absolute target, otherwise the Host.
-std::string authority_of(const BeastRequest& message, const Target& target) {
+std::string authority_of(const BeastRequest& message, const RequestTarget& target) {
     return target.authority ? *target.authority : std::string(message[http::field::host]);
 }
 
 }  // namespace
 
-std::optional<Target> target_of(const BeastRequest& message) {
+std::optional<RequestTarget> target_of(const BeastRequest& message) {
     const bool of_server = message.method() == http::verb::options && message.target() == "*";
     return parse_target(of_server ? std::string("/*") : std::string(message.target()));
 }
@@ -107,7 +107,7 @@ std::optional<Problem> repeated_field(const BeastRequest& message) {
     return std::nullopt;
 }
 
-Parsed<std::string> host_of(const BeastRequest& message, const Target& target) {
+Parsed<std::string> host_of(const BeastRequest& message, const RequestTarget& target) {
     const std::size_t named = message.count(http::field::host);
     if (named > 1) return problem(400, "a request has one Host, not " + std::to_string(named));
     if (named == 0 && message.version() >= 11) {
@@ -119,7 +119,7 @@ Parsed<std::string> host_of(const BeastRequest& message, const Target& target) {
     return *host;
 }
 
-HttpRequest to_request(BeastRequest&& message, Target target, std::string host) {
+HttpRequest to_request(BeastRequest&& message, RequestTarget target, std::string host) {
     HttpRequest request;
     request.host = std::move(host);
     request.port = port_of_authority(authority_of(message, target));

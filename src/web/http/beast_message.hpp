@@ -18,14 +18,14 @@ namespace panelgate::web {
 
 /// A request target in its origin form, "/a/b%20c?x=1", or its absolute form, "http://host/a" (RFC
 /// 9112 3.2).
-struct Target {
+struct RequestTarget {
     std::vector<std::string> path;
     std::multimap<std::string, std::string> query;  ///< decoded, repeated names kept
     std::optional<std::string> authority;           ///< of an absolute target: "host:80"
     bool folder = false;                            ///< the path ends with '/'
 };
 /// Parses a target; nullopt for another form, a broken percent-encoding, or invalid UTF-8.
-std::optional<Target> parse_target(std::string_view target);
+std::optional<RequestTarget> parse_target(std::string_view target);
 
 // Conversion between Beast's messages and ours.
 
@@ -34,15 +34,15 @@ using BeastRequest = boost::beast::http::request<boost::beast::http::string_body
 constexpr std::uint32_t kHeaderLimit = 16 * 1024;
 
 /// Parses the target; "*" (OPTIONS) becomes a path. nullopt if malformed.
-std::optional<Target> target_of(const BeastRequest& message);
+std::optional<RequestTarget> target_of(const BeastRequest& message);
 /// True if the end of the body is well defined. Only `chunked` is supported (RFC 9112 6.1, 6.3):
 /// bytes after anything else could be taken for a request.
 bool has_sound_framing(const BeastRequest& message);
 /// Returns 400 if a header that is read occurs twice and would be ambiguous.
 std::optional<Problem> repeated_field(const BeastRequest& message);
 /// Returns the requested host (RFC 9112 3.2); "" for HTTP/1.0 without one.
-Parsed<std::string> host_of(const BeastRequest& message, const Target& target);
-HttpRequest to_request(BeastRequest&& message, Target target, std::string host);
+Parsed<std::string> host_of(const BeastRequest& message, const RequestTarget& target);
+HttpRequest to_request(BeastRequest&& message, RequestTarget target, std::string host);
 
 /// For a year browsers ask this host by HTTPS only (RFC 6797); its other ports and hosts below are
 /// not meant.

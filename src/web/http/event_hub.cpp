@@ -4,7 +4,7 @@
 #include <boost/asio/post.hpp>
 #include <utility>
 
-#include "panelgate/web/http/query.hpp"
+#include "panelgate/base/text.hpp"
 
 namespace panelgate::web {
 namespace {

@@ -1,14 +1,14 @@
 #include "panelgate/web/http/gzip.hpp"
-#include "panelgate/base/text.hpp"
 
 #include <zlib.h>
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <limits>
 #include <new>
 #include <utility>
+
+#include "panelgate/base/text.hpp"
 
 namespace panelgate::web {
 namespace {
@@ -19,32 +19,15 @@ constexpr int kGzipWindow = 15 + 16;
 constexpr int kLevel = 1;
 constexpr int kMemory = 8;  // zlib's default
 
-bool same_word(std::string_view a, std::string_view b) {
-    return std::ranges::equal(a, b, [](char x, char y) {
-        return std::tolower(static_cast<unsigned char>(x)) ==
-               std::tolower(static_cast<unsigned char>(y));
-    });
-}
-
-/// "q=0", "q=0.000": not acceptable (RFC 9110 12.4.2).
-bool is_refused(std::string_view weight) {
-    weight = trimmed(weight);
-    if (weight.size() < 3 || !same_word(weight.substr(0, 2), "q=")) return false;
-    return weight.find_first_not_of("0.", 2) == weight.npos;
-}
-
 }  // namespace
 
 bool accepts_gzip(std::string_view accept_encoding) {
-    while (!accept_encoding.empty()) {
-        const auto comma = accept_encoding.find(',');
-        const std::string_view item = accept_encoding.substr(0, comma);
-        accept_encoding.remove_prefix(comma == item.npos ? accept_encoding.size() : comma + 1);
-        const auto semicolon = item.find(';');
-        if (!same_word(trimmed(item.substr(0, semicolon)), "gzip")) continue;
-        return semicolon == item.npos || !is_refused(item.substr(semicolon + 1));
-    }
-    return false;
+    std::string codings = to_lower(accept_encoding);
+    std::erase(codings, ' ');
+    const auto at = codings.find("gzip");
+    if (at == codings.npos) return false;
+    const std::string weight = codings.substr(at + 4, codings.find(',', at) - at - 4);
+    return !weight.starts_with(";q=0") || weight.find_first_of("123456789") != weight.npos;
 }
 
 std::string unpacked(std::string_view body) {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "cors.hpp"
+#include "origin.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tls/handshakes.hpp"
 #include "panelgate/tls/roles.hpp"

@@ -2,11 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <boost/asio/redirect_error.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/asio/this_coro.hpp>
-#include <boost/asio/use_awaitable.hpp>
-#include <boost/system/error_code.hpp>
 #include <chrono>
 #include <map>
 #include <optional>
@@ -15,13 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "admission.hpp"
 #include "panelgate/base/sha256.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/web/http/crossing.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/problem.hpp"
-#include "panelgate/web/http/query.hpp"
 
 namespace panelgate::web {
 
@@ -139,7 +132,8 @@ bool is_foreign_form(const HttpRequest& request) {
     return !header(request, "origin").empty() && !is_json(header(request, "content-type"));
 }
 
-/// Default roles have what the least one has that is needed; others have what they list.
+/// A default role has the rights of the least role that is needed; a role of the configuration has
+/// the rights that its list names.
 bool suffices(const Standing& standing, Role needed, Right right, std::optional<Right> or_right) {
     if (!standing.own) return standing.role >= needed;
     return standing.may(right) || (or_right && standing.may(*or_right));
@@ -229,7 +223,6 @@ Duration time_of_token(const std::string& name, const Site& site, Duration most)
     return std::max(Duration(left), Duration::zero());
 }
 
-namespace asio = boost::asio;
 namespace {
 
 /// Returns the segments matched by the pattern's {}; nullopt if the path does not match.
@@ -302,18 +295,10 @@ HttpResponse options(const Found& found, const HttpRequest& request, const Site&
     return response;
 }
 
-asio::awaitable<void> throttle(Duration hold) {
-    if (hold == Duration::zero()) co_return;
-    asio::steady_timer timer(co_await asio::this_coro::executor, hold);
-    boost::system::error_code ignored;
-    co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
-}
-
-void record_login(const HttpRequest& request, bool failed, Shared& shared) {
+void record_failed_login(const HttpRequest& request, Shared& shared) {
     const std::string& address = request.caller->address();
-    if (!failed) return shared.logins.succeeded(address);
     ++shared.counters.login_failures;
-    shared.logins.failed(shared.site->now(), address);
+    shared.wrong_tokens.add(shared.site->now(), address);
     rt::log(rt::LogLevel::warn, "login failed",
             {{"listener", shared.site->settings.name()}, {"client", address}});
 }
@@ -342,32 +327,27 @@ void count_refused(const HttpRequest& request, const Problem& why) {
                {{"path", path}, {"method", request.method}, {"why", why.detail}});
 }
 
-/// check_access() with the throttling of token guesses.
-asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, const Route* route,
-                                              Shared* shared) {
-    const Settings& settings = shared->site->settings;
-    const Role needed = route->needed;
-    if (needed == Role::none || !carries_token(*request))
-        co_return check_access(*request, needed, settings, route->right, route->or_right);
-    const std::string& address = request->caller->address();
-    const Duration turn = shared->logins.turn(shared->site->now(), address);
-    if (turn > Duration::zero()) shared->places.suspect(request->caller->id());
-    asio::awaitable<void> waiting_for_turn = throttle(turn);
-    co_await std::move(waiting_for_turn);
-    // Hanging up must reveal nothing about the token.
-    if (request->caller->has_left()) co_return std::nullopt;
-    shared->places.busy(request->caller->id());
-    const auto refused = check_access(*request, needed, settings, route->right, route->or_right);
+/// 429 while no token of the request's address is judged.
+std::optional<Problem> too_many_wrong_tokens(const HttpRequest& request, const Shared& shared) {
+    const Duration left =
+        shared.wrong_tokens.barred_for(shared.site->now(), request.caller->address());
+    if (left == Duration::zero()) return std::nullopt;
+    const auto seconds = std::chrono::ceil<std::chrono::seconds>(left).count();
+    return passing_problem(429, "too many wrong tokens came from this address", seconds);
+}
+
+/// check_access() with the limit of wrong tokens.
+std::optional<Problem> admit(const HttpRequest& request, const Route& route, Shared& shared) {
+    const bool shows_token = route.needed != Role::none && carries_token(request);
+    auto barred = shows_token ? too_many_wrong_tokens(request, shared) : std::nullopt;
+    if (barred) return barred;
+    auto refused =
+        check_access(request, route.needed, shared.site->settings, route.right, route.or_right);
     // With a token, only an unknown one gives 401.
-    const bool failed = refused && refused->status == 401;
-    const Duration hold = shared->logins.hold(shared->site->now(), address);
-    record_login(*request, failed, *shared);
-    if (failed && hold > Duration::zero()) {
-        shared->places.wrong(request->caller->id());
-        asio::awaitable<void> waiting = throttle(hold);
-        co_await std::move(waiting);
-    }
-    co_return refused;
+    if (!shows_token || !refused || refused->status != 401) return refused;
+    record_failed_login(request, shared);
+    barred = too_many_wrong_tokens(request, shared);
+    return barred ? barred : refused;
 }
 
 /// Who makes the request, by what it has shown.
@@ -395,7 +375,8 @@ class Witness {
     }
     /// Refusals are recorded whatever was asked for.
     void record(const HttpResponse& response) const {
-        const bool is_refusal = response.status == 401 || response.status == 403;
+        const bool is_refusal =
+            response.status == 401 || response.status == 403 || response.status == 429;
         if (!record_ || (!changes_ && !is_refusal)) return;
         record_({who_, method_, path_, body_, response.status, response.body, shown_token_});
     }
@@ -457,20 +438,11 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     const std::shared_ptr<const Site> site = shared->site;
     Found found = find_route(request, site->routes);
     const bool probe = found.route != nullptr && found.route->probe;
-    if (barred && !probe) {
-        // An immediate reply would be retried immediately: be as slow as for a guess.
-        Duration hold = Duration::zero();
-        if (barred->status == 503 && request.caller)
-            hold = shared->logins.hold(site->now(), request.caller->address());
-        asio::awaitable<void> waiting = throttle(hold);
-        co_await std::move(waiting);
-        co_return to_response(*barred);
-    }
+    if (barred && !probe) co_return to_response(*barred);
     if (request.method == "OPTIONS") co_return options(found, request, *site);
     if (found.route == nullptr) co_return to_response(not_found(found));
     if (site->wall) request.at = site->wall();
-    const auto refused = co_await admit(&request, found.route, shared);
-    if (request.caller->has_left()) co_return HttpResponse();
+    const auto refused = admit(request, *found.route, *shared);
     identify(request, *site);
     record_use(*request.caller, *shared);
     if (refused) {

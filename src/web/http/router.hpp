@@ -24,8 +24,8 @@ bool carries_token(const HttpRequest& request);
 /// Returns 415 for a compressed or otherwise encoded body, which is not supported.
 std::optional<Problem> check_encoding(const HttpRequest& request);
 
-/// Returns the role of its token; without one that of its certificate, where the listener goes by
-/// that; else the anonymous one. None for an unknown token.
+/// Returns the role of the request's token; without a token the role of its certificate, where the
+/// listener goes by certificates; else the anonymous role. Role::none for an unknown token.
 Standing standing_of(const HttpRequest& request, const Settings& settings);
 
 /// Returns the name of its token, "" without a known one.

@@ -21,8 +21,7 @@
 #include <string_view>
 #include <utility>
 
-#include "admission.hpp"
-#include "cors.hpp"
+#include "origin.hpp"
 #include "panelgate/base/network.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tls/roles.hpp"
@@ -219,7 +218,7 @@ asio::awaitable<bool> HttpSession::serve_one() {
         asio::awaitable<void> sending = send_events(std::move(response));
         co_await std::move(sending);
     } else if (!caller_->has_left()) {
-        const bool stays = keep_alive && !stopping_ && !shared_->places.is_throttled(caller_->id());
+        const bool stays = keep_alive && !stopping_;
         asio::awaitable<bool> sending = send(std::move(response), head, stays);
         more = co_await std::move(sending);
     }

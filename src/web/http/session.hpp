@@ -74,7 +74,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     /// has at most `reading` to take a reply.
     void stop(Duration reading);
     const Caller& caller() const { return *caller_; }
-    /// The origin of the other site's page that asked last; empty: it was none that is listed.
+    /// The origin of the last request's page, if `cors` lists that origin; else empty.
     const std::string& reader() const { return reader_; }
     const tls::Stream& stream() const { return stream_; }
     /// Takes over what its certificate says, by the listener's present settings.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "admission.hpp"
+#include "origin.hpp"
 #include "panelgate/web/http/counters.hpp"
 #include "panelgate/web/http/message.hpp"
 
@@ -15,7 +16,7 @@ struct Shared {
     explicit Shared(std::shared_ptr<const Site> with_site)
         : site(std::move(with_site)),
           hosts(site->settings, machine_names()),
-          logins(site->settings.logins),
+          wrong_tokens(site->settings.wrong_tokens),
           places(site->settings),
           rate_limit(site->settings.rate_limit) {}
 
@@ -23,14 +24,14 @@ struct Shared {
     void serve(std::shared_ptr<const Site> other) {
         site = std::move(other);
         hosts = HostNames(site->settings, machine_names());
-        logins.apply(site->settings.logins);
+        wrong_tokens.apply(site->settings.wrong_tokens);
         places.apply(site->settings);
         rate_limit.apply(site->settings.rate_limit);
     }
 
     std::shared_ptr<const Site> site;
     HostNames hosts;
-    Logins logins;
+    WrongTokens wrong_tokens;
     Places places;
     RateLimiter rate_limit;
     Counters counters;

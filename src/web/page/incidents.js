@@ -24,7 +24,9 @@ export function incidents(line) {
             const all = (await get(path('lines', line, 'incidents'))).incidents;
             list(shown.body, all.toReversed(), (one) => one.id, row);
             node.hidden = all.length === 0;
-        } catch { /* the bar above the page says it */ }
+        } catch (error) {  // without an answer the bar above the page says why
+            if (error.status === 403) clearInterval(timer);
+        }
     };
     ask();
     const timer = setInterval(() => document.hidden || ask(), PERIOD);

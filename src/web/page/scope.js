@@ -43,7 +43,11 @@ class Scope {
             h('p', {id: 'scope-keys', class: 'unseen'}, t('scope.keys')), legend(), this.summary, this.detail,
             h('h2', null, t('frames')), this.table.node, this.incidents.node);
         this.#stand(false);
-        this.unwatch = this.trace.watch(() => { this.#seek(); this.#soon(); });
+        this.unwatch = this.trace.watch(() => {
+            if (this.trace.refusal) text(this.summary, this.trace.refusal);
+            this.#seek();
+            this.#soon();
+        });
         this.#seek();
         this.resized = new ResizeObserver(() => this.#soon());
         this.resized.observe(this.canvas);

@@ -22,6 +22,7 @@ class Trace extends EventTarget {
     #next = null;
     #timer = null;
     #watchers = 0;
+    refusal = '';  // why the gateway does not tell us
 
     constructor(line) {
         super();
@@ -40,6 +41,12 @@ class Trace extends EventTarget {
         };
     }
 
+    /** Who may not read every station of a line gets nothing of its trace, until a view asks anew. */
+    #refuse(why) {
+        this.refusal = why;
+        this.dispatchEvent(new Event('change'));
+    }
+
     async #ask() {
         let full = false;
         try {
@@ -54,7 +61,13 @@ class Trace extends EventTarget {
                 this.timeline.add(page);
                 this.dispatchEvent(new Event('change'));
             }
-        } catch { /* the bar above the page says it */ }
+            this.refusal = '';
+        } catch (error) {  // without an answer the bar above the page says why
+            if (error.status === 403) {
+                this.#refuse(error.message);
+                return;
+            }
+        }
         if (this.#watchers === 0) return;
         clearTimeout(this.#timer);
         const pause = document.hidden ? 10 * PERIOD : full ? 0 : PERIOD;

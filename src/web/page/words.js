@@ -93,7 +93,6 @@ export const words = {
 "kind.retry": ["retry", "Wiederholung", "재시도", "再試行"],
 "kind.probe": ["probe", "Probe", "프로브", "プローブ"],
 "kind.learn echo": ["learns the echo", "lernt das Echo", "에코 학습", "エコー学習"],
-"kind.hidden": ["hidden", "verborgen", "숨김", "非表示"],
 "kind.broadcast": ["broadcast", "Rundruf", "브로드캐스트", "ブロードキャスト"],
 "kind.reply": ["reply", "Antwort", "응답", "応答"],
 "kind.heard request": ["request heard", "mitgehörte Anfrage", "수신된 요청", "傍受した要求"],

@@ -200,15 +200,15 @@ TEST(LineRules, KnowsWhoSeesAStation) {
     const auto rules = [&] {
         return LineRules(std::make_shared<const Settings>(settings), "floor1", {5, 20});
     };
-    EXPECT_TRUE(rules().reads_all(kScada, 5));
+    EXPECT_TRUE(rules().may_all(kScada, 5, Act::read));
     EXPECT_FALSE(rules().may_some(kScada, 5, Act::write));
     EXPECT_TRUE(rules().may_some(kScada, 20, Act::write));
     settings.allow_by_default = false;
     EXPECT_FALSE(rules().may_some(kScada, 5, Act::read));
     EXPECT_TRUE(rules().may_some(kScada, 20, Act::read)) << "a part of it";
-    EXPECT_FALSE(rules().reads_all(kScada, 20));
+    EXPECT_FALSE(rules().may_all(kScada, 20, Act::read));
     EXPECT_FALSE(rules().may_some(kBoss, 20, Act::read));
-    EXPECT_TRUE(rules().reads_all(own_task("poll of oven"), 20));
+    EXPECT_TRUE(rules().may_all(own_task("poll of oven"), 20, Act::read));
 }
 
 TEST(LineRules, ConditionsOnWhoAsks) {

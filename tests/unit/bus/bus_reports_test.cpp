@@ -196,7 +196,7 @@ TEST_F(BusTrace, KeepsWhatHappenedAroundAnError) {
     EXPECT_TRUE(head.complete);
     EXPECT_EQ(head.station, 17);
     EXPECT_EQ(head.errors, 1u);
-    const auto incident = bus->incident(1, true);
+    const auto incident = bus->incident(1);
     ASSERT_TRUE(incident);
     ASSERT_EQ(incident->part.transactions.size(), 33u);
     EXPECT_EQ(incident->part.transactions[16].end, TransactionEnd::timeout);
@@ -205,7 +205,7 @@ TEST_F(BusTrace, KeepsWhatHappenedAroundAnError) {
     for (const TraceTransaction& one : incident->part.transactions) {
         if (one.end == TransactionEnd::ok) EXPECT_EQ(one.request, line->written[0]) << one.id;
     }
-    EXPECT_FALSE(bus->incident(2, true));
+    EXPECT_FALSE(bus->incident(2));
 }
 
 TEST_F(BusTrace, NearErrorsAreOneIncidentAndWhatGoesOnIsNoNews) {
@@ -239,13 +239,13 @@ TEST_F(BusTrace, WhatWasReadGivesWayFirstAndThenTheOldest) {
     };
     for (int i = 0; i < 3; ++i) happen();
     EXPECT_EQ(incidents(), "1:timeout 2:timeout 3:timeout");
-    EXPECT_TRUE(bus->incident(2, true));
+    EXPECT_TRUE(bus->incident(2));
     EXPECT_TRUE(bus->incidents()[1].read);
     happen();
     EXPECT_EQ(incidents(), "1:timeout 3:timeout 4:timeout");
     happen();
     EXPECT_EQ(incidents(), "3:timeout 4:timeout 5:timeout");
-    EXPECT_EQ(bus->incident(5, true)->part.transactions.front().end, TransactionEnd::ok);
+    EXPECT_EQ(bus->incident(5)->part.transactions.front().end, TransactionEnd::ok);
 }
 
 TEST_F(BusTrace, TheLossOfTheLineIsAnIncidentUnlessItWasNeverThere) {
@@ -266,7 +266,7 @@ TEST_F(BusTrace, ALongIncidentKeepsItsBeginning) {
     ask_often(5);
     for (int i = 0; i < 50; ++i) fail();
     ASSERT_EQ(incidents(), "1:timeout");
-    const auto incident = bus->incident(1, true);
+    const auto incident = bus->incident(1);
     EXPECT_EQ(incident->part.transactions.size(), 20u);
     EXPECT_EQ(incident->part.transactions.front().id, 1u);
     EXPECT_TRUE(incident->head.complete);

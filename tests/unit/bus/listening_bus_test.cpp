@@ -213,8 +213,8 @@ TEST_F(ListeningBusTest, KeepsWhatHappenedAroundASilence) {
     ASSERT_EQ(heads.size(), 1u);
     EXPECT_EQ(heads[0].cause, "timeout");
     EXPECT_EQ(heads[0].station, 17);
-    EXPECT_EQ(bus->incident(1, true)->part.transactions.size(), 3u);
-    EXPECT_FALSE(bus->incident(2, true));
+    EXPECT_EQ(bus->incident(1)->part.transactions.size(), 3u);
+    EXPECT_FALSE(bus->incident(2));
 }
 
 }  // namespace

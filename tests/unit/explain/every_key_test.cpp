@@ -140,7 +140,7 @@ mqtt: {broker: "mqtts://b:8883", topic: x, qos: 1, client_id: x, username: x, st
        certificate: /run/secrets/ops, key: /run/secrets/ops}
 relays: [{from: a-1/400001, to: a-1/400101, on_change: true, refresh: 60s}]
 realtime: {priority: 20, lock_memory: true}
-audit: {file: /var/log/audit.jsonl, rotate: 10MiB, keep: 5, on_failure: refuse_writes, syslog: true}
+audit: {file: /var/log/audit.jsonl, rotate: 10MiB, keep: 5, on_failure: refuse_writes}
 )";
 
 /// Keys that the values of their neighbours there rule out.

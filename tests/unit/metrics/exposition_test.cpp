@@ -127,10 +127,9 @@ TEST(Exposition, ShowsTheBrokerWhereThereIsOne) {
     Snapshot snapshot = filled();
     EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_mqtt")));
     EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_audit")));
-    snapshot.audit = {100, 7, 2, 3, 1000, false, 5};
+    snapshot.audit = {100, 7, 2, 3, false};
     expect_samples(snapshot, {"audit_up 1", "audit_records_total 100", "audit_lost_total 7",
-                              "audit_failures_total 2", "audit_rotations_total 3",
-                              "audit_syslog_lost_total 5"});
+                              "audit_failures_total 2", "audit_rotations_total 3"});
     snapshot.mqtt = {true, 5, 100, 7, 2, 3, 4, 1, 6};
     expect_samples(snapshot, {"mqtt_connected 1", "mqtt_stored 5", "mqtt_published_total 100",
                               "mqtt_dropped_total 7", "mqtt_results_dropped_total 6",

@@ -34,10 +34,11 @@ class Caller {
     const WhoRef& who() const { return who_; }
     const std::string& name() const { return who_->name; }
     const std::string& token() const { return who_->token; }
-    /// Sets what the current request has shown: the name of its token ("": none), its role, and
-    /// where it came in.
+    /// Sets the client of the current request: the name of the token ("": none), the role, and the
+    /// listener.
     void identify(std::string token, Standing standing, std::string listener);
-    /// What its certificate says; `standing`: by the role in it, where the listener goes by that.
+    /// Sets subject and role word of the client's certificate; `standing`: by that role, on a
+    /// listener that takes roles from certificates.
     void certify(std::string subject, std::string word, std::optional<Standing> standing);
     const std::optional<Standing>& certificate_role() const { return certificate_role_; }
     /// A caller of the same identity for another loop, still there and without callbacks.
@@ -118,8 +119,7 @@ inline constexpr const char* kHeadersRead[] = {
     "authorization",  "origin",         "content-type",    "content-encoding", "sec-fetch-site",
     "sec-fetch-mode", "sec-fetch-dest", "idempotency-key", "last-event-id"};
 /// … and list headers: repeated fields are joined (RFC 9110 5.3).
-inline constexpr const char* kListsRead[] = {"accept", "accept-encoding", "if-none-match",
-                                             "prefer"};
+inline constexpr const char* kListsRead[] = {"accept", "accept-encoding", "if-none-match"};
 
 /// A body shared by several responses, in memory once.
 using SharedText = std::shared_ptr<const std::string>;

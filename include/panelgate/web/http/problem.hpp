@@ -3,6 +3,7 @@
 #include <boost/json/object.hpp>
 #include <boost/system/result.hpp>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -20,23 +21,16 @@ struct Problem {
         : status(with_status), detail(std::move(with_detail)) {}
 
     unsigned status = 500;
-    std::string detail;  ///< one sentence for the user
-    std::string kind;    ///< last part of the type URN: one of problem_kinds(); "": by status
+    std::string detail;              ///< one sentence for the user
+    std::string kind;                ///< last part of the URN of its type; "": by status
     boost::json::object extensions;  ///< further members (RFC 9457 3.2)
     std::vector<std::pair<std::string, std::string>> headers;
 };
 template <class T>
 using Parsed = boost::system::result<T, Problem>;
 
-/// A kind of problem with its URN: "urn:panelgate:problem:" and the word.
-struct ProblemKind {
-    std::string_view word;
-    std::string_view meaning;  ///< one sentence for the documentation
-    unsigned of_status = 0;    ///< not 0: default kind for this status
-};
-std::span<const ProblemKind> problem_kinds();
-
-/// Makes a problem. `kind`: a word of problem_kinds().
+/// Makes a problem. `status`: 400-405, 409, 413, 415, 421, 422, 429, 431, 500 or 502-504. `kind`: "": by
+/// status.
 Problem problem(unsigned status, std::string detail, std::string_view kind = {});
 /// ... that is temporary: with Retry-After in seconds.
 Problem passing_problem(unsigned status, std::string detail, std::int64_t seconds);
@@ -47,5 +41,16 @@ Problem unknown_name(const std::string& what, const std::string& name,
 /// Returns its members for a reply's body.
 boost::json::object json_of(const Problem& problem);
 HttpResponse to_response(const Problem& problem);
+
+/// Returns 400 for an unknown or repeated query.
+std::optional<Problem> check_queries(const HttpRequest& request,
+                                     std::span<const std::string_view> known);
+
+/// Returns a query value as an integer in [low, high]; `fallback` if absent.
+Parsed<unsigned> query_number(const HttpRequest& request, const std::string& name, unsigned low,
+                              unsigned high, unsigned fallback);
+
+/// Returns a boolean query value; false if absent.
+Parsed<bool> query_flag(const HttpRequest& request, const std::string& name);
 
 }  // namespace panelgate::web

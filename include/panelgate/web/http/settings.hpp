@@ -34,16 +34,12 @@ bool is_token_hash(std::string_view text);
 std::optional<WallTime> parse_expiry(std::string_view text);
 std::string expiry_text(WallTime expires);
 
-/// Throttling of token guesses, per address.
-struct LoginSettings {
-    unsigned free = 5;   ///< wrong tokens without penalty
-    Duration hold = 2s;  ///< delay for each further one, and each refused for lack of a place
-    unsigned checks_per_second = 32;  ///< tokens checked per address
-    Duration longest_turn = 1s;       ///< longest wait for a check
-    Duration forgiven_after = 10s;    ///< time until one wrong token is forgiven
-    unsigned remembered = 20;         ///< wrong tokens counted per address
-    std::size_t addresses = 256;      ///< tracked
-    friend bool operator==(const LoginSettings&, const LoginSettings&) = default;
+/// How many wrong tokens of an address are judged.
+struct WrongTokenSettings {
+    unsigned most = 10;           ///< beyond them the address gets 429 until `within` is over
+    Duration within = 1min;       ///< from the first wrong token on
+    std::size_t addresses = 256;  ///< counted; beyond it, the oldest is dropped
+    friend bool operator==(const WrongTokenSettings&, const WrongTokenSettings&) = default;
 };
 
 /// Limits of the replies to one address.
@@ -62,7 +58,7 @@ struct Settings {
     bool ipv6_only = false;             ///< with "::": another listener has this port on IPv4
     Standing anonymous = Role::viewer;  ///< of clients that show nothing
     std::vector<Token> tokens;
-    LoginSettings logins;
+    WrongTokenSettings wrong_tokens;
     RateLimitSettings rate_limit;
     std::vector<std::string> hosts;  ///< its host names; empty: the machine's
     std::vector<Network> allow;      ///< empty: all
@@ -70,7 +66,6 @@ struct Settings {
     std::size_t max_connections = 256;
     std::size_t max_connections_per_address = 32;  ///< excluding event streams
     std::size_t max_streams_per_address = 48;      ///< event streams
-    std::size_t max_throttled = 64;                ///< throttled for wrong tokens, per address
     std::size_t probe_places = 16;                 ///< additional places, for probes only
     std::size_t max_body = 64 * 1024;              ///< bytes
     Duration first_request_timeout = 10s;          ///< of a new connection

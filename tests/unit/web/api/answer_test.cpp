@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "panelgate/web/api/render.hpp"
 #include "support/fake_bus.hpp"
 
 namespace panelgate::web::answer_test {
@@ -57,14 +58,18 @@ TEST(Answer, OfAFaultHasItsStatusItsExceptionAndWhetherItLeft) {
 TEST(Answer, OfAnExceptionBlamesTheRequestForOneToFourOnlyAndAddsTheManualsWord) {
     profile::PanelProfile panel;
     panel.exceptions.push_back({2, "Address is outside the range"});
+    const auto problem_of_code = [&](unsigned code) {
+        const auto byte = static_cast<std::uint8_t>(code);
+        return problem_of(test::FakeBus::reply({0x83, byte}), panel).value();
+    };
     for (unsigned code = 0; code <= 11; ++code) {
-        const Problem problem = problem_of_exception(static_cast<std::uint8_t>(code), panel);
+        const Problem problem = problem_of_code(code);
         EXPECT_EQ(problem.status, code >= 1 && code <= 4 ? 422u : 502u) << code;
         EXPECT_EQ(told(problem).at("modbus_exception"), code);
         EXPECT_EQ(problem.detail.ends_with(" (Address is outside the range)"), code == 2) << code;
     }
     EXPECT_EQ(
-        problem_of_exception(2, panel).detail,
+        problem_of_code(2).detail,
         "the panel answered exception 2: illegal data address (Address is outside the range)");
 }
 
@@ -111,15 +116,11 @@ TEST(Answer, OfALineThatIsDownSaysWhatIsWrongWithIt) {
               "the line is down: cannot open /dev/ttyS0: Permission denied");
 }
 
-TEST(Accept, PrefersATypeWhereItIsNamedAndWeighsNoLess) {
-    EXPECT_TRUE(prefers("text/plain", "text/plain"));
-    for (const char* accept : {"*/*", "text/plain;q=0.5, application/json", "text/csv"})
-        EXPECT_FALSE(prefers(accept, "text/plain")) << accept;
-    for (const char* accept : {"text/csv", "text/csv, */*;q=0.1",
-                               "application/json;q=0.5,text/csv;header=present; q=0.8"})
-        EXPECT_TRUE(prefers_csv(accept)) << accept;
-    for (const char* accept : {"", "*/*", "application/json, text/csv;q=0.8", "text/csv;q=0"})
-        EXPECT_FALSE(prefers_csv(accept)) << accept;
+TEST(Csv, IsForWhoNamesItAndNoJsonBefore) {
+    for (const char* accept : {"text/csv", "text/csv, */*;q=0.1", "text/csv, application/json"})
+        EXPECT_TRUE(wants_csv(accept)) << accept;
+    for (const char* accept : {"", "*/*", "application/json, text/csv;q=0.8"})
+        EXPECT_FALSE(wants_csv(accept)) << accept;
 }
 
 TEST(Csv, QuotesWhatHasCommasQuotesOrLines) {

@@ -1,4 +1,4 @@
-#include "panelgate/web/api/events.hpp"
+#include "panelgate/web/api/render.hpp"
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/error.hpp>

@@ -198,6 +198,7 @@ class HttpRig : public ::testing::Test {
         providers.events = &events;
         providers.discovery = discovery;
         providers.configuration = configuration;
+        providers.settings = api;
         server = std::make_unique<Server>(io.get_executor(), settings, shown(), providers);
         EXPECT_FALSE(server->start());
         return *server;
@@ -310,6 +311,7 @@ class HttpRig : public ::testing::Test {
     profile::PanelProfile panel;
     Directory directory;
     Settings settings;
+    ApiSettings api;
     TimePoint now{1h};
     WallTime wall{std::chrono::seconds(1'790'000'000)};  ///< 2026-09-21T14:13:20Z
     std::vector<points::RelayStatus> relays;

@@ -68,7 +68,7 @@ Options options_of(std::string_view body, std::size_t from) {
 }
 
 TEST(Pcapng, BeginsWithItsSectionAndOneInterfaceOfMicroseconds) {
-    Pcapng file("panelgate 1.2", "floor1", 252);
+    TracePcapng file("1.2", "floor1");
     const auto blocks = blocks_of(file.take());
     ASSERT_EQ(blocks.size(), 2u);
     EXPECT_EQ(blocks[0].type, 0x0A0D0D0Au);
@@ -80,43 +80,6 @@ TEST(Pcapng, BeginsWithItsSectionAndOneInterfaceOfMicroseconds) {
     EXPECT_EQ(number(blocks[1].body, 0, 2), 252u);
     EXPECT_EQ(number(blocks[1].body, 4), 0u) << "no packet is cut";
     EXPECT_EQ(options_of(blocks[1].body, 8), (Options{{2, "floor1"}, {9, "\x06"}}));
-}
-
-TEST(Pcapng, APacketHasItsTimeItsLengthsItsWayAndItsComments) {
-    for (std::size_t size = 0; size < 9; ++size) {
-        Pcapng file("p", "l", 252);
-        file.take();
-        Pcapng::Packet packet;
-        packet.time = WallTime(std::chrono::microseconds(0x0005'1234'9ABC'DEF0));
-        packet.way = Pcapng::Way::out;
-        packet.bytes = std::string(size, 'x');
-        packet.comments = {"one", "second"};
-        file.add(packet);
-        const auto blocks = blocks_of(file.take());
-        ASSERT_EQ(blocks.size(), 1u);
-        EXPECT_EQ(blocks[0].type, 6u);
-        const std::string& body = blocks[0].body;
-        EXPECT_EQ(number(body, 0), 0u);
-        EXPECT_EQ(number(body, 4), 0x00051234u);
-        EXPECT_EQ(number(body, 8), 0x9ABCDEF0u);
-        EXPECT_EQ(number(body, 12), size);
-        EXPECT_EQ(number(body, 16), size);
-        EXPECT_EQ(body.substr(20, size), packet.bytes);
-        const std::size_t padded = (size + 3) / 4 * 4;
-        EXPECT_EQ(body.substr(20 + size, padded - size), std::string(padded - size, '\0'));
-        EXPECT_EQ(options_of(body, 20 + padded),
-                  (Options{{2, std::string("\x02\0\0\0", 4)}, {1, "one"}, {1, "second"}}));
-    }
-}
-
-TEST(Pcapng, CutsAnEndlessComment) {
-    Pcapng file("p", "l", 252);
-    file.take();
-    Pcapng::Packet packet;
-    packet.comments = {std::string(100'000, 'a')};
-    file.add(packet);
-    EXPECT_EQ(options_of(blocks_of(file.take())[0].body, 20).back().second.size(),
-              Pcapng::kLongestComment);
 }
 
 bus::TraceFrame frame(std::uint64_t sequence, FrameKind kind, const Bytes& bytes) {
@@ -213,19 +176,18 @@ TEST(TracePcapng, AReplyHasTheFormOfItsRequest) {
     EXPECT_EQ(forms, "ttrr");
 }
 
-TEST(ExportedPdu, KnowsWhatTheDissectorOfRtuSees) {
-    const auto seen = [](const Bytes& adu, bool request) { return is_seen_by_rtu(adu, request); };
-    EXPECT_TRUE(seen("1F 03 00 64 00 01 00 00"_hex, true));
-    EXPECT_TRUE(seen("1F 03 02 00 07 00 00"_hex, false));
-    EXPECT_TRUE(seen("1F 83 02 00 00"_hex, false));
-    EXPECT_TRUE(seen("1F 10 00 64 00 01 02 00 07 00 00"_hex, true));
-    EXPECT_TRUE(seen("1F 10 00 64 00 01 00 00"_hex, false));
-    EXPECT_TRUE(seen("1F 02 03 01 02 03 00 00"_hex, false));
-    EXPECT_FALSE(seen("1F 02 03 00 00 08 00 00"_hex, true));
-    EXPECT_FALSE(seen("00 10 00 64 00 01 02 00 07 00 00"_hex, true)) << "a broadcast";
-    EXPECT_FALSE(seen("1F 05 00 64 FF 00 00 00"_hex, false));
-    EXPECT_FALSE(seen("1F 07 00 00"_hex, true));
-    EXPECT_FALSE(seen("1F 2B 0E 01 00 00 00"_hex, true));
+TEST(TracePcapng, CutsAnEndlessCommentAndHasTheTimeOfAFrame) {
+    bus::TracePart part;
+    part.frames = {frame(1, FrameKind::request, "1F 03 00 64 00 01 C6 6B"_hex)};
+    part.frames[0].why = std::string(100'000, 'a');
+    part.frames[0].time = WallTime(std::chrono::microseconds(0x0005'1234'9ABC'DEF0));
+    EXPECT_EQ(shown(part)[0].comments.back().size(), 1000u);
+    TracePcapng file("1.2", "floor1");
+    file.take();
+    file.add(part);
+    const std::string body = blocks_of(file.finish()).at(0).body;
+    EXPECT_EQ(number(body, 4), 0x00051234u);
+    EXPECT_EQ(number(body, 8), 0x9ABCDEF0u);
 }
 
 TEST(TracePcapng, SaysInCommentsWhatWasThrownAwayAndDecided) {

@@ -61,7 +61,6 @@ class ApiTrace : public HttpRig {
         bus.made.push_back({41, TimePoint(1s), "station 5 is refused", WallTime(2501ms)});
         bus.exchanges.push_back(transaction());
     }
-    Reply text() { return ask("GET", kTrace, "", "Accept: text/plain\r\n"); }
 };
 
 TEST_F(ApiTrace, ATransactionHasItsInstantsAndItsFrames) {
@@ -75,10 +74,9 @@ TEST_F(ApiTrace, ATransactionHasItsInstantsAndItsFrames) {
     EXPECT_EQ(get(kTrace).at("frames").as_array().at(0).at("transaction"), 17);
 }
 
-TEST_F(ApiTrace, WhatDidNotHappenIsNullAndADashInText) {
+TEST_F(ApiTrace, WhatDidNotHappenIsNull) {
     bus.exchanges[0].end = TransactionEnd::timeout;
     bus.exchanges[0].first_byte_in = bus.exchanges[0].last_byte_in = std::nullopt;
-    EXPECT_THAT(text().body(), HasSubstr("timeout       2.0     2.0       -       -    13.0"));
     bus.exchanges[0].arrived = bus.exchanges[0].answered = std::nullopt;
     bus.exchanges[0].client.clear();
     bus.exchanges[0].reply.clear();
@@ -97,22 +95,6 @@ TEST_F(ApiTrace, APageFollowsByTheNumberOfATransactionsEnd) {
     EXPECT_EQ(status_and(page("?since=43"), "transactions"), "200 []");
     EXPECT_EQ(status_and(page("?since=40&last=2"), "next transactions"), "200 42 []")
         << "it ends behind that";
-}
-
-TEST_F(ApiTrace, IsAlignedTextForPeople) {
-    const Reply reply = text();
-    EXPECT_EQ(reply.header("Content-Type"), "text/plain; charset=utf-8");
-    EXPECT_EQ(reply.header("Vary"), "Accept");
-    EXPECT_EQ(reply.body(),
-              "TIME                              ID STATION REASON      OUTCOME     QUEUE     OUT"
-              "   THINK      IN   TOTAL  CLIENT\n"
-              "1970-01-01T00:00:02.500000Z       17      31 read        ok            2.0     2.0"
-              "     5.0     2.0    13.0  http 10.0.0.9\n"
-              "                               > 1F 03 00 64\n"
-              "                               < 1F 03 02 00 07\n"
-              "                               x FF  damaged\n"
-              "1970-01-01T00:00:02.501000Z  station 5 is refused\n"
-              "1970-01-01T00:00:00.000000Z    > 1F 03 00 64 00 01 C6 6B  request\n");
 }
 
 TEST_F(ApiTrace, IsACaptureForWireshark) {

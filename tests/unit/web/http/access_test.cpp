@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "admission.hpp"
+#include "origin.hpp"
 #include "router.hpp"
 
 namespace panelgate::web::access_test {

@@ -11,91 +11,50 @@
 namespace panelgate::web::admission_test {
 namespace {
 
-class LoginsTest : public ::testing::Test {
-  protected:
-    void fail(unsigned times, const std::string& address = "a") {
-        for (unsigned i = 0; i < times; ++i) logins.failed(now, address);
-    }
-    bool held(const std::string& address = "a") const {
-        return logins.hold(now, address) > Duration::zero();
-    }
-    LoginSettings settings;
-    Logins logins{settings};
+TEST(WrongTokens, OfAnAddressBarItUntilItsMinuteIsOver) {
+    const WrongTokenSettings settings;
+    WrongTokens wrong{settings};
     TimePoint now{1h};
-};
-
-TEST_F(LoginsTest, ThrottleAnAddressThatGuessesAndNoneForAFewMistakes) {
-    fail(settings.free);
-    EXPECT_FALSE(held());
-    fail(1);
-    EXPECT_EQ(logins.hold(now, "a"), settings.hold);
-    EXPECT_FALSE(held("b"));
+    for (unsigned i = 0; i < settings.most; ++i) wrong.add(now, "a");
+    EXPECT_EQ(wrong.barred_for(now, "a"), Duration::zero());
+    now += 20s;
+    wrong.add(now, "a");
+    EXPECT_EQ(wrong.barred_for(now, "a"), 40s);
+    EXPECT_EQ(wrong.barred_for(now, "b"), Duration::zero());
+    now += 40s;
+    EXPECT_EQ(wrong.barred_for(now, "a"), Duration::zero());
+    for (unsigned i = 0; i < settings.most; ++i) wrong.add(now, "a");
+    EXPECT_EQ(wrong.barred_for(now, "a"), Duration::zero()) << "another minute";
 }
 
-TEST_F(LoginsTest, LookAtAnAddressThatGuessesNoFasterThanItsGuessesAreAnswered) {
-    EXPECT_EQ(logins.turn(now, "a"), Duration::zero());
-    fail(settings.free + 1);
-    EXPECT_EQ(logins.turn(now, "a"), Duration::zero()) << "the first is looked at at once";
-    const Duration pause = Duration(1s) / settings.checks_per_second;
-    EXPECT_EQ(logins.turn(now, "a"), pause);
-    EXPECT_EQ(logins.turn(now, "a"), 2 * pause) << "whether the one before has hung up or not";
-    for (int i = 0; i < 1000; ++i) EXPECT_LE(logins.turn(now, "a"), settings.longest_turn);
-    EXPECT_EQ(logins.turn(now, "b"), Duration::zero());
-    now += settings.longest_turn + pause;
-    EXPECT_EQ(logins.turn(now, "a"), Duration::zero());
-    EXPECT_GT(settings.hold / pause, 40 + 10)
-        << "so many turns pass while each of forty guessers waits for its answer";
+TEST(WrongTokens, AreCountedOfSoManyAddresses) {
+    WrongTokenSettings settings;
+    settings.addresses = 2;
+    settings.most = 0;
+    WrongTokens wrong{settings};
+    const TimePoint now{1h};
+    const auto is_barred = [&](const char* address) {
+        return wrong.barred_for(now + 3ms, address) > Duration::zero();
+    };
+    wrong.add(now, "a");
+    wrong.add(now + 1ms, "b");
+    wrong.add(now + 2ms, "b");
+    EXPECT_TRUE(is_barred("a")) << "no other address has come";
+    wrong.add(now + 3ms, "c");
+    EXPECT_FALSE(is_barred("a"));
+    EXPECT_TRUE(is_barred("b"));
+    EXPECT_TRUE(is_barred("c"));
 }
 
-TEST_F(LoginsTest, ARightTokenUsesUpNoTurn) {
-    fail(settings.free + 10);
-    for (int i = 0; i < 5; ++i) {
-        EXPECT_EQ(logins.turn(now, "a"), Duration::zero());
-        logins.succeeded("a");
-    }
-}
-
-TEST_F(LoginsTest, ForgiveWithTime) {
-    fail(1000);
-    now += settings.forgiven_after;
-    EXPECT_TRUE(held());
-    now += settings.forgiven_after * settings.remembered;
-    EXPECT_FALSE(held());
-    fail(settings.free);
-    EXPECT_FALSE(held());
-}
-
-TEST_F(LoginsTest, ForgiveAnAddressWithMoreRightTokensThanWrongOnes) {
-    fail(settings.free + 1);
-    logins.succeeded("a");
-    EXPECT_FALSE(held());
-    for (unsigned i = 0; i < 100; ++i) logins.succeeded("a");
-    EXPECT_EQ(logins.addresses(), 0u);
-    fail(settings.free + 1);
-    EXPECT_TRUE(held());
-}
-
-TEST_F(LoginsTest, RememberSoManyAddressesAndForgetTheOneThatFailedLongestAgo) {
-    fail(settings.free + 1, "old");
-    now += 1ms;
-    for (unsigned i = 0; i + 1 < settings.addresses; ++i) fail(1, std::to_string(i));
-    EXPECT_TRUE(held("old"));
-    fail(1, "one more");
-    EXPECT_FALSE(held("old"));
-    EXPECT_EQ(logins.addresses(), settings.addresses);
-}
-
-/// Places for three connections, two of an address, two streams and two throttled ones of an
-/// address, two probes. Plays moves: "4a" is the arrival of connection 4 from address a, behind it
-/// what comes of it: "?" a place for probes only, "-2" connection 2 leaves. "b1" is busy(1),
-/// "i1" idle(1), "l1" leave(1), "s1" suspect(1), "w1" wrong(1), "e1" an event stream, "e1!" too
-/// many.
+/// Places for three connections, two of an address, two streams of an address, two probes. Plays
+/// moves: "4a" is the arrival of connection 4 from address a, behind it what comes of the arrival:
+/// "?" a place for probes only, "-2" connection 2 leaves. "b1" is busy(1), "i1" idle(1),
+/// "l1" leave(1), "e1" an event stream, "e1!" a stream too many.
 void play(const std::string& moves) {
     Settings settings;
     settings.max_connections = 3;
     settings.max_connections_per_address = 2;
     settings.max_streams_per_address = 2;
-    settings.max_throttled = 2;
     settings.probe_places = 2;
     Places places(settings);
     std::istringstream in(moves);
@@ -113,12 +72,9 @@ void play(const std::string& moves) {
         if (move[0] == 'b') places.busy(id);
         if (move[0] == 'i') places.idle(id);
         if (move[0] == 'l') places.leave(id);
-        if (move[0] == 's') places.suspect(id);
-        if (move[0] == 'w') places.wrong(id);
         if (move[0] == 'e') {
             EXPECT_EQ(places.stream(id), move.back() != '!');
         }
-        EXPECT_EQ(places.is_throttled(id), move[0] == 'w');
     }
 }
 
@@ -133,14 +89,6 @@ TEST(Places, AreTakenFromTheLongestIdleOneAndFromNoneThatHasARequest) {
         probes += ' ' + name + "a?-" + std::to_string(id - 2) + " b" + name;
     }
     play(probes);  // there is always one for a probe
-}
-
-TEST(Places, OfAWrongTokenAreFreeAndItKeepsItsConnection) {
-    play("1a 2a b1 b2 w2 3a b3 4a?");       // the place is taken once
-    play("1a w1 2a w2 3a-1 w3 4b");         // so many of an address, then the oldest leaves
-    play("1b 2a 3a b2 b3 w2 4c-2 5d-1");    // in a full house before those that are idle
-    play("1a 2a 3b b1 b2 b3 s2 4a? 5c-2");  // a guessing address gives way to another only
-    play("1a 2a 3b b1 b2 b3 s2 b2 4c?");    // not if its token was found right
 }
 
 /// A proxy is one address, and each tab keeps a stream open all day.

@@ -1,82 +1,15 @@
-#include "key_book.hpp"
-
-#include <cstdint>
-#include <memory>
 #include <string>
-#include <variant>
 
 #include "http_rig.hpp"
 
-namespace panelgate::web::key_book_test {
+namespace panelgate::web::once_test {
 namespace {
 
 using ::testing::HasSubstr;
 
-class Keys : public ::testing::Test {
-  protected:
-    enum class Outcome { fresh, answer, in_flight, other, full };
-    using enum Outcome;
-    Outcome begin(const std::string& client, const std::string& key, std::uint64_t request = 1) {
-        const auto begun = book.begin(now, {client, key}, request, std::make_shared<Caller>(1, ""));
-        if (std::holds_alternative<KeyBook::Fresh>(begun)) return fresh;
-        const auto* refused = std::get_if<Problem>(&begun);
-        if (refused == nullptr) return answer;
-        if (refused->status == 409) return in_flight;
-        return refused->status == 422 ? other : full;
-    }
-    void end(const std::string& client, const std::string& key) {
-        HttpResponse made;
-        made.body = "1234567890";
-        book.end(now, {client, key}, made);
-    }
-
-    ApiSettings settings{
-        .keys_kept = 10min, .max_keys = 4, .max_keys_of_client = 3, .max_kept = 25};
-    KeyBook book{settings};
-    TimePoint now{1h};
-};
-
-TEST_F(Keys, AreForgottenWhenTheirTimeIsOverAndNotBefore) {
-    EXPECT_EQ(begin("a", "k"), fresh);
-    EXPECT_EQ(begin("a", "k"), in_flight);
-    EXPECT_EQ(begin("b", "k"), fresh) << "another client";
-    end("a", "k");
-    now += 10min - 1ns;
-    EXPECT_EQ(begin("a", "k"), answer);
-    EXPECT_EQ(begin("a", "k", 2), other);
-    now += 1ns;
-    EXPECT_EQ(begin("a", "k", 2), fresh);
-    EXPECT_EQ(book.size(), 2u);
-    book.drop({"a", "k"});
-    EXPECT_EQ(begin("a", "k", 3), fresh) << "what had no effect may be tried again";
-}
-
-TEST_F(Keys, OfOneClientLeaveRoomForOthers) {
-    for (const char* key : {"1", "2", "3"}) EXPECT_EQ(begin("a", key), fresh);
-    EXPECT_EQ(begin("a", "4"), full);
-    EXPECT_EQ(begin("b", "4"), fresh);
-    EXPECT_EQ(begin("c", "4"), full);
-    book.drop({"a", "1"});
-    EXPECT_EQ(begin("c", "4"), fresh);
-}
-
-TEST_F(Keys, AreBoundedByTheBytesOfTheirAnswersToo) {
-    for (const char* key : {"1", "2", "3"}) begin("a", key), end("a", key);
-    EXPECT_EQ(begin("b", "4"), full);
-    now += 10min;
-    EXPECT_EQ(begin("b", "4"), fresh);
-}
-
-TEST_F(Keys, TheirWorkersLeaveWhenTheyAreDismissed) {
-    const auto worker = std::make_shared<Caller>(1, "");
-    book.begin(now, {"a", "k"}, 1, worker);
-    book.dismiss();
-    EXPECT_TRUE(worker->has_left());
-}
-
 class ApiKeyed : public HttpRig {
   protected:
-    Reply put(const std::string& key, const std::string& body = R"({"values":[9]})",
+    Reply put(const std::string& key, const std::string& body = kBody,
               const std::string& more = "") {
         return ask("PUT", kPath, body, "Idempotency-Key: " + key + "\r\n" + more);
     }
@@ -87,6 +20,7 @@ class ApiKeyed : public HttpRig {
     static bool is_replayed(const Reply& reply) {
         return reply.header("Idempotency-Replayed") == "true";
     }
+    static constexpr const char* kBody = R"({"values":[9]})";
     static constexpr const char* kPath = "/api/v1/stations/press/devices/UW7";
 };
 
@@ -167,6 +101,30 @@ TEST_F(ApiKeyed, P2WhoLeavesTakesWhatWaitsAlongAndMayTryAgain) {
     EXPECT_EQ(bus.requests.size(), 2u);
 }
 
+TEST_F(ApiKeyed, OfOneClientLeaveRoomForOthersAndNoneIsDroppedBeforeItsTime) {
+    settings.tokens.push_back({"ops", Role::operator_, hash_of("let-me")});
+    api.max_keys_of_client = 2;
+    api.max_keys = 3;
+    for (const char* key : {"1", "2"}) EXPECT_EQ(put(key).status(), 200u);
+    const Reply refused = put("3");
+    EXPECT_EQ(refused.status(), 503u);
+    EXPECT_NE(refused.header("Retry-After"), "");
+    const char* token = "Authorization: Bearer let-me\r\n";
+    EXPECT_EQ(put("3", kBody, token).status(), 200u);
+    EXPECT_EQ(put("4", kBody, token).status(), 503u);
+    EXPECT_TRUE(is_replayed(put("1")));
+    now += 10min;
+    EXPECT_EQ(put("4", kBody, token).status(), 200u);
+}
+
+TEST_F(ApiKeyed, AreBoundedByTheBytesOfTheirAnswersToo) {
+    api.max_kept = 1;
+    EXPECT_EQ(put("1").status(), 200u);
+    EXPECT_EQ(put("2").status(), 503u);
+    now += 10min;
+    EXPECT_EQ(put("2").status(), 200u);
+}
+
 TEST_F(ApiKeyed, AServerThatEndsLeavesNobodyWorking) {
     hold_answers();
     Client client = connect();
@@ -193,4 +151,4 @@ TEST_F(ApiKeyed, SaysWhatAKeyIs) {
 }
 
 }  // namespace
-}  // namespace panelgate::web::key_book_test
+}  // namespace panelgate::web::once_test

@@ -1,4 +1,4 @@
-#include "body.hpp"
+#include "panelgate/web/api/values.hpp"
 
 #include <gmock/gmock.h>
 
@@ -11,7 +11,10 @@
 #include <variant>
 #include <vector>
 
-namespace panelgate::web::body_test {
+#include "panelgate/base/decimal.hpp"
+#include "panelgate/web/http/json_text.hpp"
+
+namespace panelgate::web::values_test {
 namespace {
 
 using modbus::Table;
@@ -19,10 +22,10 @@ using points::Value;
 using ::testing::ElementsAre;
 using ::testing::StartsWith;
 
-Parsed<std::vector<std::uint16_t>> cells_of(std::string_view body, Table table) {
+Parsed<std::vector<std::uint16_t>> cells_in(std::string_view body, Table table) {
     const auto object = parse_object(body, {"values"});
     if (!object) return object.error();
-    return values_member(*object, table);
+    return web::cells_of(*object, table);
 }
 Parsed<Value> value_of(std::string_view body) {
     const auto object = parse_object(body, {"value"});
@@ -32,23 +35,23 @@ Parsed<Value> value_of(std::string_view body) {
 Parsed<Value> number_of(const std::string& text) { return value_of("{\"value\": " + text + "}"); }
 
 std::string registers_error(const std::string& body) {
-    const auto cells = cells_of(body, Table::holding_registers);
+    const auto cells = cells_in(body, Table::holding_registers);
     if (cells) return "";
     EXPECT_EQ(cells.error().status, 400u);
     return cells.error().detail;
 }
 
 TEST(Body, TakesRegistersUnsignedOrAsTwosComplementAndBitsAsBooleansOrNumbers) {
-    EXPECT_THAT(*cells_of(R"({"values":[0, 65535, -1, -32768, 10.0]})", Table::holding_registers),
+    EXPECT_THAT(*cells_in(R"({"values":[0, 65535, -1, -32768, 10.0]})", Table::holding_registers),
                 ElementsAre(0, 0xFFFF, 0xFFFF, 0x8000, 10));
     for (const char* value : {"65536", "-32769", "1.5", "\"1\"", "true", "null", "[1]", "1e16"}) {
         EXPECT_THAT(registers_error(std::string("{\"values\":[1, ") + value + "]}"),
                     StartsWith("a register is a whole number from 0 to 65535, or from -32768, not"))
             << value;
     }
-    EXPECT_THAT(*cells_of(R"({"values":[true, false, 1, 0, 1.0]})", Table::coils),
+    EXPECT_THAT(*cells_in(R"({"values":[true, false, 1, 0, 1.0]})", Table::coils),
                 ElementsAre(1, 0, 1, 0, 1));
-    EXPECT_EQ(cells_of(R"({"values":[2]})", Table::coils).error().detail,
+    EXPECT_EQ(cells_in(R"({"values":[2]})", Table::coils).error().detail,
               "a bit is true, false, 1 or 0, not 2");
 }
 
@@ -68,16 +71,9 @@ TEST(Body, SaysWhatAHandTypesThatIsNoJson) {
     };
     constexpr Row kRows[] = {
         {"", "1: it is empty; send an object, such as {\"value\": 1}"},
-        {"\xEF\xBB\xBF{\"value\": 1}",
-         "1: a byte order mark (U+FEFF) precedes the value; send the body without"},
-        {"{\"value\": \"\xFF\"}", "12: this is not UTF-8"},
-        {"{\"value\": +21}", "11: a number of JSON has no '+'; remove it"},
-        {"{\"value\": .5}", "11: a number of JSON has a digit before its '.'; write 0."},
-        {"{\"value\": 021}", "12: a number of JSON has no leading zeros; write it without"},
-        {"{\"value\": 1} // one", "14: JSON has no comments; remove it"},
-        {"{\"value\": 1,}", "13: a ',' too many before this"},
-        {"{\"value\": True}", "11: it is written true"},
-        {"{\"value\": NaN}", "11: NaN is no number of JSON"},
+        {"{\"value\": \"\xFF\"}", "12: it is not UTF-8"},
+        {"{\"value\": 1,}",
+         "13: a value, a quote, a ':' or a ',' is missing here, or something else is too many"},
         {"{\"value\": 1", "12: it ends before it is complete; a bracket or a quote is not closed"},
         {"{} x", "4: something follows the value"},
     };
@@ -101,17 +97,13 @@ TEST(Body, WithAMemberThatNobodyKnowsIsRefused) {
 TEST(Body, WithAMemberTwiceIsRefusedAtAnyDepth) {
     EXPECT_EQ(registers_error("{\"values\":[1],\n\"values\":[2]}"),
               "the member 'values' comes a second time: line 2, column 1");
-    EXPECT_THAT(registers_error(R"({"values":[{"a":1,"a":2}]})"),
-                StartsWith("the member 'a' comes a second time: line 1, "));
-    const auto repeated = [](std::string_view json) { return find_repeated_member(json); };
-    EXPECT_EQ(repeated(R"([{"x":{"a":1,"b":[{"c":1,"d":2,"c":3}]}}])").value().name, "c");
-    EXPECT_EQ(repeated(R"({"a":1,"\u0061":2})").value().name, "a") << "two spellings";
-    EXPECT_EQ(repeated(R"({"a":1, "a":2})").value().at, 8u) << "where the second one begins";
-    for (const char* once :
-         {R"({"a":{"a":[{"a":1},{"a":2}]},"A":1})", R"(["a","a"])", "{}",  // from here on no JSON:
-          "", "{", "[1,,2]", R"({"a":1 x "a":2})", R"({"a":1,"a)"})
-        EXPECT_FALSE(repeated(once)) << once;
-    EXPECT_FALSE(repeated(std::string(60'000, '[')));
+    for (const char* twice : {R"({"values":[{"a":1,"a":2}]})", R"({"a":1,"\u0061":2})",
+                              R"([{"x":{"c":1,"b":[{"c":1,"d":2,"c":3}]}}])"})
+        EXPECT_THAT(registers_error(twice), testing::HasSubstr("comes a second time: line 1, "))
+            << twice;
+    EXPECT_TRUE(parse_json(R"({"a":{"a":[{"a":1},{"a":2}]},"A":1})"));
+    EXPECT_TRUE(parse_json(R"(["a","a"])"));
+    EXPECT_FALSE(parse_json(std::string(60'000, '[')));
 }
 
 TEST(Body, TakesAPointsValueAsItIs) {
@@ -179,4 +171,4 @@ TEST(Body, GivesMembersOfTheirKind) {
 }
 
 }  // namespace
-}  // namespace panelgate::web::body_test
+}  // namespace panelgate::web::values_test
