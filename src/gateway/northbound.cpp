@@ -110,7 +110,7 @@ void BrokerSession::start() {
     sweep();
 }
 
-std::unique_ptr<mqtt::GracefulClose> BrokerSession::stop() {
+std::shared_ptr<mqtt::GracefulClose> BrokerSession::stop() {
     alarm_->cancel();
     rebirth_alarm_->cancel();
     auto leaving = client_.stop();

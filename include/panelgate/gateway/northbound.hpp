@@ -52,7 +52,7 @@ class BrokerSession {
     void start();
     /// Ends the session. The returned object keeps the connection until the broker has got the last
     /// message; null: there is none.
-    std::unique_ptr<mqtt::GracefulClose> stop();
+    std::shared_ptr<mqtt::GracefulClose> stop();
 
     /// Publishes what has happened on a line.
     void on_bus_event(const std::string& line, const bus::BusEvent& event);
@@ -146,7 +146,7 @@ class Northbound {
     rt::Clock& clock_;
     TopicRefusals refused_;
     std::unique_ptr<BrokerSession> session_;        ///< null without a broker
-    std::unique_ptr<mqtt::GracefulClose> closing_;  ///< of the previous or the last session
+    std::shared_ptr<mqtt::GracefulClose> closing_;  ///< of the previous or the last session
     bool running_ = false;
 };
 
