@@ -61,9 +61,7 @@ class ScanRun final : public line::Line::Events {
     void end(const std::string& why);
     void redraw();
     void tell();
-    std::string progress(std::size_t width) const {
-        return scan::format_progress(scanner_->progress(clock_.now()), width);
-    }
+    std::string progress(std::size_t width) const { return scanner_->progress().substr(0, width); }
 
     boost::asio::io_context& io_;
     const scan::Settings& settings_;

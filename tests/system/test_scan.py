@@ -115,7 +115,7 @@ class Scan(unittest.TestCase):
             print(f"six addresses: {took:.1f} s", flush=True)
             self.assertLess(took, LIMIT)
             self.assertEqual((shown.returncode, piped.returncode), (0, 0), err)
-            self.assertRegex(err, r"^(panelgate: (\d+ %, about \d+ s left, \d found: 38400 8N1, |found station ).*\n)+$")
+            self.assertRegex(err, r"^(panelgate: (\d found, \d+ questions left at most: 38400 8N1, |found station ).*\n)+$")
             self.check_named(err)
             self.check_table(links["a"], table)
             self.check_progress(drawn)
@@ -133,7 +133,7 @@ class Scan(unittest.TestCase):
         lines = drawn.replace("\x1b[K", "").replace("\n", "").split("\r")
         self.assertLess(max(map(len, lines)), COLUMNS)
         self.check_named(drawn)
-        self.assertRegex(drawn, r"\d+ %, about \d+ s left, \d found: 38400 8N1, station")
+        self.assertRegex(drawn, r"\d found, \d+ questions left at most: 38400 8N1, station")
         self.assertTrue(drawn.endswith("\r\x1b[K"), repr(drawn[-80:]))
         shares = [int(share) for share in re.findall(r"(\d+) %", drawn)]
         self.assertGreater(shares[-1], 80)
