@@ -127,18 +127,6 @@ std::string yaml_text(const std::string& text) {
     return quoted + '"';
 }
 
-std::string yaml_serial(const Result& result) {
-    if (!result.format) return {};
-    const SerialFormat& format = *result.format;
-    const std::string supposed =
-        result.remote ? "    # what the far end is set to; supposed from the panels found\n" : "";
-    const std::string mode = format.mode == SerialMode::ascii ? "mode: ascii, " : "";
-    return supposed + "    serial: {" + mode + "baud: " + std::to_string(format.baud) +
-           ", data_bits: " + std::to_string(format.data_bits) +
-           ", parity: " + to_string(format.parity) +
-           ", stop_bits: " + std::to_string(format.stop_bits) + "}\n";
-}
-
 /// `prefix`: of the name, before the address.
 std::string yaml_station(const StationFinding& finding, const std::string& prefix = "station") {
     std::string text;
@@ -183,6 +171,17 @@ std::string nothing_answered(const Result& result) {
 
 }  // namespace
 
+std::string serial_yaml(const Result& result) {
+    const SerialFormat format = result.format.value_or(SerialFormat{});
+    const std::string supposed =
+        result.remote ? "    # what the far end is set to; supposed from the panels found\n" : "";
+    const std::string mode = format.mode == SerialMode::ascii ? "mode: ascii, " : "";
+    return supposed + "    serial: {" + mode + "baud: " + std::to_string(format.baud) +
+           ", data_bits: " + std::to_string(format.data_bits) +
+           ", parity: " + to_string(format.parity) +
+           ", stop_bits: " + std::to_string(format.stop_bits) + "}\n";
+}
+
 bool found_any(const Result& result) { return std::ranges::any_of(result.stations, was_read); }
 
 std::string report_text(const std::string& device, const Result& result,
@@ -211,7 +210,7 @@ std::string report_yaml(const std::string& device, const Result& result,
         text += "# incomplete: the scan was interrupted\n";
     if (!profiles_dir.empty()) text += "profiles_dir: " + yaml_text(profiles_dir) + '\n';
     text += "lines:\n  - name: line1\n    device: " + yaml_text(device) + '\n' +
-            yaml_serial(result) + "    stations:\n";
+            serial_yaml(result) + "    stations:\n";
     for (const StationFinding& finding : result.stations) text += yaml_station(finding);
     return text + "modbus_tcp:\n  - listen: 127.0.0.1:1502\n";  // a configuration needs a server
 }

@@ -177,7 +177,8 @@ void Scanner::State::listen(TimePoint now, Duration how_long) {
     not_before = std::max(not_before, now) + how_long;
 }
 
-/// Valid frames: another master. Unreadable bytes: perhaps one in another format. Silence: start.
+/// Valid frames mean another master, unreadable bytes perhaps a master in another format. Silence
+/// starts the search.
 void Scanner::State::end_listening(TimePoint now) {
     const Heard parts = extract_frames(heard);
     for (const Frame& frame : parts.frames) add_frame(result.talk, frame);

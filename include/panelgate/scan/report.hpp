@@ -90,6 +90,9 @@ std::string report_text(const std::string& device, const Result& result,
 std::string report_yaml(const std::string& device, const Result& result,
                         const std::string& profiles_dir = {});
 
+/// Returns the line `serial:` of that configuration, indented, with a comment where it is supposed.
+std::string serial_yaml(const Result& result);
+
 /// Returns the entries of these stations only, for the `stations:` of the named line.
 std::string stations_yaml(const std::string& line, const std::vector<StationFinding>& stations);
 

@@ -50,7 +50,7 @@ class Scanner {
     bool done() const;
     /// "3 found, 45 questions left at most: 38400 8N1, station 17".
     std::string progress() const;
-    /// Returns the stations that were looked at closely so far, in that order.
+    /// Returns the stations examined so far, in the order of their examinations.
     const std::vector<StationFinding>& examined() const;
     /// Returns what is known so far, also before it is done.
     Result result() const;
