@@ -138,8 +138,7 @@ class Reader {
             {"logfile",
              [](Reader&
                     in) { in.note("the log goes to standard error: under systemd to the journal"); }},
-            {"daemon",
-             [](Reader& in) { in.note("run it as a service: deploy/ has a unit for systemd"); }},
+            {"daemon", [](Reader& in) { in.note("deploy/ has a unit for systemd"); }},
             {"enable_rmtaddr_in_log",
              [](Reader&
                     in) { in.note("the log and the status always name clients by their addresses"); }},
@@ -164,7 +163,6 @@ class Reader {
         return mbusd_;
     }
     const std::vector<std::string>& notes() const { return notes_; }
-    const std::vector<std::string>& comments() const { return comments_; }
 
   private:
     void wrong(const std::string& what) {
@@ -175,9 +173,8 @@ class Reader {
     }
     /// Records what has no counterpart, and why.
     void note(const std::string& why) {
-        const std::string told = as_ascii(line_->name + " = " + line_->value) + ": " + why;
-        comments_.push_back(told);
-        notes_.push_back(problems_.file() + ':' + std::to_string(line_->mark.line) + ": " + told);
+        notes_.push_back(problems_.file() + ':' + std::to_string(line_->mark.line) + ": " +
+                         as_ascii(line_->name + " = " + line_->value) + ": " + why);
     }
     void integer(std::int64_t& value, std::int64_t min, std::int64_t max) {
         const auto number = parse_number(line_->value);
@@ -265,7 +262,6 @@ class Reader {
     Settings mbusd_;
     bool kernel_ = false;
     std::vector<std::string> notes_;
-    std::vector<std::string> comments_;
 };
 
 /// All attempts must fit; empty if the default is enough.
@@ -309,7 +305,7 @@ std::string filled(std::string_view form, std::initializer_list<std::string> val
     return text + std::string(form);
 }
 
-std::string yaml_of(const Settings& mbusd, const std::vector<std::string>& comments) {
+std::string yaml_of(const Settings& mbusd, const std::vector<std::string>& notes) {
     const char parity = to_lower(mbusd.mode)[1];
     const auto listen = endpoint_of(mbusd.address, mbusd.port);
     std::string text = filled(
@@ -322,8 +318,8 @@ std::string yaml_of(const Settings& mbusd, const std::vector<std::string>& comme
                 listen ? endpoint_text(listen->address, listen->port) : "",
                 mbusd.replies_to_broadcasts ? "reply" : "silent", std::to_string(mbusd.connections),
                 mbusd.port == 8080 ? "" : std::string(kHttp), mbusd.level});
-    if (!comments.empty()) text += "\n# Without a counterpart, or not as it was written:\n";
-    for (const std::string& comment : comments) text += "# " + comment + '\n';
+    if (!notes.empty()) text += "\n# Without a counterpart, or not as it was written:\n";
+    for (const std::string& note : notes) text += "# " + note.substr(note.find(": ") + 2) + '\n';
     return text;
 }
 
@@ -333,7 +329,7 @@ std::optional<Imported> import_conf(std::string_view text, yaml::Problems& probl
     Reader reader(problems);
     for (const Line& line : lines_of(text, problems)) reader.take(line);
     if (!problems.empty()) return std::nullopt;
-    return Imported{yaml_of(reader.mbusd(), reader.comments()), reader.notes()};
+    return Imported{yaml_of(reader.mbusd(), reader.notes()), reader.notes()};
 }
 
 }  // namespace panelgate::mbusd

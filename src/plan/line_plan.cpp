@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
@@ -171,15 +170,8 @@ Line at_intervals(const Line& line, double times) {
 }
 
 std::string_view label(RelayLoad::Request request) {
-    switch (request) {
-        case RelayLoad::Request::read:
-            return "read";
-        case RelayLoad::Request::write:
-            return "write";
-        case RelayLoad::Request::reread:
-            return "reread";
-    }
-    std::abort();
+    if (request == RelayLoad::Request::read) return "read";
+    return request == RelayLoad::Request::write ? "write" : "reread";
 }
 
 Verdict verdict(const LinePlan& plan) {

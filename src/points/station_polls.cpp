@@ -1,7 +1,6 @@
 #include "panelgate/points/station_polls.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <map>
 #include <tuple>
 #include <utility>
@@ -126,15 +125,8 @@ std::vector<std::uint16_t> items_of(const modbus::Span& span, ByteView reply) {
 }
 
 std::string_view label(Quality quality) {
-    switch (quality) {
-        case Quality::good:
-            return "good";
-        case Quality::stale:
-            return "stale";
-        case Quality::bad:
-            return "bad";
-    }
-    std::abort();
+    if (quality == Quality::good) return "good";
+    return quality == Quality::stale ? "stale" : "bad";
 }
 
 std::optional<bool> SharedMemory::changes(const modbus::Span& written,

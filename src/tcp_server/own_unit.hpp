@@ -45,7 +45,8 @@ struct Diagnostics {
 /// Returns the diagnostics unit's reply. Never uses a bus. Pure.
 ///
 /// 02, 03 and 04 read the map that describe_register_map() documents; 2B/0E identifies the gateway
-/// (AP 6.21). Every other function is exception 01; a malformed request of these 03.
+/// (AP 6.21). Every other function, including those for serial lines only (SER-01), is exception
+/// 01; a malformed request of these functions 03.
 Bytes answer_diagnostics(ByteView request, const Diagnostics& state);
 
 /// Returns the gateway's current state as `who` may see it: a line or station of which he may read

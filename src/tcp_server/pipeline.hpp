@@ -29,7 +29,7 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
     /// take() or pop(), nor after close().
     Pipeline(std::shared_ptr<Shared> shared, Caller caller, std::function<void()> on_answer);
 
-    /// True if one more request fits. Callers that respect it bound the memory.
+    /// True if one more request fits. Callers that ask before take() bound the memory.
     bool has_room() const;
     /// Takes a request. A retransmission of an unanswered one gets no answer of its own
     /// (settings.retransmissions).

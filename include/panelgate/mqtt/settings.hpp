@@ -17,8 +17,8 @@ inline std::string_view label(Format format) {
     return format == Format::json ? "json" : "sparkplug";
 }
 
-/// The contents of `ca`, `certificate` and `key`. Others make no other session: they are for its
-/// next connection.
+/// The contents of `ca`, `certificate` and `key`. Changed contents leave the session as it is: they
+/// count for the session's next connection.
 struct Files : tls::Material {
     friend bool operator==(const Files&, const Files&) { return true; }
 };

@@ -34,13 +34,14 @@ struct Station {
     bool repeats = true;
     /// Silence after its replies, if configured; nullopt: from the serial format and the profile.
     std::optional<Duration> frame_gap;
-    Duration station_gap{};  ///< rest of the station behind its reply, in which others are asked
+    Duration
+        station_gap{};  ///< rest of the station behind a reply; other stations are asked meanwhile
     Duration after_write{};  ///< the same behind a write
     std::vector<PolledItem> asked;
     points::SharedMemory memory{};  ///< decides what is read again after a write
 };
 
-/// A relay's part on one line. `from` and `to`: its endpoints on this line, at least one.
+/// A relay's part on one line. `from` and `to`: the relay's ends on this line, at least one end.
 struct Relay {
     struct End {
         std::size_t station = 0;  ///< index into Line::stations

@@ -26,8 +26,8 @@ namespace panelgate::points {
 class PollSchedule {
   public:
     struct Settings {
-        /// Every entry gets its first turn within this time, spread evenly, so that slow ones have
-        /// a value soon.
+        /// Every entry gets its first turn within this time, spread evenly, so that slow entries
+        /// have a value soon.
         Duration first_within = 1s;
         /// Limits of extra turns (request_extra_turn): a burst, then one per interval.
         std::size_t extra_burst = 16;
@@ -104,8 +104,8 @@ void adopt_readings(const std::vector<Want>& wants, std::vector<Reading>& readin
 
 /// How the tables of a panel show the same memory.
 struct SharedMemory {
-    /// Returns everything that a write of these items changes; empty: it may change all other
-    /// tables.
+    /// Returns everything that a write of these items changes. Empty: the write may change all
+    /// other tables.
     std::function<std::vector<modbus::Span>(const modbus::Span&)> shown_as;
     /// False: the panel may share more memory than this.
     bool known = true;
