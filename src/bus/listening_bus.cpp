@@ -23,9 +23,6 @@
 
 namespace panelgate::bus {
 
-/// Outcome of a request between another master and a station.
-Outcome outcome_of(const tap::Transaction& heard);
-
 /// Counters of the stations on a line with another master. Pure.
 class HeardStations {
   public:
@@ -61,21 +58,6 @@ class HeardStations {
     Wire wire_;
     arbiter::LineCounters line_;
 };
-
-Outcome outcome_of(const tap::Transaction& heard) {
-    switch (heard.end) {
-        case tap::End::answered:
-            return modbus::exception_of(heard.reply) ? Outcome::exception : Outcome::ok;
-        case tap::End::silent:
-            return Outcome::timeout;
-        case tap::End::damaged:
-        case tap::End::wrong:
-            return Outcome::damaged;
-        case tap::End::unasked:
-            return Outcome::ok;
-    }
-    std::abort();
-}
 
 HeardStations::HeardStations(const Stations& listed, int offline_after) {
     apply(listed, offline_after);
@@ -160,27 +142,14 @@ void HeardStations::count_failure(One& one, const tap::Transaction& heard) {
 
 void HeardStations::count(const tap::Frame& frame) {
     arbiter::StationCounters& wire = wire_of(frame.station);
-    switch (frame.kind) {
-        case FrameKind::damaged:
-            ++wire.damaged_frames;
-            break;
-        case FrameKind::late:
-            ++wire.late_frames;
-            break;
-        case FrameKind::copy:
-        case FrameKind::foreign:
-            ++wire.foreign_frames;
-            break;
-        case FrameKind::request:
-        case FrameKind::retry:
-        case FrameKind::probe:
-        case FrameKind::learn_echo:
-        case FrameKind::broadcast:
-        case FrameKind::reply:
-        case FrameKind::heard_request:
-        case FrameKind::echo:
-        case FrameKind::foreign_request:
-            return;
+    if (frame.kind == FrameKind::damaged) {
+        ++wire.damaged_frames;
+    } else if (frame.kind == FrameKind::late) {
+        ++wire.late_frames;
+    } else if (frame.kind == FrameKind::copy || frame.kind == FrameKind::foreign) {
+        ++wire.foreign_frames;
+    } else {
+        return;
     }
     wire.discarded_bytes += frame.bytes.size();
 }
@@ -222,6 +191,22 @@ std::string doubt_text(const tap::Transaction& made) {
                " may be to another request: its values are not taken";
     return "the request of function " + function + " to station " + station +
            " may be a reply whose request was not heard: it is not counted";
+}
+
+/// Outcome of a request between another master and a station.
+Outcome outcome_of(const tap::Transaction& heard) {
+    switch (heard.end) {
+        case tap::End::answered:
+            return modbus::exception_of(heard.reply) ? Outcome::exception : Outcome::ok;
+        case tap::End::silent:
+            return Outcome::timeout;
+        case tap::End::damaged:
+        case tap::End::wrong:
+            return Outcome::damaged;
+        case tap::End::unasked:
+            return Outcome::ok;
+    }
+    std::abort();
 }
 
 TransactionEnd end_of(const tap::Transaction& made) {
