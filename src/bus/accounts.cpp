@@ -1,6 +1,7 @@
 #include "accounts.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <boost/asio/ip/address.hpp>
 #include <boost/system/error_code.hpp>
 #include <cmath>
@@ -20,6 +21,11 @@
 #include "panelgate/rt/log.hpp"
 
 namespace panelgate::bus {
+
+ClientId next_client_id() {
+    static std::atomic<ClientId> last{0};
+    return ++last;
+}
 
 void log_event(const Settings& settings, const arbiter::StationEvent& event) {
     const std::string station = name_of(settings.stations, event.station);
@@ -71,7 +77,7 @@ std::string hex_of(ByteView pdu) {
     return hex;
 }
 
-/// Shortens a request that had no effect: there may be many of these.
+/// Shortens a request that had no effect: the log may get many such requests.
 std::string shortened(const std::string& hex) {
     constexpr std::size_t kShown = 64;
     return hex.size() > kShown ? hex.substr(0, kShown) + "..." : hex;
@@ -380,7 +386,7 @@ OutcomeCounts RequestCounters::outcomes(std::uint8_t station) const {
 }
 
 std::vector<StationReport> RequestCounters::report(const arbiter::Arbiter& arbiter) const {
-    // One that has never been heard is not up, and nobody knows yet that it is down.
+    // A station that has never been heard is not up, and not yet known to be down.
     return report(arbiter.station_counters(), [&](std::uint8_t id) -> State {
         const arbiter::StationHealth& health = arbiter.health(id);
         const bool is_open = health.state() == Health::suspect && !health.last_heard();

@@ -153,7 +153,7 @@ class RequestCounters {
     OutcomeCounts outcomes(std::uint8_t station) const;
     /// Returns the reports, joined with the arbiter's counters.
     std::vector<StationReport> report(const arbiter::Arbiter& arbiter) const;
-    /// How a station is: its health, and its condition where something is asked.
+    /// A station's health, and its condition on a line where stations are asked.
     struct State {
         Health health = Health::unknown;
         std::optional<Condition> condition{};

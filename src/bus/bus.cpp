@@ -56,7 +56,7 @@ void Bus::State::on_up() {
 }
 
 void Bus::State::on_down(const std::string& why) {
-    take_down(*this, why, [this](TimePoint now) { arbiter.on_line_down(now); });
+    take_down(why, [this] { drive.hear([this](TimePoint now) { arbiter.on_line_down(now); }); });
 }
 
 void Bus::State::on_bytes(ByteView bytes) {
@@ -208,8 +208,8 @@ void Bus::State::answer(Pending entry, Answer result) {
 
 Bus::Bus(asio::any_io_executor executor, rt::Clock& clock, Settings settings,
          std::unique_ptr<line::Line> line)
-    : state_(std::make_unique<State>(std::move(executor), clock,
-                                     with_explanations(std::move(settings)), std::move(line))) {}
+    : state_(std::make_unique<State>(executor, clock, with_explanations(std::move(settings)),
+                                     std::move(line))) {}
 
 Bus::~Bus() { close(); }
 
@@ -218,7 +218,7 @@ void Bus::start() {
 }
 
 void Bus::stop() {
-    leave_line(*state_);
+    state_->leave();
     close();
 }
 
@@ -265,8 +265,6 @@ void Bus::count_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) {
     state_->account.add_refused(station, pdu, who, std::move(rule));
 }
 
-void Bus::count_denied(std::string_view rule) { ++state_->denials[std::string(rule)]; }
-
 /// Keeps a disconnecting client's use of the line in the list of clients.
 void Bus::State::record_departure(ClientId client) {
     const auto used = arbiter.shares().of(client);
@@ -283,21 +281,10 @@ void Bus::cancel(ClientId client) {
     state_->names.forget(client);
 }
 
-void Bus::name_client(ClientId client, std::string name) {
-    state_->names.set(client, std::move(name));
-}
-
 LineStatus Bus::status() const {
-    LineStatus status;
-    status.name = state_->settings.name;
-    status.device = state_->settings.device;
-    status.up = state_->up;
-    status.state = state_->up ? "up" : "down: " + state_->why_down;
+    LineStatus status = state_->LineRecords::status(state_->counts());
     status.queue_depth = state_->arbiter.queue_depth();
-    status.load_percent = state_->load.percent(state_->clock.now());
     status.echo = state_->arbiter.echo();
-    if (state_->up) state_->doctor.look_on_demand(state_->clock.now(), state_->counts());
-    status.findings = state_->doctor.findings();
     return status;
 }
 
@@ -334,21 +321,7 @@ std::optional<Refusal> Bus::write_refusal(std::uint8_t station) const {
     return refusal ? refusal : unrecordable(state_->settings, station);
 }
 
-TracePart Bus::trace(std::size_t last) const { return state_->book.store().part(last); }
-
-TracePart Bus::trace_since(std::uint64_t sequence, std::size_t most) const {
-    return state_->book.store().part_since(sequence, most);
-}
-
-std::vector<IncidentHead> Bus::incidents() const { return state_->book.incidents().heads(); }
-
-std::optional<Incident> Bus::incident(std::uint64_t id) {
-    return state_->book.incidents().fetch(id);
-}
-
-bool Bus::tells(const WhoRef& who, std::uint8_t station) const {
-    return may_tell(state_->settings, who, station);
-}
+LineRecords& Bus::records() const { return *state_; }
 
 TimePoint Bus::clear_at() const { return state_->arbiter.clear_at(state_->clock.now()); }
 
@@ -357,14 +330,9 @@ void Bus::rest_until(TimePoint until) { state_->arbiter.rest_until(until); }
 bool Bus::idle() const { return state_->arbiter.idle(); }
 
 LineReport Bus::report() const {
-    LineReport report;
-    report.line = state_->settings.name;
-    report.findings = state_->doctor.report();
-    report.up = state_->up;
+    LineReport report = state_->LineRecords::report();
     report.queue_depth = state_->arbiter.queue_depth();
     report.wire = state_->arbiter.counters();
-    report.device = state_->line->counters();
-    report.denials = denials_by_rule(state_->settings, state_->denials);
     report.stations = state_->account.counters().report(state_->arbiter);
     return report;
 }

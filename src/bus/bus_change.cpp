@@ -83,8 +83,8 @@ void Bus::State::change_line() {
     change.reset();
     call([&] {
         line->stop();
-        take_down(*this, "its settings have changed, and it is being opened",
-                  [this](TimePoint) { arbiter.on_line_left(); });
+        take_down("its settings have changed, and it is being opened",
+                  [this] { drive.hear([this](TimePoint) { arbiter.on_line_left(); }); });
         adopt(std::move(made.settings));
         line = std::move(made.line);
         drive.use(*line);

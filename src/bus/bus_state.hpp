@@ -9,23 +9,16 @@
 #include <utility>
 #include <vector>
 
-#include "accounts.hpp"
-#include "answers.hpp"
-#include "client_names.hpp"
-#include "explain.hpp"
-#include "health_events.hpp"
-#include "line_doctor.hpp"
+#include "line_records.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/base/pool.hpp"
 #include "panelgate/bus/bus.hpp"
-#include "panelgate/bus/line_history.hpp"
 #include "panelgate/line/line.hpp"
-#include "trace_book.hpp"
 
 namespace panelgate::bus {
 
 /// Also the host of the arbiter's drive.
-struct Bus::State final : public line::Line::Events {
+struct Bus::State final : public LineRecords, public line::Line::Events {
     struct Pending {
         AnswerHandler handler;
         std::uint8_t station = 0;
@@ -38,21 +31,13 @@ struct Bus::State final : public line::Line::Events {
         std::unique_ptr<Refusal> denial{};  ///< by settings that changed while it waited
     };
 
-    State(boost::asio::any_io_executor e, rt::Clock& c, Settings s, std::unique_ptr<line::Line> l)
-        : executor(std::move(e)),
-          clock(c),
-          settings(std::move(s)),
-          line(std::move(l)),
+    State(const boost::asio::any_io_executor& e, rt::Clock& c, Settings s,
+          std::unique_ptr<line::Line> l)
+        : LineRecords(e, c, std::move(s), std::move(l)),
+          executor(e),
           arbiter(settings.arbiter),
           rights(settings.stations, settings.access),
-          account(settings),
           departed(settings.clients),
-          doctor(settings),
-          health_events(settings),
-          load(c.now()),
-          refusals(executor, clock),
-          wall(clock),
-          book(settings, wall),
           answers(executor),
           drive(clock, *line, arbiter, *this) {}
 
@@ -124,22 +109,10 @@ struct Bus::State final : public line::Line::Events {
     }
 
     boost::asio::any_io_executor executor;
-    rt::Clock& clock;
-    Settings settings;
-    std::unique_ptr<line::Line> line;
     arbiter::Arbiter arbiter;
     Rights rights;
-    Account account;
-    std::map<std::string, std::uint64_t> denials;  ///< by the name of the rule
     ClientAccounts clients;
-    ClientNames names;
     DepartedClients departed;
-    LineDoctor doctor;
-    HealthEvents health_events;
-    LoadMeter load;
-    Refusals refusals;
-    Wall wall;
-    TraceBook book;
     Answers answers;
     line::Drive<arbiter::Arbiter, State> drive;
     PoolMap<arbiter::Ticket, Pending> pending;
@@ -152,10 +125,8 @@ struct Bus::State final : public line::Line::Events {
     };
     std::optional<Change> change;
     std::shared_ptr<bool> alive = std::make_shared<bool>(true);
-    int calls = 0;  ///< clients' calls in progress
-    bool up = false;
+    int calls = 0;               ///< clients' calls in progress
     std::uint64_t up_count = 0;  ///< how often the line came up
-    std::string why_down = "not opened yet";
 };
 
 }  // namespace panelgate::bus

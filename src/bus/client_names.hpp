@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "panelgate/arbiter/actions.hpp"
+#include "panelgate/arbiter/settings.hpp"
 #include "panelgate/bus/bus_client.hpp"
 
 namespace panelgate::bus {
@@ -38,5 +40,11 @@ class ClientNames {
   private:
     std::map<ClientId, ClientName> names_;
 };
+
+/// The arbiter's reasons and decisions in words, one line each; "" for a frame that has no reason.
+/// `client`: the name of who has asked.
+std::string text_of(const arbiter::Reason& reason, const ClientName& client);
+std::string text_of(const arbiter::Decision& decision, const ClientName& client,
+                    const arbiter::QueueSettings& queue);
 
 }  // namespace panelgate::bus

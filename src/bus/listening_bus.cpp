@@ -7,29 +7,21 @@
 #include <optional>
 #include <utility>
 
-#include "accounts.hpp"
-#include "answers.hpp"
-#include "health_events.hpp"
-#include "line_doctor.hpp"
+#include "line_records.hpp"
 #include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/words.hpp"
 #include "panelgate/bus/bus_client.hpp"
-#include "panelgate/bus/line_history.hpp"
 #include "panelgate/bus/rights.hpp"
 #include "panelgate/line/line.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tap/heard.hpp"
 #include "panelgate/tap/matcher.hpp"
-#include "trace_book.hpp"
 
 namespace panelgate::bus {
-
-/// Outcome of a request between another master and a station.
-Outcome outcome_of(const tap::Transaction& heard);
 
 /// Counters of the stations on a line with another master. Pure.
 class HeardStations {
@@ -66,21 +58,6 @@ class HeardStations {
     Wire wire_;
     arbiter::LineCounters line_;
 };
-
-Outcome outcome_of(const tap::Transaction& heard) {
-    switch (heard.end) {
-        case tap::End::answered:
-            return modbus::exception_of(heard.reply) ? Outcome::exception : Outcome::ok;
-        case tap::End::silent:
-            return Outcome::timeout;
-        case tap::End::damaged:
-        case tap::End::wrong:
-            return Outcome::damaged;
-        case tap::End::unasked:
-            return Outcome::ok;
-    }
-    std::abort();
-}
 
 HeardStations::HeardStations(const Stations& listed, int offline_after) {
     apply(listed, offline_after);
@@ -165,27 +142,14 @@ void HeardStations::count_failure(One& one, const tap::Transaction& heard) {
 
 void HeardStations::count(const tap::Frame& frame) {
     arbiter::StationCounters& wire = wire_of(frame.station);
-    switch (frame.kind) {
-        case FrameKind::damaged:
-            ++wire.damaged_frames;
-            break;
-        case FrameKind::late:
-            ++wire.late_frames;
-            break;
-        case FrameKind::copy:
-        case FrameKind::foreign:
-            ++wire.foreign_frames;
-            break;
-        case FrameKind::request:
-        case FrameKind::retry:
-        case FrameKind::probe:
-        case FrameKind::learn_echo:
-        case FrameKind::broadcast:
-        case FrameKind::reply:
-        case FrameKind::heard_request:
-        case FrameKind::echo:
-        case FrameKind::foreign_request:
-            return;
+    if (frame.kind == FrameKind::damaged) {
+        ++wire.damaged_frames;
+    } else if (frame.kind == FrameKind::late) {
+        ++wire.late_frames;
+    } else if (frame.kind == FrameKind::copy || frame.kind == FrameKind::foreign) {
+        ++wire.foreign_frames;
+    } else {
+        return;
     }
     wire.discarded_bytes += frame.bytes.size();
 }
@@ -229,6 +193,22 @@ std::string doubt_text(const tap::Transaction& made) {
            " may be a reply whose request was not heard: it is not counted";
 }
 
+/// Outcome of a request between another master and a station.
+Outcome outcome_of(const tap::Transaction& heard) {
+    switch (heard.end) {
+        case tap::End::answered:
+            return modbus::exception_of(heard.reply) ? Outcome::exception : Outcome::ok;
+        case tap::End::silent:
+            return Outcome::timeout;
+        case tap::End::damaged:
+        case tap::End::wrong:
+            return Outcome::damaged;
+        case tap::End::unasked:
+            return Outcome::ok;
+    }
+    std::abort();
+}
+
 TransactionEnd end_of(const tap::Transaction& made) {
     if (made.doubtful) return TransactionEnd::doubtful;
     switch (made.end) {
@@ -264,21 +244,12 @@ arbiter::Exchange exchange_of(const tap::Transaction& made) {
 }  // namespace
 
 /// Also the host of the matcher's drive.
-struct ListeningBus::State final : public line::Line::Events {
+struct ListeningBus::State final : public LineRecords, public line::Line::Events {
     State(const asio::any_io_executor& executor, rt::Clock& c, Settings s,
           std::unique_ptr<line::Line> l)
-        : clock(c),
-          settings(std::move(s)),
-          line(std::move(l)),
+        : LineRecords(executor, c, std::move(s), std::move(l)),
           matcher(tap_settings(settings.arbiter)),
           heard(settings.stations, settings.arbiter.offline.after),
-          account(settings),
-          doctor(settings),
-          health_events(settings),
-          load(c.now()),
-          refusals(executor, clock),
-          wall(clock),
-          book(settings, wall),
           drive(clock, *line, matcher, *this) {}
 
     void on_up() override;
@@ -301,23 +272,9 @@ struct ListeningBus::State final : public line::Line::Events {
     Refusal refusal(std::uint8_t station) const;
     LineCounts counts() const { return {heard.wire(), heard.line().broadcasts, *line}; }
 
-    rt::Clock& clock;
-    Settings settings;
-    std::unique_ptr<line::Line> line;
-    tap::Matcher matcher;
+    tap::Matcher matcher;  ///< assigns frames to requests
     HeardStations heard;
-    Account account;
-    std::map<std::string, std::uint64_t> denials{};  ///< by the name of the rule
-    ClientNames names;
-    mutable LineDoctor doctor;
-    HealthEvents health_events;
-    LoadMeter load;
-    Refusals refusals;
-    Wall wall;
-    TraceBook book;  ///< the matcher assigns frames to requests
     line::Drive<tap::Matcher, State> drive;
-    bool up = false;
-    std::string why_down = "not opened yet";
 };
 
 void ListeningBus::State::on_up() {
@@ -330,7 +287,7 @@ void ListeningBus::State::on_up() {
 }
 
 void ListeningBus::State::on_down(const std::string& why) {
-    take_down(*this, why, [this](TimePoint now) { matcher.on_line_down(now); });
+    take_down(why, [this] { drive.hear([this](TimePoint now) { matcher.on_line_down(now); }); });
 }
 
 void ListeningBus::State::act(tap::Frame& frame) {
@@ -380,7 +337,7 @@ ListeningBus::~ListeningBus() { close(); }
 void ListeningBus::start() { state_->line->start(*state_); }
 
 void ListeningBus::stop() {
-    leave_line(*state_);
+    state_->leave();
     close();
 }
 
@@ -420,24 +377,11 @@ void ListeningBus::count_refused(std::uint8_t station, ByteView pdu, const WhoRe
     state_->account.add_refused(station, pdu, who);
 }
 
-void ListeningBus::count_denied(std::string_view rule) { ++state_->denials[std::string(rule)]; }
-
 void ListeningBus::cancel(ClientId client) { state_->names.forget(client); }
 
-void ListeningBus::name_client(ClientId client, std::string name) {
-    state_->names.set(client, std::move(name));
-}
-
 LineStatus ListeningBus::status() const {
-    LineStatus status;
-    status.name = state_->settings.name;
-    status.device = state_->settings.device;
-    status.up = state_->up;
+    LineStatus status = state_->LineRecords::status(state_->counts());
     status.listens = true;
-    status.state = state_->up ? "up" : "down: " + state_->why_down;
-    status.load_percent = state_->load.percent(state_->clock.now());
-    if (state_->up) state_->doctor.look_on_demand(state_->clock.now(), state_->counts());
-    status.findings = state_->doctor.findings();
     return status;
 }
 
@@ -451,32 +395,11 @@ std::optional<Refusal> ListeningBus::write_refusal(std::uint8_t station) const {
     return state_->refusal(station);
 }
 
-TracePart ListeningBus::trace(std::size_t last) const { return state_->book.store().part(last); }
-
-TracePart ListeningBus::trace_since(std::uint64_t sequence, std::size_t most) const {
-    return state_->book.store().part_since(sequence, most);
-}
-
-std::vector<IncidentHead> ListeningBus::incidents() const {
-    return state_->book.incidents().heads();
-}
-
-std::optional<Incident> ListeningBus::incident(std::uint64_t id) {
-    return state_->book.incidents().fetch(id);
-}
-
-bool ListeningBus::tells(const WhoRef& who, std::uint8_t station) const {
-    return may_tell(state_->settings, who, station);
-}
+LineRecords& ListeningBus::records() const { return *state_; }
 
 LineReport ListeningBus::report() const {
-    LineReport report;
-    report.line = state_->settings.name;
-    report.findings = state_->doctor.report();
-    report.up = state_->up;
+    LineReport report = state_->LineRecords::report();
     report.wire = state_->heard.line();
-    report.device = state_->line->counters();
-    report.denials = denials_by_rule(state_->settings, state_->denials);
     report.stations = state_->account.counters().report(
         state_->heard.wire(), [this](std::uint8_t station) -> RequestCounters::State {
             return {station_status(station).state};

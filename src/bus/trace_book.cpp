@@ -1,5 +1,4 @@
 #include "trace_book.hpp"
-#include "explain.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -25,6 +24,34 @@ std::string reason_of(const RecordedFrame& request) {
 }
 
 }  // namespace
+
+/// Uninitialised: pages are touched only when written, and only written bytes are read.
+ByteRing::ByteRing(std::size_t size)
+    : size_(size), bytes_(std::make_unique_for_overwrite<std::uint8_t[]>(size)) {}
+
+std::uint64_t ByteRing::add(ByteView bytes) {
+    const std::uint64_t place = end_;
+    bytes = bytes.first(std::min(bytes.size(), size_));
+    while (!bytes.empty()) {
+        const auto at = static_cast<std::size_t>(end_ % size_);
+        const ByteView piece = bytes.first(std::min(bytes.size(), size_ - at));
+        std::ranges::copy(piece, bytes_.get() + at);
+        end_ += piece.size();
+        bytes = bytes.subspan(piece.size());
+    }
+    return place;
+}
+
+Bytes ByteRing::at(std::uint64_t place, std::size_t length) const {
+    Bytes bytes;
+    bytes.reserve(length);
+    while (bytes.size() < length) {
+        const auto at = static_cast<std::size_t>((place + bytes.size()) % size_);
+        const std::size_t piece = std::min(length - bytes.size(), size_ - at);
+        bytes.insert(bytes.end(), bytes_.get() + at, bytes_.get() + at + piece);
+    }
+    return bytes;
+}
 
 TraceStore::TraceStore(const TraceSettings& settings)
     : limits_(settings),
@@ -145,29 +172,12 @@ TraceTransaction TraceStore::decoded(const RecordedTransaction& one) const {
     return made;
 }
 
-template <class Decoded, class Recorded>
-std::vector<Decoded> TraceStore::decoded_all(const std::vector<Recorded>& recorded) const {
-    std::vector<Decoded> list;
+template <class Recorded>
+auto TraceStore::decoded(const std::vector<Recorded>& recorded) const {
+    std::vector<decltype(decoded(recorded.front()))> list;
     list.reserve(recorded.size());
     for (const Recorded& one : recorded) list.push_back(decoded(one));
     return list;
-}
-
-std::vector<TraceFrame> TraceStore::frames(std::size_t last) const {
-    return decoded_all<TraceFrame>(frames_.last(last));
-}
-
-std::vector<TraceFrame> TraceStore::frames_since(std::uint64_t sequence, std::size_t most) const {
-    return decoded_all<TraceFrame>(frames_.since(sequence, most));
-}
-
-std::vector<TraceDecision> TraceStore::decisions(std::size_t last) const {
-    return decoded_all<TraceDecision>(decisions_.last(last));
-}
-
-std::vector<TraceDecision> TraceStore::decisions_since(std::uint64_t sequence,
-                                                       std::size_t most) const {
-    return decoded_all<TraceDecision>(decisions_.since(sequence, most));
 }
 
 /// Only the newest may still be open.
@@ -177,27 +187,17 @@ std::size_t TraceStore::ended() const {
     return size - (open ? 1 : 0);
 }
 
-std::vector<TraceTransaction> TraceStore::transactions(std::size_t last) const {
-    const std::size_t open = transactions_.size() - ended();
-    auto some = transactions_.last(std::min(last, ended()) + open);
-    if (open > 0) some.pop_back();
-    return decoded_all<TraceTransaction>(some);
-}
-
-std::vector<TraceTransaction> TraceStore::transactions_since(std::uint64_t sequence,
-                                                             std::size_t most) const {
-    const std::size_t before = std::min(transactions_.index_after(sequence), ended());
-    return decoded_all<TraceTransaction>(
-        transactions_.since(sequence, std::min(most, ended() - before)));
-}
-
 TracePart TraceStore::part(std::size_t last) const {
-    return {frames(last), decisions(last), transactions(last)};
+    const std::size_t open = transactions_.size() - ended();
+    auto ended_last = transactions_.last(std::min(last, ended()) + open);
+    if (open > 0) ended_last.pop_back();
+    return {decoded(frames_.last(last)), decoded(decisions_.last(last)), decoded(ended_last)};
 }
 
 TracePart TraceStore::part_since(std::uint64_t sequence, std::size_t most) const {
-    return {frames_since(sequence, most), decisions_since(sequence, most),
-            transactions_since(sequence, most)};
+    const std::size_t before = std::min(transactions_.index_after(sequence), ended());
+    return {decoded(frames_.since(sequence, most)), decoded(decisions_.since(sequence, most)),
+            decoded(transactions_.since(sequence, std::min(most, ended() - before)))};
 }
 
 void IncidentBook::on_error(const ErrorEvent& error, const TraceStore& trace) {

@@ -96,25 +96,18 @@ class TraceStore {
     /// oldest; 0 if there is none.
     std::uint64_t first_of_last(std::size_t count) const;
 
-    // Oldest first: the last ones, or those after a sequence number.
-    std::vector<TraceFrame> frames(std::size_t last) const;
-    std::vector<TraceFrame> frames_since(std::uint64_t sequence, std::size_t most) const;
-    std::vector<TraceDecision> decisions(std::size_t last) const;
-    std::vector<TraceDecision> decisions_since(std::uint64_t sequence, std::size_t most) const;
-    /// Finished transactions only.
-    std::vector<TraceTransaction> transactions(std::size_t last) const;
-    std::vector<TraceTransaction> transactions_since(std::uint64_t sequence,
-                                                     std::size_t most) const;
-    // ... and all three kinds.
+    /// Returns the last frames, decisions and finished transactions, oldest first, at most `last`
+    /// of each.
     TracePart part(std::size_t last) const;
+    /// Returns the first that follow a sequence number, oldest first, at most `most` of each.
     TracePart part_since(std::uint64_t sequence, std::size_t most) const;
 
   private:
     TraceFrame decoded(const RecordedFrame& frame) const;
     TraceDecision decoded(const RecordedDecision& decision) const;
     TraceTransaction decoded(const RecordedTransaction& transaction) const;
-    template <class Decoded, class Recorded>
-    std::vector<Decoded> decoded_all(const std::vector<Recorded>& recorded) const;
+    template <class Recorded>
+    auto decoded(const std::vector<Recorded>& recorded) const;
     std::size_t ended() const;
     void drop_incomplete();
 

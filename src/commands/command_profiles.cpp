@@ -16,7 +16,7 @@
 #include "panelgate/explain/load.hpp"
 #include "panelgate/profile/describe.hpp"
 #include "panelgate/profile/load_profile.hpp"
-#include "panelgate/tcp_server/register_map_text.hpp"
+#include "panelgate/tcp_server/listener.hpp"
 #include "panelgate/yaml/document.hpp"
 
 namespace panelgate::commands {

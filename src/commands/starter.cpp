@@ -61,9 +61,7 @@ class ScanRun final : public line::Line::Events {
     void end(const std::string& why);
     void redraw();
     void tell();
-    std::string progress(std::size_t width) const {
-        return scan::format_progress(scanner_->progress(clock_.now()), width);
-    }
+    std::string progress(std::size_t width) const { return scanner_->progress().substr(0, width); }
 
     boost::asio::io_context& io_;
     const scan::Settings& settings_;
@@ -269,17 +267,6 @@ std::string quoted(const std::string& text) {
     return made + '"';
 }
 
-std::string serial_of(const scan::Result& result) {
-    const SerialFormat format = result.format.value_or(SerialFormat{});
-    const std::string mode = format.mode == SerialMode::ascii ? "mode: ascii, " : "";
-    const std::string supposed =
-        result.remote ? "    # What the far end is set to; supposed from the panels found.\n" : "";
-    return supposed + "    serial: {" + mode + "baud: " + std::to_string(format.baud) +
-           ", data_bits: " + std::to_string(format.data_bits) +
-           ", parity: " + to_string(format.parity) +
-           ", stop_bits: " + std::to_string(format.stop_bits) + "}\n";
-}
-
 /// A point name made from a notation: "at-gdt0" for GDT0.
 std::string name_of(std::string_view notation) {
     std::string name = "at-";
@@ -376,7 +363,7 @@ std::string starter_yaml(const Found& found) {
     if (!found.profiles_dir.empty()) text += "profiles_dir: " + quoted(found.profiles_dir) + '\n';
     text +=
         "lines:\n  - name: line1\n    device: " + quoted(found.device) + '\n' +
-        serial_of(found.result) +
+        scan::serial_yaml(found.result) +
         "    timing: {response_timeout: 500ms}   # a panel that is silent for longer has failed\n"
         "    stations:\n";
     for (const scan::StationFinding& finding : found.result.stations)

@@ -150,10 +150,10 @@ void add_plan(json::object& line, const Capacity& capacity) {
     json::array relays;
     for (const plan::RelayLoad& relay : plan.relays) relays.push_back(relay_json(relay));
     json::array advice;
-    for (const plan::Advice& one : capacity.advice)
-        advice.push_back(json::object{{"what", one.what},
-                                      {"load_percent", percent(one.load)},
-                                      {"most_percent", percent(one.most)}});
+    if (capacity.advice)
+        advice.push_back(json::object{{"what", capacity.advice->what},
+                                      {"load_percent", percent(capacity.advice->load)},
+                                      {"most_percent", percent(capacity.advice->most)}});
     line["load_percent"] = percent(plan.load);
     line["most_percent"] = percent(plan.most);
     line["verdict"] = word(plan::verdict(plan));
@@ -239,9 +239,8 @@ std::string plan_text(const Capacity& capacity) {
     if (plan.listens) return text + "  it only listens: nothing is ever sent there\n";
     if (plan.dead) text += text_of(*plan.dead);
     text += headroom_of(capacity);
-    const bool changing = plan::is_high_by_changes(plan);
-    for (const plan::Advice& advice : capacity.advice)
-        text += "  advice: " + text_of(advice, changing) + '\n';
+    if (capacity.advice)
+        text += "  advice: " + text_of(*capacity.advice, plan::is_high_by_changes(plan)) + '\n';
     return text;
 }
 
@@ -259,8 +258,7 @@ std::string overload_text(const Capacity& capacity) {
     } else {
         text += ": above " + percent_text(plan::kHigh) + " clients wait long";
     }
-    for (const plan::Advice& advice : capacity.advice) text += "; " + text_of(advice, changing);
-    return text;
+    return capacity.advice ? text + "; " + text_of(*capacity.advice, changing) : text;
 }
 
 }  // namespace panelgate::explain

@@ -7,7 +7,6 @@
 #include <functional>
 #include <initializer_list>
 #include <limits>
-#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -27,20 +26,15 @@ using config::Endpoint;
 
 namespace {
 
-struct Number {
-    std::int64_t value = 0;
-    bool plain = true;  ///< decimal and nothing after it: other programs read the same
-};
-
 /// Parses a number as mbusd does (strtoul() with base 0; cfg.c, cfg_handle_param()): 0x1F6, 010 for
 /// 8; text after the digits is ignored. Nothing without a digit (0 to mbusd), if negative or beyond
 /// 2^31 - 1.
-std::optional<Number> parse_number(const std::string& text) {
+std::optional<std::int64_t> parse_number(const std::string& text) {
     char* stop = nullptr;
     const long long value = std::strtoll(text.c_str(), &stop, 0);
     constexpr long long kMost = std::numeric_limits<std::int32_t>::max();
     if (stop == text.c_str() || text[0] == '-' || value > kMost) return std::nullopt;
-    return Number{value, std::to_string(value) == text.substr(text[0] == '+' ? 1 : 0)};
+    return value;
 }
 
 /// One NAME = VALUE of an mbusd.conf.
@@ -51,28 +45,26 @@ struct Line {
     yaml::Mark value_mark;  ///< or of the end of the line
 };
 
-/// Only a line that begins with '#' is a comment: text after a value belongs to the value. Lines
-/// end with LF, CR or both; a leading byte order mark is skipped. Invalid lines are added to
-/// `problems`.
+/// Only a line that begins with '#' is a comment: text after a value belongs to the value. A
+/// leading byte order mark is skipped. Invalid lines are added to `problems`.
 std::vector<Line> lines_of(std::string_view text, yaml::Problems& problems) {
     std::vector<Line> lines;
     text.remove_prefix(byte_order_mark(text));
     for (int number = 1; !text.empty(); ++number) {
-        const std::string_view whole = text.substr(0, text.find_first_of("\r\n"));
-        text.remove_prefix(whole.size());
-        text.remove_prefix(text.starts_with("\r\n") ? 2 : text.empty() ? 0 : 1);
+        std::string_view whole = text.substr(0, text.find('\n'));
+        text.remove_prefix(std::min(whole.size() + 1, text.size()));
+        if (whole.ends_with('\r')) whole.remove_suffix(1);
         const std::string_view typed = trimmed(whole);
         if (typed.empty() || typed[0] == '#') continue;
         const std::size_t sign = std::min(typed.find('='), typed.size());
         const std::string_view name = trimmed(typed.substr(0, sign));
         const std::string_view value = trimmed(typed.substr(std::min(sign + 1, typed.size())));
-        const auto mark = [&](std::string_view part) {
-            return yaml::Mark{number, static_cast<int>(part.data() - whole.data()) + 1};
+        const auto mark = [&](const char* at) {
+            return yaml::Mark{number, static_cast<int>(at - whole.data()) + 1};
         };
-        const yaml::Mark behind =
-            value.empty() ? yaml::Mark{number, static_cast<int>(whole.size()) + 1} : mark(value);
+        const yaml::Mark behind = mark(value.empty() ? typed.data() + typed.size() : value.data());
         if (sign == typed.size() || name.empty())
-            problems.add(mark(typed),
+            problems.add(mark(typed.data()),
                          "a line must be NAME = VALUE such as speed = 19200, or a comment that "
                          "begins with '#', not " +
                              yaml::quote(typed));
@@ -80,7 +72,7 @@ std::vector<Line> lines_of(std::string_view text, yaml::Problems& problems) {
             problems.add(behind,
                          std::string(name) + " must be plain text; it holds control characters");
         else
-            lines.push_back({std::string(name), std::string(value), mark(typed), behind});
+            lines.push_back({std::string(name), std::string(value), mark(typed.data()), behind});
     }
     return lines;
 }
@@ -133,7 +125,7 @@ class Reader {
             {"mode", [](Reader& in) { in.mode(); }},
             {"enable_rs485", [](Reader& in) { in.yes_or_no(in.kernel_); }},
             {"trx_control", [](Reader& in) { in.trx_control(); }},
-            {"trx_sysfile", [](Reader& in) { in.trx_sysfile(); }},
+            {"trx_sysfile", [](Reader&) {}},  // trx_control says what becomes of it
             {"address", [](Reader& in) { in.address(); }},
             {"port", [](Reader& in) { in.integer(in.mbusd_.port, 1, 65535); }},
             {"maxconn", [](Reader& in) { in.integer(in.mbusd_.connections, 1, 65535); }},
@@ -143,15 +135,18 @@ class Reader {
             {"wait", [](Reader& in) { in.integer(in.mbusd_.wait, 1, 120'000); }},
             {"replyonbroadcast", [](Reader& in) { in.yes_or_no(in.mbusd_.replies_to_broadcasts); }},
             {"loglevel", [](Reader& in) { in.loglevel(); }},
-            {"logfile", [](Reader& in) { in.note(kLogfile); }},
-            {"daemon", [](Reader& in) { in.flag_with_note(kDaemon); }},
-            {"enable_rmtaddr_in_log", [](Reader& in) { in.flag_with_note(kAddresses); }},
+            {"logfile",
+             [](Reader&
+                    in) { in.note("the log goes to standard error: under systemd to the journal"); }},
+            {"daemon", [](Reader& in) { in.note("deploy/ has a unit for systemd"); }},
+            {"enable_rmtaddr_in_log",
+             [](Reader&
+                    in) { in.note("the log and the status always name clients by their addresses"); }},
         });
         std::vector<std::string_view> names;
         for (const auto& [name, read] : kKeys) {
             names.push_back(name);
             if (name != line.name) continue;
-            note_overridden(line);
             if (line.value.empty() && name != "trx_sysfile" && name != "logfile")
                 wrong("has no value; leave the line out for the default");
             else
@@ -162,22 +157,12 @@ class Reader {
                                      yaml::did_you_mean(line.name, names, "settings"));
     }
 
-    /// Combines the settings, in whichever order they were.
-    void finish() {
-        if (rts_) mbusd_.rs485 = rts_text_;
-        if (!kernel_) return;
-        mbusd_.rs485 = "{mode: kernel}";
-        if (!rts_) return;
-        line_ = &*rts_;
-        note(
-            "with enable_rs485 the driver switches the transceiver, and only that is taken over; "
-            "where RTS has to, write rs485: " +
-            rts_text_);
+    /// Returns the settings. A driver that switches the transceiver wins over RTS.
+    const Settings& mbusd() {
+        if (kernel_) mbusd_.rs485 = "{mode: kernel}";
+        return mbusd_;
     }
-
-    const Settings& mbusd() const { return mbusd_; }
     const std::vector<std::string>& notes() const { return notes_; }
-    const std::vector<std::string>& comments() const { return comments_; }
 
   private:
     void wrong(const std::string& what) {
@@ -186,28 +171,17 @@ class Reader {
     void wrong_value(const std::string& wanted) {
         wrong("must be " + wanted + ", not " + yaml::quote(line_->value));
     }
-    /// mbusd uses the last of repeated settings.
-    void note_overridden(const Line& line) {
-        const auto [first, added] = seen_.emplace(line.name, line);
-        if (added) return;
-        line_ = &first->second;
-        note("line " + std::to_string(line.mark.line) + " sets it again, and that one counts");
-        line_ = &line;
-        first->second = line;
-    }
     /// Records what has no counterpart, and why.
     void note(const std::string& why) {
-        const std::string told = as_ascii(line_->name + " = " + line_->value) + ": " + why;
-        comments_.push_back(told);
-        notes_.push_back(problems_.file() + ':' + std::to_string(line_->mark.line) + ": " + told);
+        notes_.push_back(problems_.file() + ':' + std::to_string(line_->mark.line) + ": " +
+                         as_ascii(line_->name + " = " + line_->value) + ": " + why);
     }
     void integer(std::int64_t& value, std::int64_t min, std::int64_t max) {
         const auto number = parse_number(line_->value);
-        if (!number || number->value < min || number->value > max)
+        if (!number || *number < min || *number > max)
             return wrong_value("a whole number from " + std::to_string(min) + " to " +
                                std::to_string(max));
-        if (!number->plain) note("mbusd reads this as " + std::to_string(number->value));
-        value = number->value;
+        value = *number;
     }
     void yes_or_no(bool& yes) {
         static const std::set<std::string, std::less<>> kYes{"yes", "y", "true", "on", "1"};
@@ -215,12 +189,6 @@ class Reader {
         yes = kYes.contains(to_lower(line_->value));
         if (!yes && !kNo.contains(to_lower(line_->value))) wrong_value("yes or no");
     }
-    void flag_with_note(const std::string& why) {
-        bool ignored = false;
-        yes_or_no(ignored);
-        note(why);
-    }
-
     void device() {
         const std::string& path = mbusd_.device = line_->value;
         const bool is_tty = path.starts_with("/dev/tty");
@@ -243,25 +211,17 @@ class Reader {
         static const std::set<std::string, std::less<>> kWords{"addc",  "rts",     "rts_0",
                                                                "rts_1", "sysfs_0", "sysfs_1"};
         const std::string typed = to_lower(line_->value);
-        rts_.reset();
-        if (!kWords.contains(typed)) {
-            wrong_value("addc, rts_0, rts_1 (or rts), sysfs_0 or sysfs_1");
-        } else if (typed.starts_with("rts")) {
-            rts_ = *line_;
-            rts_text_ = std::string("{mode: rts, rts_on_send: ") +
-                        (typed == "rts_0" ? "low" : "high") + '}';
-        } else if (typed.starts_with("sysfs")) {
+        if (!kWords.contains(typed))
+            return wrong_value("addc, rts_0, rts_1 (or rts), sysfs_0 or sysfs_1");
+        mbusd_.rs485 = "{mode: off}";
+        if (typed.starts_with("rts"))
+            mbusd_.rs485 = std::string("{mode: rts, rts_on_send: ") +
+                           (typed == "rts_0" ? "low" : "high") + '}';
+        if (typed.starts_with("sysfs"))
             note(
                 "a GPIO that is switched through a file is late by what the machine is busy; the "
                 "driver does it to the bit: bind it to the UART (device tree: rts-gpios, "
                 "linux,rs485-enabled-at-boot-time) and write rs485: {mode: kernel}");
-        }
-    }
-    void trx_sysfile() {
-        if (!line_->value.empty())
-            note(
-                "see trx_control = sysfs_0 and sysfs_1: nothing is "
-                "switched through files");
     }
     void address() {
         if (endpoint_of(line_->value, 1))
@@ -297,21 +257,11 @@ class Reader {
         integer(level, 0, 9);
         mbusd_.level = kLevels[static_cast<std::size_t>(std::min<std::int64_t>(level, 3))];
     }
-    static constexpr const char* kLogfile =
-        "the log goes to standard error: under systemd to the journal";
-    static constexpr const char* kDaemon = "run it as a service: deploy/ has a unit for systemd";
-    static constexpr const char* kAddresses =
-        "the log and the status always name clients by their addresses";
-
     yaml::Problems& problems_;
     const Line* line_ = nullptr;
     Settings mbusd_;
     bool kernel_ = false;
-    std::optional<Line> rts_;  ///< the trx_control that selects RTS
-    std::string rts_text_;     ///< its equivalent here
-    std::map<std::string, Line> seen_;
     std::vector<std::string> notes_;
-    std::vector<std::string> comments_;
 };
 
 /// All attempts must fit; empty if the default is enough.
@@ -355,7 +305,7 @@ std::string filled(std::string_view form, std::initializer_list<std::string> val
     return text + std::string(form);
 }
 
-std::string yaml_of(const Settings& mbusd, const std::vector<std::string>& comments) {
+std::string yaml_of(const Settings& mbusd, const std::vector<std::string>& notes) {
     const char parity = to_lower(mbusd.mode)[1];
     const auto listen = endpoint_of(mbusd.address, mbusd.port);
     std::string text = filled(
@@ -368,8 +318,8 @@ std::string yaml_of(const Settings& mbusd, const std::vector<std::string>& comme
                 listen ? endpoint_text(listen->address, listen->port) : "",
                 mbusd.replies_to_broadcasts ? "reply" : "silent", std::to_string(mbusd.connections),
                 mbusd.port == 8080 ? "" : std::string(kHttp), mbusd.level});
-    if (!comments.empty()) text += "\n# Without a counterpart, or not as it was written:\n";
-    for (const std::string& comment : comments) text += "# " + comment + '\n';
+    if (!notes.empty()) text += "\n# Without a counterpart, or not as it was written:\n";
+    for (const std::string& note : notes) text += "# " + note.substr(note.find(": ") + 2) + '\n';
     return text;
 }
 
@@ -378,9 +328,8 @@ std::string yaml_of(const Settings& mbusd, const std::vector<std::string>& comme
 std::optional<Imported> import_conf(std::string_view text, yaml::Problems& problems) {
     Reader reader(problems);
     for (const Line& line : lines_of(text, problems)) reader.take(line);
-    reader.finish();
     if (!problems.empty()) return std::nullopt;
-    return Imported{yaml_of(reader.mbusd(), reader.comments()), reader.notes()};
+    return Imported{yaml_of(reader.mbusd(), reader.notes()), reader.notes()};
 }
 
 }  // namespace panelgate::mbusd

@@ -25,161 +25,115 @@
 
 namespace panelgate::mqtt {
 
-/// Connects without blocking the loop: name look-up and connect run in a detached thread, which is
-/// never joined, not even at program exit. One connection at a time.
-class Dialling {
-  public:
-    /// Receives the connection, and the error text ("" on success).
-    using Done = std::function<void(std::shared_ptr<Connection>, const std::string& failed)>;
-
-    explicit Dialling(boost::asio::any_io_executor executor);
-    ~Dialling();
-    Dialling(const Dialling&) = delete;
-    Dialling& operator=(const Dialling&) = delete;
-
-    /// Calls `done` once from the loop, unless cancelled or destroyed first. Not while under way.
-    void connect(std::shared_ptr<Connection> connection, Message will, Done done);
-    void cancel();
-    bool under_way() const;
-
-  private:
-    struct State;
-    std::shared_ptr<State> state_;  ///< shared with the thread
-};
-
 namespace asio = boost::asio;
 using asio::posix::stream_descriptor;
 using boost::system::error_code;
 
-struct GracefulClose::State : std::enable_shared_from_this<GracefulClose::State> {
-    State(asio::any_io_executor executor, int socket, rt::Clock& clock,
-          std::shared_ptr<Connection> c)
-        : descriptor(std::move(executor), socket),
-          connection(std::move(c)),
-          alarm(clock.make_alarm()) {}
+/// Sends what is queued, then keeps the socket until the broker has closed it. Closing a socket the
+/// broker still writes to would reset the connection and lose what the broker has not read yet,
+/// including the farewell.
+class Closing final : public GracefulClose, public std::enable_shared_from_this<Closing> {
+  public:
+    Closing(asio::any_io_executor executor, int socket, rt::Clock& clock,
+            std::shared_ptr<Connection> connection)
+        : descriptor_(std::move(executor), socket),
+          connection_(std::move(connection)),
+          alarm_(clock.make_alarm()) {}
 
-    void send();
-    void drain();
-    bool discard();
-    void end();
+    bool done() const override { return !descriptor_.is_open(); }
+    /// Ends at `until` at the latest.
+    void start(TimePoint until) {
+        alarm_->arm(until, [this] { end(); });
+        go_on();
+    }
 
-    stream_descriptor descriptor;
-    std::shared_ptr<Connection> connection;
-    std::unique_ptr<rt::Alarm> alarm;
-    bool done = false;
+  private:
+    void go_on() {
+        const bool sends = connection_->wants_write();
+        if (!sends) ::shutdown(descriptor_.native_handle(), SHUT_WR);
+        descriptor_.async_wait(sends ? stream_descriptor::wait_write : stream_descriptor::wait_read,
+                               [weak = weak_from_this(), sends](const error_code& error) {
+                                   const auto self = weak.lock();
+                                   if (!self || self->done()) return;
+                                   const bool goes_on =
+                                       sends ? self->connection_->write().empty() : self->discard();
+                                   !error&& goes_on ? self->go_on() : self->end();
+                               });
+    }
+    /// Discards input; false if the broker has closed or the connection failed.
+    bool discard() {
+        std::array<char, 4096> nobody_reads{};
+        while (true) {
+            const auto size = ::recv(descriptor_.native_handle(), nobody_reads.data(),
+                                     nobody_reads.size(), MSG_DONTWAIT);
+            if (size < 0) return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
+            if (size == 0) return false;
+        }
+    }
+    void end() {
+        alarm_->cancel();
+        error_code ignored;
+        descriptor_.close(ignored);
+        connection_.reset();
+    }
+
+    stream_descriptor descriptor_;
+    std::shared_ptr<Connection> connection_;
+    std::unique_ptr<rt::Alarm> alarm_;
 };
 
-void GracefulClose::State::send() {
-    if (connection->wants_write()) {
-        descriptor.async_wait(stream_descriptor::wait_write,
-                              [self = shared_from_this()](const error_code& error) {
-                                  if (self->done) return;
-                                  if (error || !self->connection->write().empty())
-                                      return self->end();
-                                  self->send();
-                              });
-        return;
+/// Connects without blocking the loop: name look-up and connect run in a detached thread, which is
+/// never joined, not even at program exit. One connection at a time. Shared with the thread.
+class Dialling : public std::enable_shared_from_this<Dialling> {
+  public:
+    /// Receives the connection, and the error text ("" on success).
+    using Done = std::function<void(std::shared_ptr<Connection>, const std::string& failed)>;
+
+    explicit Dialling(asio::any_io_executor executor) : loop_(std::move(executor)) {}
+
+    /// Calls `done` once from the loop, unless cancelled or left first. Not while under way.
+    void connect(std::shared_ptr<Connection> connection, Message will, Done done) {
+        done_ = std::move(done);
+        under_way_ = true;
+        try {
+            std::thread([self = shared_from_this(), made = connection,
+                         last = std::move(will)]() mutable {
+                sigset_t all;
+                sigfillset(&all);
+                ::pthread_sigmask(SIG_BLOCK, &all, nullptr);  // signals belong to the loop's thread
+                std::string failed = made->connect(last);
+                self->tell(std::move(made), std::move(failed));
+            }).detach();
+        } catch (const std::system_error& error) {
+            tell(std::move(connection), error.code().message());
+        }
     }
-    ::shutdown(descriptor.native_handle(), SHUT_WR);
-    drain();
-}
-
-void GracefulClose::State::drain() {
-    descriptor.async_wait(stream_descriptor::wait_read,
-                          [self = shared_from_this()](const error_code& error) {
-                              if (self->done) return;
-                              if (error || !self->discard()) return self->end();
-                              self->drain();
-                          });
-}
-
-/// Discards input; false if the broker has closed or the connection failed.
-bool GracefulClose::State::discard() {
-    std::array<char, 4096> nobody_reads{};
-    while (true) {
-        const auto size = ::recv(descriptor.native_handle(), nobody_reads.data(),
-                                 nobody_reads.size(), MSG_DONTWAIT);
-        if (size < 0) return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
-        if (size == 0) return false;
-        if (static_cast<std::size_t>(size) < nobody_reads.size()) return true;
+    void cancel() { done_ = nullptr; }
+    bool under_way() const { return under_way_; }
+    /// Nothing is called any more; the executor may end.
+    void leave() {
+        cancel();
+        const std::lock_guard lock(mutex_);
+        loop_.reset();
     }
-}
 
-void GracefulClose::State::end() {
-    if (std::exchange(done, true)) return;
-    alarm->cancel();
-    error_code ignored;
-    descriptor.close(ignored);
-    connection.reset();
-}
-
-GracefulClose::GracefulClose(asio::any_io_executor executor, int socket, rt::Clock& clock,
-                             std::shared_ptr<Connection> connection, Duration within)
-    : state_(std::make_shared<State>(std::move(executor), socket, clock, std::move(connection))) {
-    state_->alarm->arm(clock.now() + within, [state = state_.get()] { state->end(); });
-    state_->send();
-}
-
-GracefulClose::~GracefulClose() { state_->end(); }
-
-bool GracefulClose::done() const { return state_->done; }
-
-struct Dialling::State : std::enable_shared_from_this<Dialling::State> {
-    explicit State(asio::any_io_executor executor) : loop(std::move(executor)) {}
-
-    void dial(std::shared_ptr<Connection> connection, const Message& will);
-    void tell(std::shared_ptr<Connection> connection, const std::string& failed);
-
-    std::mutex mutex;                           ///< guards `loop`, all that the thread shares
-    std::optional<asio::any_io_executor> loop;  ///< nullopt: the owner is gone
-    Done done;
-    bool under_way = false;
-};
-
-/// Runs in the thread. The loop may have ended meanwhile; checked under the lock.
-void Dialling::State::dial(std::shared_ptr<Connection> connection, const Message& will) {
-    sigset_t all;
-    sigfillset(&all);
-    ::pthread_sigmask(SIG_BLOCK, &all, nullptr);  // signals belong to the loop's thread
-    std::string failed = connection->connect(will);
-    const std::lock_guard lock(mutex);
-    if (!loop) return;
-    asio::post(*loop, [self = shared_from_this(), made = std::move(connection),
-                       why = std::move(failed)]() mutable { self->tell(std::move(made), why); });
-}
-
-void Dialling::State::tell(std::shared_ptr<Connection> connection, const std::string& failed) {
-    under_way = false;
-    if (const Done asked = std::exchange(done, nullptr)) asked(std::move(connection), failed);
-}
-
-Dialling::Dialling(asio::any_io_executor executor)
-    : state_(std::make_shared<State>(std::move(executor))) {}
-
-Dialling::~Dialling() {
-    cancel();
-    const std::lock_guard lock(state_->mutex);
-    state_->loop.reset();
-}
-
-void Dialling::connect(std::shared_ptr<Connection> connection, Message will, Done done) {
-    state_->done = std::move(done);
-    state_->under_way = true;
-    try {
-        std::thread([state = state_, made = connection, last = std::move(will)]() mutable {
-            state->dial(std::move(made), last);
-        }).detach();
-    } catch (const std::system_error& error) {
-        asio::post(*state_->loop, [state = state_, made = std::move(connection),
-                                   why = std::string(error.code().message())]() mutable {
-            state->tell(std::move(made), why);
+  private:
+    /// From any thread.
+    void tell(std::shared_ptr<Connection> connection, std::string failed) {
+        const std::lock_guard lock(mutex_);
+        if (!loop_) return;
+        asio::post(*loop_, [self = shared_from_this(), made = std::move(connection),
+                            why = std::move(failed)]() mutable {
+            self->under_way_ = false;
+            if (const Done done = std::exchange(self->done_, nullptr)) done(std::move(made), why);
         });
     }
-}
 
-void Dialling::cancel() { state_->done = nullptr; }
-
-bool Dialling::under_way() const { return state_->under_way; }
+    std::mutex mutex_;
+    std::optional<asio::any_io_executor> loop_;
+    Done done_;
+    bool under_way_ = false;
+};
 
 namespace {
 constexpr Duration kLook = 1s;  // interval for libmosquitto's housekeeping
@@ -192,13 +146,15 @@ struct Client::State : std::enable_shared_from_this<Client::State> {
           settings(s),
           publisher(p),
           on_command(std::move(o)),
-          dialling(executor),
+          dialling(std::make_shared<Dialling>(executor)),
           pauses(s.first_pause, s.longest_pause),
           alarm(clock.make_alarm()) {}
+    ~State() { dialling->leave(); }
+    State(const State&) = delete;
+    State& operator=(const State&) = delete;
 
     void dial();
     void dialled(std::shared_ptr<Connection> made, const std::string& failed);
-    void attach();
     void await_readable();
     void await_writable();
     void read();
@@ -210,7 +166,6 @@ struct Client::State : std::enable_shared_from_this<Client::State> {
     void retry();
     void pump();
     void wake();
-    bool send(const Publisher::Outgoing& outgoing);
     /// Guards completions: false once their connection is gone.
     auto current() {
         return [self = shared_from_this(), now = attempt] {
@@ -223,7 +178,7 @@ struct Client::State : std::enable_shared_from_this<Client::State> {
     Settings settings;
     Publisher& publisher;
     OnCommand on_command;
-    Dialling dialling;
+    std::shared_ptr<Dialling> dialling;
     line::Reopen pauses;
     std::unique_ptr<rt::Alarm> alarm;  ///< next attempt, or next housekeeping
     std::shared_ptr<Connection> connection;
@@ -242,13 +197,13 @@ struct Client::State : std::enable_shared_from_this<Client::State> {
 };
 
 void Client::State::dial() {
-    if (dialling.under_way()) return retry();
+    if (dialling->under_way()) return retry();
     ++attempt;
-    dialling.connect(std::make_shared<Connection>(settings, settings.client_id), publisher.will(),
-                     [this, is_current = current()](std::shared_ptr<Connection> made,
-                                                    const std::string& failed) {
-                         if (is_current()) dialled(std::move(made), failed);
-                     });
+    dialling->connect(std::make_shared<Connection>(settings, settings.client_id), publisher.will(),
+                      [this, is_current = current()](std::shared_ptr<Connection> made,
+                                                     const std::string& failed) {
+                          if (is_current()) dialled(std::move(made), failed);
+                      });
 }
 
 void Client::State::dialled(std::shared_ptr<Connection> made, const std::string& failed) {
@@ -258,10 +213,6 @@ void Client::State::dialled(std::shared_ptr<Connection> made, const std::string&
     if (own < 0) return lost(std::strerror(errno));
     descriptor.emplace(executor, own);
     connack_due = clock.now() + settings.connack_timeout;
-    attach();
-}
-
-void Client::State::attach() {
     await_readable();
     await_writable();
     housekeep();
@@ -375,18 +326,13 @@ void Client::State::pump() {
         }
         const auto outgoing = publisher.next(rt::wall_now());
         if (!outgoing) break;
-        if (!send(*outgoing)) return lost("the connection takes nothing");
+        const int id = connection->publish(outgoing->message);
+        if (id == 0) return lost("the connection takes nothing");
+        ++published;
+        open.sent(id, outgoing->message.qos > 0, outgoing->change);
     }
     if (open.wants_barrier()) open.barrier(connection->barrier());
     await_writable();
-}
-
-bool Client::State::send(const Publisher::Outgoing& outgoing) {
-    const int id = connection->publish(outgoing.message);
-    if (id == 0) return false;
-    ++published;
-    open.sent(id, outgoing.message.qos > 0, outgoing.change);
-    return true;
 }
 
 Client::Client(asio::any_io_executor executor, rt::Clock& clock, const Settings& settings,
@@ -401,17 +347,17 @@ void Client::start() {
     state_->dial();
 }
 
-std::unique_ptr<GracefulClose> Client::stop() {
+std::shared_ptr<GracefulClose> Client::stop() {
     if (!std::exchange(state_->running, false)) return nullptr;
     state_->alarm->cancel();
-    state_->dialling.cancel();
-    std::unique_ptr<GracefulClose> leaving;
+    state_->dialling->cancel();
+    std::shared_ptr<Closing> leaving;
     if (std::exchange(state_->connected, false) && state_->connection) {
         state_->connection->publish(state_->publisher.farewell(rt::wall_now()));
         state_->connection->disconnect();
-        leaving = std::make_unique<GracefulClose>(state_->executor, state_->descriptor->release(),
-                                                  state_->clock, std::move(state_->connection),
-                                                  state_->settings.disconnect_timeout);
+        leaving = std::make_shared<Closing>(state_->executor, state_->descriptor->release(),
+                                            state_->clock, std::move(state_->connection));
+        leaving->start(state_->clock.now() + state_->settings.disconnect_timeout);
     }
     state_->descriptor.reset();
     state_->connection.reset();

@@ -43,7 +43,7 @@ constexpr const char* kNothing = "panelgate/barrier";
 
 }  // namespace
 
-/// libmosquitto's callbacks, with its parameter order; they do not call back into it.
+/// libmosquitto's callbacks, with libmosquitto's parameter order. No callback calls libmosquitto.
 struct Connection::Callbacks {
     static Connection& of(void* owner) { return *static_cast<Connection*>(owner); }
 

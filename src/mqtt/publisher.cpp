@@ -11,7 +11,8 @@ namespace panelgate::mqtt {
 
 namespace {
 
-// Numbers outside the range of changes
+// Numbers of the three queues
+constexpr std::uint64_t kFirstChange = 1;  // 0: not a change
 constexpr std::uint64_t kFirstCleared = std::uint64_t{1} << 63;
 constexpr std::uint64_t kFirstResult = std::uint64_t{1} << 62;
 
@@ -29,7 +30,7 @@ Publisher::Publisher(const Settings& settings, Subjects subjects)
       subjects_(std::make_unique<const Subjects>(std::move(subjects))),
       format_(make_message_format(settings_, *subjects_)),
       states_(subjects_->size()),
-      store_(settings.store),
+      store_(kFirstChange, settings.store),
       results_(kFirstResult),
       cleared_(kFirstCleared) {}
 
@@ -41,10 +42,10 @@ void Publisher::take_over(const Publisher& before) {
         here[i] = subjects_->find_same(*before.subjects_, i);
         if (here[i]) states_[*here[i]] = before.states_[i];
     }
-    for (const Change& change : before.store_.changes())
-        if (here[change.subject]) store_.add(*here[change.subject], change.state);
+    for (const auto& [number, waits] : before.store_.entries())
+        if (here[waits.subject]) change(*here[waits.subject], waits.state);
     if (settings_.broker() != before.settings_.broker()) return;
-    for (const auto& [number, message] : before.results_.messages()) results_.add(message);
+    for (const auto& [number, message] : before.results_.entries()) results_.add(message);
     clear_stale_topics(before);
 }
 
@@ -53,7 +54,7 @@ void Publisher::clear_stale_topics(const Publisher& before) {
     const std::vector<std::string> told = before.format_->retained();
     std::set<std::string> went(told.begin(), told.end());
     const std::size_t most = went.size() + settings_.store;
-    for (const auto& [number, message] : before.cleared_.messages())
+    for (const auto& [number, message] : before.cleared_.entries())
         if (went.size() < most) went.insert(message.topic);
     for (const std::string& topic : format_->retained()) went.erase(topic);
     for (const std::string& topic : went) cleared_.add({topic, "", 1, true});
@@ -67,12 +68,16 @@ bool Publisher::offer(std::size_t subject, State state) {
     std::optional<State>& known = states_[subject];
     if (known && known->same_as(state)) return false;
     known = state;
-    store_.add(subject, std::move(state));
+    change(subject, std::move(state));
     return true;
 }
 
+void Publisher::change(std::size_t subject, State state) {
+    store_.add({store_.next_number(), subject, std::move(state)});
+}
+
 void Publisher::repeat(std::size_t subject) {
-    if (states_[subject]) store_.add(subject, *states_[subject]);
+    if (states_[subject]) change(subject, *states_[subject]);
 }
 
 void Publisher::answer(const WriteResult& result, bool refused) {
@@ -134,18 +139,14 @@ std::optional<Message> Publisher::next_behind() {
 std::optional<Publisher::Outgoing> Publisher::next(WallTime now) {
     if (!connected_) return std::nullopt;
     if (auto message = next_before(now)) return Outgoing{std::move(*message)};
-    if (auto cleared = cleared_.next()) return Outgoing{std::move(cleared->second), cleared->first};
-    while (const Change* change = store_.next()) {
-        auto message = format_->change(*change, states_, store_.next_number(), now);
-        if (!message) {
-            store_.skip();
-            continue;
-        }
-        const std::uint64_t number = change->number;
-        store_.sent();
-        return Outgoing{std::move(*message), number};
+    if (const auto* cleared = cleared_.next()) return Outgoing{cleared->second, cleared->first};
+    while (const auto* waits = store_.next()) {
+        const std::uint64_t number = waits->first;
+        auto message = format_->change(waits->second, states_, store_.next_number(), now);
+        if (message) return Outgoing{std::move(*message), number};
+        store_.delivered(number);  // a birth covers it
     }
-    if (auto result = results_.next()) return Outgoing{std::move(result->second), result->first};
+    if (const auto* result = results_.next()) return Outgoing{result->second, result->first};
     if (auto message = next_behind()) return Outgoing{std::move(*message)};
     return std::nullopt;
 }

@@ -1,7 +1,8 @@
 #include "sparkplug.hpp"
 
 #include <algorithm>
-#include <cstdlib>
+#include <array>
+#include <iterator>
 #include <utility>
 
 namespace panelgate::mqtt {
@@ -10,36 +11,17 @@ namespace {
 constexpr std::string_view kRebirth = "Node Control/Rebirth";
 constexpr std::uint64_t kDeaths = 256;  // bdSeq is 0..255 (Sparkplug 3.0, 5.4)
 
+/// By points::Type.
+constexpr std::array<DataType, std::size(points::kTypes)> kTypes{
+    DataType::boolean, DataType::uint16, DataType::int16,  DataType::uint32,
+    DataType::int32,   DataType::uint64, DataType::int64,  DataType::float32,
+    DataType::float64, DataType::uint16, DataType::uint32, DataType::string};
+
 DataType type_of(const Subject& subject) {
     if (subject.kind == Subject::Kind::line) return DataType::boolean;
-    if (subject.scaled && subject.type != points::Type::boolean &&
-        subject.type != points::Type::string)
-        return DataType::float64;
-    switch (subject.type) {
-        case points::Type::boolean:
-            return DataType::boolean;
-        case points::Type::u16:
-        case points::Type::bcd16:
-            return DataType::uint16;
-        case points::Type::i16:
-            return DataType::int16;
-        case points::Type::u32:
-        case points::Type::bcd32:
-            return DataType::uint32;
-        case points::Type::i32:
-            return DataType::int32;
-        case points::Type::u64:
-            return DataType::uint64;
-        case points::Type::i64:
-            return DataType::int64;
-        case points::Type::f32:
-            return DataType::float32;
-        case points::Type::f64:
-            return DataType::float64;
-        case points::Type::string:
-            return DataType::string;
-    }
-    std::abort();
+    const DataType plain = kTypes.at(static_cast<std::size_t>(subject.type));
+    const bool is_number = plain != DataType::boolean && plain != DataType::string;
+    return subject.scaled && is_number ? DataType::float64 : plain;
 }
 
 bool is_alive(const std::optional<State>& station) {

@@ -131,15 +131,8 @@ std::uint64_t milliseconds(WallTime time) {
 
 /// The codes of the property Quality (Sparkplug 3.0, 6.4.10).
 std::uint32_t code_of(points::Quality quality) {
-    switch (quality) {
-        case points::Quality::good:
-            return 192;
-        case points::Quality::stale:
-            return 500;
-        case points::Quality::bad:
-            return 0;
-    }
-    std::abort();
+    if (quality == points::Quality::good) return 192;
+    return quality == points::Quality::stale ? 500 : 0;
 }
 
 /// Converts to an integer in two's complement.

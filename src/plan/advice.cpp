@@ -1,31 +1,21 @@
-#include "panelgate/plan/advice.hpp"
-
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "panelgate/base/text.hpp"
-#include "panelgate/modbus/function.hpp"
 #include "panelgate/plan/line_plan.hpp"
-#include "panelgate/points/settings.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::plan {
-
-/// A possible change, and the changed line.
-struct Change {
-    std::string what;
-    Line line;
-};
-
 namespace {
 
-constexpr std::array kRates{2400, 4800, 9600, 19200, 38400, 57600, 115200};
+using yaml::format_duration;
+using yaml::format_milliseconds;
+
+constexpr double kMostTimes = 1000;  // as long: more is no advice
 
 bool all_have(const Line& line, int baud) {
     return std::ranges::all_of(line.stations, [&](const Station& station) {
@@ -33,137 +23,60 @@ bool all_have(const Line& line, int baud) {
     });
 }
 
-/// The lowest higher rate that is enough, else the highest that all panels support.
-std::optional<Change> higher_baud(const Line& line) {
-    std::optional<Change> found;
-    for (const int baud : kRates) {
+Advice made_of(std::string what, const LinePlan& then) {
+    return {std::move(what), then.load, then.most};
+}
+
+std::optional<Advice> higher_baud(const Line& line) {
+    for (const int baud : {2400, 4800, 9600, 19200, 38400, 57600, 115200}) {
         if (baud <= line.serial.baud || !all_have(line, baud)) continue;
-        found = Change{"serial: {baud: " + std::to_string(baud) + "} (of all panels, too)",
-                       at_rate(line, baud)};
-        if (verdict(make_plan(found->line)) == Verdict::fine) break;
+        Line quicker = line;
+        quicker.serial.baud = baud;
+        const LinePlan then = make_plan(quicker);
+        if (verdict(then) == Verdict::fine)
+            return made_of("serial: {baud: " + std::to_string(baud) + "} (of all panels, too)",
+                           then);
     }
-    return found;
+    return std::nullopt;
 }
 
-using yaml::format_duration;
-
-constexpr int kMaxTenths = 10'000;  // factor for all intervals, in tenths
-
-bool is_enough(const Line& line) { return verdict(make_plan(line)) == Verdict::fine; }
-
-/// Returns the least sufficient factor, in tenths and at least `first`; 0: none.
-int least_tenths(const Line& line, int first) {
-    const auto enough = [&](int tenths) { return is_enough(at_intervals(line, tenths / 10.0)); };
-    int low = first - 1;
-    int high = first;
-    while (!enough(high)) {
-        if (high >= kMaxTenths) return 0;
-        low = high;
-        high = std::min(2 * high, kMaxTenths);
-    }
-    while (high - low > 1) {
-        const int middle = (low + high) / 2;
-        (enough(middle) ? high : low) = middle;
-    }
-    return high;
+std::optional<Advice> longer_intervals(const Line& line, const LinePlan& plan) {
+    const auto highest = highest_rate(line, plan);
+    if (!highest || highest->times * kMostTimes < 1) return std::nullopt;
+    const double times = std::ceil(10 / highest->times) / 10;
+    const LinePlan then = make_plan(at_intervals(line, times));
+    if (verdict(then) != Verdict::fine) return std::nullopt;  // 24 h are not long enough
+    const bool refreshes = std::ranges::any_of(
+        line.relays, [](const Relay& relay) { return relay.to && relay.refresh; });
+    return made_of("all intervals " + number_text(times) + " times as long" +
+                       (refreshes ? " (refresh as it is)" : ""),
+                   then);
 }
-
-bool reaches_slowest(const Line& line) {
-    const auto is_slowest = [](Duration every) { return every >= points::kSlowest; };
-    return std::ranges::any_of(line.relays, is_slowest, &Relay::every) ||
-           std::ranges::any_of(line.stations, [&](const Station& station) {
-               return std::ranges::any_of(station.asked, [&](const PolledItem& asked) {
-                   return is_slowest(asked.want.every);
-               });
-           });
-}
-
-/// Returns what "all intervals" does not include or cannot reach, as text.
-std::string remarks_of(const Line& line) {
-    std::string text;
-    if (reaches_slowest(line)) text = "24h at most";
-    const auto has_refresh = [](const Relay& relay) { return relay.to && relay.refresh; };
-    if (std::ranges::any_of(line.relays, has_refresh))
-        text += std::string(text.empty() ? "" : ", ") + "refresh as it is";
-    return text.empty() ? text : " (" + text + ')';
-}
-
-/// One factor on all intervals; a relay's refresh stays.
-std::optional<Change> slow_all_intervals(const Line& line, const LinePlan& plan) {
-    const double least = std::max(plan.load / kHigh, plan.most / kFull);  // no load shrinks faster
-    if (least * 10 > kMaxTenths) return std::nullopt;
-    const int tenths = least_tenths(line, std::max(11, static_cast<int>(std::ceil(least * 10))));
-    if (tenths == 0) return std::nullopt;
-    Line made = at_intervals(line, tenths / 10.0);
-    const std::string remarks = remarks_of(made);
-    return Change{"all intervals " + number_text(tenths / 10.0) + " times as long" + remarks,
-                  std::move(made)};
-}
-
-}  // namespace
-
-std::vector<Advice> advise(const Line& line, const LinePlan& plan) {
-    std::vector<Advice> all;
-    if (verdict(plan) == Verdict::fine) return all;
-    const bool changing = is_high_by_changes(plan);
-    const auto judged = [&](const auto& one) { return changing ? one.most : one.load; };
-    for (const std::optional<Change>& change :
-         {higher_baud(line), slow_all_intervals(line, plan)}) {
-        if (!change) continue;
-        const LinePlan then = make_plan(change->line);
-        if (judged(plan) - judged(then) >= kMinGain)
-            all.push_back({change->what, then.load, then.most});
-    }
-    std::ranges::sort(all, {}, [&](const Advice& one) { return std::pair(judged(one), one.what); });
-    return all;
-}
-
-namespace {
-
-using yaml::format_milliseconds;
-
-constexpr std::size_t kMaxNamed = 3;  // stations named per warning
 
 bool is_asked(const LinePlan& plan, const Station& station) {
     const auto is_its = [&](const auto& request) { return request.station == station.name; };
     return std::ranges::any_of(plan.polls, is_its) || std::ranges::any_of(plan.relays, is_its);
 }
 
-/// Time from the end of a request to the start of its reply: the panel detects the end by silence.
-Duration answers_after(const Line& line, const Station& station) {
-    return silent_interval(line.serial) + station.think_time;
-}
-
-bool is_too_late(const Line& line, const Station& station) {
-    return answers_after(line, station) > station.response_timeout;
-}
-
-std::string named(const std::vector<std::string>& names) {
-    std::string all;
-    for (std::size_t i = 0; i < std::min(names.size(), kMaxNamed); ++i)
-        all += (i == 0 ? "'" : ", '") + names[i] + '\'';
-    if (names.size() > kMaxNamed)
-        all += " and " + std::to_string(names.size() - kMaxNamed) + " more";
-    return all;
-}
-
-/// One warning for all stations with the same times.
+/// Names the first of the stations whose replies are planned to begin too late.
 void warn_of_timeouts(const Line& line, const LinePlan& plan, std::vector<std::string>& messages) {
-    std::map<std::pair<Duration, Duration>, std::vector<std::string>> alike;
+    std::vector<const Station*> late;
+    const Duration silence = silent_interval(line.serial);  // by it the panel knows the end
     for (const Station& station : line.stations) {
-        if (is_asked(plan, station) && is_too_late(line, station))
-            alike[{station.think_time, station.response_timeout}].push_back(station.name);
+        if (is_asked(plan, station) && silence + station.think_time > station.response_timeout)
+            late.push_back(&station);
     }
-    for (const auto& [times, names] : alike) {
-        const auto& [think, timeout] = times;
-        const Duration after = silent_interval(line.serial) + think;
-        messages.push_back(
-            "line " + line.name + ": think_time " + yaml::format_duration(think) + " of " +
-            named(names) + " makes replies begin " + format_milliseconds(after) +
-            " after a request, above the response_timeout of " + yaml::format_duration(timeout) +
-            ": each poll and relay there would time out; set response_timeout above " +
-            format_milliseconds(after) + ", or think_time lower where the panel is quicker");
-    }
+    if (late.empty()) return;
+    const Station& first = *late.front();
+    const std::string after = format_milliseconds(silence + first.think_time);
+    const std::string more =
+        late.size() > 1 ? " (and of " + std::to_string(late.size() - 1) + " more)" : "";
+    messages.push_back("line " + line.name + ": think_time " + format_duration(first.think_time) +
+                       " of '" + first.name + '\'' + more + " makes replies begin " + after +
+                       " after a request, above the response_timeout of " +
+                       format_duration(first.response_timeout) +
+                       ": each poll and relay there would time out; set response_timeout above " +
+                       after + ", or think_time lower where the panel is quicker");
 }
 
 /// Returns which part of each second the station is asked or rests; more than 1 cannot be.
@@ -187,72 +100,59 @@ void warn_of_rests(const Line& line, const LinePlan& plan, std::vector<std::stri
         if (station.station_gap + station.after_write == Duration::zero()) continue;
         const double share = share_with_rests(plan, station);
         if (share <= 1) continue;
-        const double times = std::ceil(share * 10) / 10;
         messages.push_back("line " + line.name + ": with its station_gap and after_write '" +
                            station.name + "' is busy for longer than its polls and relays allow; " +
-                           "ask it " + number_text(times) +
+                           "ask it " + number_text(std::ceil(share * 10) / 10) +
                            " times as seldom, or for more items at once");
     }
 }
 
-/// A periodic request whose items could be fewer.
-struct Transaction {
-    std::string what;
-    Duration wire{};
-    const Poll* poll = nullptr;  ///< null: of a relay
-};
+/// A periodic request, and its time on the wire.
+using Transaction = std::pair<Duration, std::string>;
 
-std::vector<Transaction> longest_two(const LinePlan& plan) {
+std::vector<Transaction> longest_first(const LinePlan& plan) {
     std::vector<Transaction> all;
-    for (const Poll& poll : plan.polls) {
-        all.push_back({"the poll of " + poll.station + ' ' + poll.read + " (count " +
-                           std::to_string(poll.count) + ')',
-                       poll.wire, &poll});
-    }
+    for (const Poll& poll : plan.polls)
+        all.emplace_back(poll.wire, "the poll of " + poll.station + ' ' + poll.read + " (count " +
+                                        std::to_string(poll.count) + ')');
     for (const RelayLoad& relay : plan.relays) {
         if (relay.request == RelayLoad::Request::reread) continue;  // already among the polls
-        all.push_back({"the " + std::string(label(relay.request)) + " of relay " + relay.relay,
-                       relay.wire, nullptr});
+        all.emplace_back(relay.wire,
+                         "the " + std::string(label(relay.request)) + " of relay " + relay.relay);
     }
-    std::ranges::sort(all, std::ranges::greater(),
-                      [](const Transaction& one) { return std::pair(one.wire, one.what); });
-    all.resize(std::min<std::size_t>(all.size(), 2));
+    std::ranges::sort(all, std::ranges::greater());
     return all;
 }
 
-/// Returns the items of a block whose read takes at most `within`; 0 if not a single block, or none
-/// fits.
-std::uint32_t most_items(const Line& line, const Poll& poll, Duration within) {
-    const auto station = std::ranges::find(line.stations, poll.station, &Station::name);
-    if (poll.asked.size() != 1) return 0;
-    const points::PlanLimits limits = limits_of(line, *station);
-    const modbus::Table table = station->asked[poll.asked.front()].want.span.table;
-    std::uint32_t most = poll.count;
-    while (most > 0 && points::read_cost(limits, table, most) > within) --most;
-    return most;
+/// Rounds up to a round number of milliseconds with at most two significant digits.
+Duration rounded_up(Duration duration) {
+    Duration unit = 1ms;
+    while (duration > 20 * unit) unit *= 10;
+    return (duration + unit - Duration(1)) / unit * unit;
 }
 
 void warn_of_deadline(const Line& line, const LinePlan& plan, std::vector<std::string>& messages) {
-    const std::vector<Transaction> longest = longest_two(plan);
+    const std::vector<Transaction> longest = longest_first(plan);
     if (longest.empty()) return;
-    const Duration before = longest.size() > 1 ? longest[1].wire : Duration::zero();
-    const Duration both = longest[0].wire + before;
+    const bool two = longest.size() > 1;
+    const Duration both = longest[0].first + (two ? longest[1].first : Duration::zero());
     if (both <= line.deadline) return;
-    std::string warning = "line " + line.name + ": " + longest[0].what + " takes " +
-                          format_milliseconds(longest[0].wire) + " at " + to_string(line.serial);
-    if (longest.size() > 1)
-        warning += ", and " + longest[1].what + ' ' + format_milliseconds(before);
-    warning += longest.size() > 1 ? ": one after the other they miss" : ": it misses";
-    warning += " the queue's deadline of " + yaml::format_duration(line.deadline) +
-               "; set queue: {deadline: " + yaml::format_duration(rounded_up(both)) + '}';
-    const Poll* poll = longest[0].poll;
-    const std::uint32_t most =
-        poll == nullptr ? 0 : most_items(line, *poll, line.deadline - before);
-    if (most > 0) warning += ", or read at most " + std::to_string(most) + " at once";
-    messages.push_back(std::move(warning));
+    std::string text = "line " + line.name + ": " + longest[0].second + " takes " +
+                       format_milliseconds(longest[0].first) + " at " + to_string(line.serial);
+    if (two) text += ", and " + longest[1].second + ' ' + format_milliseconds(longest[1].first);
+    messages.push_back(text + (two ? ": one after the other they miss" : ": it misses") +
+                       " the queue's deadline of " + format_duration(line.deadline) +
+                       "; set queue: {deadline: " + format_duration(rounded_up(both)) +
+                       "}, or read less at once");
 }
 
 }  // namespace
+
+std::optional<Advice> advise(const Line& line, const LinePlan& plan) {
+    if (verdict(plan) == Verdict::fine) return std::nullopt;
+    auto helps = higher_baud(line);
+    return helps ? helps : longer_intervals(line, plan);
+}
 
 std::vector<std::string> warnings(const Line& line, const LinePlan& plan) {
     std::vector<std::string> messages;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
@@ -21,47 +20,18 @@ Duration times_as_long(Duration every, double times) {
     return Duration(static_cast<Duration::rep>(std::clamp(made, 1.0, most)));
 }
 
-bool follows(const Relay::End& end, const Relay::End& next) {
-    return end.station == next.station && end.span.table == next.span.table &&
-           end.span.end() == next.span.first;
-}
-
-}  // namespace
-
-bool Relay::continues_in(const Relay& other) const {
-    if (!from || !to || !other.from || !other.to) return false;
-    return every == other.every && refresh == other.refresh && !single &&
-           follows(*from, *other.from) && follows(*to, *other.to);
-}
-
+/// Returns the silence after the station's replies.
 Duration gap_of(const Line& line, const Station& station) {
     return station.frame_gap.value_or(profile::automatic_gap(line.serial, *station.profile));
 }
 
+/// Returns the limits and costs of the station's reads on this line.
 points::PlanLimits limits_of(const Line& line, const Station& station) {
     points::PlanLimits limits =
         points::make_plan_limits(*station.profile, line.serial, gap_of(line, station));
     limits.think_time = station.think_time;
     return limits;
 }
-
-Line at_rate(const Line& line, int baud) {
-    Line made = line;
-    made.serial.baud = baud;
-    return made;
-}
-
-Line at_intervals(const Line& line, double times) {
-    Line made = line;
-    for (Station& station : made.stations) {
-        for (PolledItem& asked : station.asked)
-            asked.want.every = times_as_long(asked.want.every, times);
-    }
-    for (Relay& relay : made.relays) relay.every = times_as_long(relay.every, times);
-    return made;
-}
-
-namespace {
 
 double share(Duration wire, Duration every) { return to_seconds(wire) / to_seconds(every); }
 
@@ -95,54 +65,53 @@ void add_polls(const Station& station, const Planned& planned, std::vector<Poll>
         poll.station = station.name;
         poll.read = notation_of(station, read);
         poll.count = read.span.count;
-        poll.asked = read.wants;
         poll.every = read.every;
         poll.wire = points::read_cost(planned.limits, read.span.table, read.span.count);
         poll.load = share(poll.wire, poll.every);
     }
 }
 
+RelayLoad load_by(const Relay& relay, const Station& station, RelayLoad::Request request,
+                  Duration wire, Duration every) {
+    return {relay.name,
+            station.name,
+            request,
+            every,
+            wire,
+            share(wire, every),
+            share(wire, relay.every)};
+}
+
 RelayLoad read_of(const Line& line, const Relay& relay) {
     const Station& station = line.stations[relay.from->station];
-    RelayLoad made{relay.name, station.name, RelayLoad::Request::read, relay.every, {}, 0, 0};
     const modbus::Span& span = relay.from->span;
-    made.wire = points::read_cost(limits_of(line, station), span.table, span.count);
-    made.load = made.most = share(made.wire, made.every);
-    return made;
+    const Duration wire = points::read_cost(limits_of(line, station), span.table, span.count);
+    return load_by(relay, station, RelayLoad::Request::read, wire, relay.every);
 }
 
 RelayLoad write_of(const Line& line, const Relay& relay) {
     const Station& station = line.stations[relay.to->station];
-    RelayLoad made{relay.name, station.name, RelayLoad::Request::write, relay.writes_every(), {}, 0,
-                   0};
     const modbus::Span& span = relay.to->span;
-    const points::PlanLimits limits = limits_of(line, station);
-    made.wire = points::write_cost(limits, span.table, span.count, relay.single);
-    made.load = share(made.wire, made.every);
-    made.most = share(made.wire, relay.every);
-    return made;
-}
-
-/// Returns the load of rereads at this interval, limited by the station's extra turns.
-double share_of_extra(Duration wire, std::size_t reads, Duration every) {
-    const Duration least = static_cast<int>(reads) * points::PollSchedule::Settings().extra_every;
-    return share(wire, std::max(every, least));
+    const Duration wire =
+        points::write_cost(limits_of(line, station), span.table, span.count, relay.single);
+    return load_by(relay, station, RelayLoad::Request::write, wire, relay.writes_every());
 }
 
 /// Returns nullopt if no poll of the target shows what is written.
 std::optional<RelayLoad> rereads_of(const Station& station, const Planned& planned,
                                     const Relay& relay) {
-    RelayLoad made{
-        relay.name, station.name, RelayLoad::Request::reread, relay.writes_every(), {}, 0, 0};
-    std::size_t reads = 0;
+    Duration wire{};
+    Duration least{};  // between two of the station's extra turns
     for (const points::PlannedRead& read : planned.reads) {
         if (points::leaves_unchanged(station.memory, relay.to->span, read.span)) continue;
-        made.wire += points::read_cost(planned.limits, read.span.table, read.span.count);
-        ++reads;
+        wire += points::read_cost(planned.limits, read.span.table, read.span.count);
+        least += points::PollSchedule::Settings().extra_every;
     }
-    if (reads == 0) return std::nullopt;
-    made.load = share_of_extra(made.wire, reads, relay.writes_every());
-    made.most = share_of_extra(made.wire, reads, relay.every);
+    if (wire == Duration::zero()) return std::nullopt;
+    const Duration every = relay.writes_every();
+    RelayLoad made = load_by(relay, station, RelayLoad::Request::reread, wire, every);
+    made.load = share(wire, std::max(every, least));
+    made.most = share(wire, std::max(relay.every, least));
     return made;
 }
 
@@ -177,35 +146,32 @@ std::optional<OneDead> worst_case(const Line& line, const LinePlan& plan) {
 }
 
 Duration client_read(const Line& line) {
-    Duration longest{};
-    for (const Station& station : line.stations) {
-        longest =
-            std::max(longest, points::read_cost(limits_of(line, station),
-                                                modbus::Table::holding_registers, kClientRead));
-    }
-    if (longest > Duration::zero()) return longest;
+    constexpr auto kTable = modbus::Table::holding_registers;
     points::PlanLimits unlisted;
     unlisted.serial = line.serial;
     unlisted.gap = silent_interval(line.serial);
-    return points::read_cost(unlisted, modbus::Table::holding_registers, kClientRead);
+    Duration longest = points::read_cost(unlisted, kTable, kClientRead);
+    for (const Station& station : line.stations)
+        longest =
+            std::max(longest, points::read_cost(limits_of(line, station), kTable, kClientRead));
+    return longest;
 }
 
 }  // namespace
 
-double LinePlan::free_share() const { return listens ? 0 : std::max(0.0, kFull - load); }
-
-double LinePlan::free_reads() const { return free_share() / to_seconds(client_read); }
+Line at_intervals(const Line& line, double times) {
+    Line made = line;
+    for (Station& station : made.stations) {
+        for (PolledItem& asked : station.asked)
+            asked.want.every = times_as_long(asked.want.every, times);
+    }
+    for (Relay& relay : made.relays) relay.every = times_as_long(relay.every, times);
+    return made;
+}
 
 std::string_view label(RelayLoad::Request request) {
-    switch (request) {
-        case RelayLoad::Request::read:
-            return "read";
-        case RelayLoad::Request::write:
-            return "write";
-        case RelayLoad::Request::reread:
-            return "reread";
-    }
-    std::abort();
+    if (request == RelayLoad::Request::read) return "read";
+    return request == RelayLoad::Request::write ? "write" : "reread";
 }
 
 Verdict verdict(const LinePlan& plan) {

@@ -1,6 +1,7 @@
 #include "panelgate/points/point.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdlib>
@@ -131,70 +132,35 @@ std::string to_string(const Value& value) {
     return std::get<std::string>(value);
 }
 
-std::string_view label(Type type) {
-    switch (type) {
-        case Type::boolean:
-            return "bool";
-        case Type::u16:
-            return "u16";
-        case Type::i16:
-            return "i16";
-        case Type::u32:
-            return "u32";
-        case Type::i32:
-            return "i32";
-        case Type::u64:
-            return "u64";
-        case Type::i64:
-            return "i64";
-        case Type::f32:
-            return "f32";
-        case Type::f64:
-            return "f64";
-        case Type::bcd16:
-            return "bcd16";
-        case Type::bcd32:
-            return "bcd32";
-        case Type::string:
-            return "string";
-    }
-    std::abort();
-}
+namespace {
 
-unsigned registers_of(Type type) {
-    switch (type) {
-        case Type::boolean:
-        case Type::u16:
-        case Type::i16:
-        case Type::bcd16:
-        case Type::string:
-            return 1;
-        case Type::u32:
-        case Type::i32:
-        case Type::f32:
-        case Type::bcd32:
-            return 2;
-        case Type::u64:
-        case Type::i64:
-        case Type::f64:
-            return 4;
-    }
-    std::abort();
-}
+/// A row for each Type.
+struct TypeRow {
+    std::string_view word;
+    unsigned registers;
+};
+constexpr std::array<TypeRow, std::size(kTypes)> kTypeRows{{{"bool", 1},
+                                                            {"u16", 1},
+                                                            {"i16", 1},
+                                                            {"u32", 2},
+                                                            {"i32", 2},
+                                                            {"u64", 4},
+                                                            {"i64", 4},
+                                                            {"f32", 2},
+                                                            {"f64", 4},
+                                                            {"bcd16", 1},
+                                                            {"bcd32", 2},
+                                                            {"string", 1}}};
+constexpr std::array<std::string_view, std::size(kOrders)> kOrderWords{"ABCD", "BADC", "CDAB",
+                                                                       "DCBA"};
 
-std::string_view label(WordOrder order) {
-    switch (order) {
-        case WordOrder::abcd:
-            return "ABCD";
-        case WordOrder::badc:
-            return "BADC";
-        case WordOrder::cdab:
-            return "CDAB";
-        case WordOrder::dcba:
-            return "DCBA";
-    }
-    std::abort();
-}
+}  // namespace
+
+std::string_view label(Type type) { return kTypeRows.at(static_cast<std::size_t>(type)).word; }
+
+unsigned registers_of(Type type) { return kTypeRows.at(static_cast<std::size_t>(type)).registers; }
+
+std::string_view label(WordOrder order) { return kOrderWords.at(static_cast<std::size_t>(order)); }
 
 unsigned Point::count() const {
     if (modbus::is_bit_table(table)) return 1;

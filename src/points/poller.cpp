@@ -42,7 +42,7 @@ struct Poller::State : std::enable_shared_from_this<Poller::State> {
 void Poller::State::send_due() {
     const TimePoint now = clock.now();
     for (const StationPtr& station : stations) {
-        for (StationPolls::Due& due : station->polls->take_due(now)) ask(station, std::move(due));
+        if (auto due = station->polls->take_due(now)) ask(station, std::move(*due));
     }
     arm();
 }

@@ -10,49 +10,48 @@
 
 namespace panelgate::points {
 
+namespace {
+
+/// True if the want is valid, as Want requires.
 bool is_plannable(const Want& want) {
     const modbus::Span& span = want.span;
     return span.count > 0 && span.first < modbus::kTableItems &&
            span.count <= modbus::kTableItems - span.first && want.every > Duration::zero();
 }
 
-TableMap::TableMap(std::span<const Want> wants, const PlanLimits& limits, modbus::Table table)
-    : max_items_(limits.of(table).max_items) {
-    const auto by_first = [](const Piece& a, const Piece& b) { return a.first < b.first; };
-    std::vector<Piece> all;
-    for (const profile::AddressRange& range : limits.of(table).readable)
-        all.push_back({range.first, range.last + 1});
-    for (const Want& want : wants)
-        if (want.span.table == table && is_plannable(want))
-            all.push_back({want.span.first, want.span.end()});
-    std::sort(all.begin(), all.end(), by_first);
-    for (const Piece& piece : all) {
-        if (open_.empty() || piece.first > open_.back().end)
-            open_.push_back(piece);
-        else
-            open_.back().end = std::max(open_.back().end, piece.end);
+/// How far reads of one table may extend, given readable areas and wants.
+class TableMap {
+  public:
+    TableMap(std::span<const Want> wants, const PlanLimits& limits, modbus::Table table)
+        : max_items_(limits.of(table).max_items) {
+        std::vector<std::pair<std::uint32_t, std::uint32_t>> all;
+        for (const profile::AddressRange& range : limits.of(table).readable)
+            all.emplace_back(range.first, range.last + 1);
+        for (const Want& want : wants)
+            if (want.span.table == table && is_plannable(want))
+                all.emplace_back(want.span.first, want.span.end());
+        std::ranges::sort(all);
+        std::uint32_t* last_end = nullptr;
+        for (const auto& [first, end] : all) {
+            if (last_end == nullptr || first > *last_end)
+                last_end = &(open_[first] = end);
+            else
+                *last_end = std::max(*last_end, end);
+        }
     }
-    for (const modbus::Span& span : limits.refused)
-        if (span.table == table && span.count > 0) refused_.push_back({span.first, span.end()});
-    std::sort(refused_.begin(), refused_.end(), by_first);
-    for (std::size_t i = refused_.size(); i-- > 1;)
-        refused_[i - 1].end = std::min(refused_[i - 1].end, refused_[i].end);
-}
 
-std::uint32_t TableMap::reach(std::uint32_t first) const {
-    std::uint32_t end = first + max_items_;
-    const auto after = std::upper_bound(
-        open_.begin(), open_.end(), first,
-        [](std::uint32_t address, const Piece& piece) { return address < piece.first; });
-    if (after != open_.begin()) end = std::min(end, std::prev(after)->end);
-    const auto refused = std::lower_bound(
-        refused_.begin(), refused_.end(), first,
-        [](const Piece& piece, std::uint32_t address) { return piece.first < address; });
-    if (refused != refused_.end()) end = std::min(end, refused->end - 1);
-    return end;
-}
+    /// Returns the maximum end (one past the last item) of a read from `first`, which must be
+    /// wanted or readable.
+    std::uint32_t reach(std::uint32_t first) const {
+        const auto after = open_.upper_bound(first);
+        const std::uint32_t end = first + max_items_;
+        return after == open_.begin() ? end : std::min(end, std::prev(after)->second);
+    }
 
-namespace {
+  private:
+    std::uint32_t max_items_;
+    std::map<std::uint32_t, std::uint32_t> open_;  ///< ends by starts; disjoint, never adjacent
+};
 
 /// A want, or a part of one.
 struct Piece {
@@ -100,13 +99,10 @@ class TablePlanner {
         const std::uint32_t max_items = limits.of(table).max_items;
         for (std::uint32_t count = 0; count <= max_items; ++count)
             seconds_.push_back(to_seconds(read_cost(limits, table, count)));
-        std::vector<Piece> all;
         for (std::size_t i = 0; i < wants.size(); ++i)
             if (wants[i].span.table == table && is_plannable(wants[i]))
-                cut(wants[i], i, max_items, all);
-        sort_by_start(all);
-        for (const Piece& piece : all)
-            (piece.end <= map_.reach(piece.first) ? pieces_ : refused_).push_back(piece);
+                cut(wants[i], i, max_items, pieces_);
+        sort_by_start(pieces_);
     }
 
     std::vector<PlannedRead> run() const {
@@ -114,10 +110,8 @@ class TablePlanner {
         if (has_intervals()) {
             std::vector<Box> together = plan_runs(pieces_);
             if (load(together) < load(boxes)) boxes = std::move(together);
-            if (pieces_.size() <= kMaxExhaustive) search_exhaustively(boxes);
         }
         std::vector<PlannedRead> reads = serve(std::move(boxes));
-        add_refused(reads);
         for (PlannedRead& read : reads) {
             std::sort(read.wants.begin(), read.wants.end());
             read.wants.erase(std::unique(read.wants.begin(), read.wants.end()), read.wants.end());
@@ -134,37 +128,6 @@ class TablePlanner {
         return std::any_of(pieces_.begin(), pieces_.end(), [&](const Piece& piece) {
             return piece.every != pieces_.front().every;
         });
-    }
-
-    static constexpr std::size_t kMaxExhaustive = 8;  ///< pieces: at most 4140 partitions
-
-    /// Replaces `best` by the cheapest of all partitions, if that is cheaper. Adding to a read
-    /// never makes it cheaper, so partitions that already cost as much are not pursued.
-    void search_exhaustively(std::vector<Box>& best) const {
-        std::vector<Box> boxes;
-        double least = load(best);
-        add_piece(0, boxes, least, best);
-    }
-    void add_piece(std::size_t index, std::vector<Box>& boxes, double& least,
-                   std::vector<Box>& best) const {
-        const double now = load(boxes);
-        if (now >= least) return;
-        if (index == pieces_.size()) {
-            least = now;
-            best = boxes;
-            return;
-        }
-        const Piece& piece = pieces_[index];
-        for (std::size_t i = 0; i < boxes.size(); ++i) {
-            const Box before = boxes[i];
-            boxes[i].end = std::max(before.end, piece.end);  // pieces are sorted by start
-            boxes[i].every = std::min(before.every, piece.every);
-            if (boxes[i].end <= map_.reach(before.first)) add_piece(index + 1, boxes, least, best);
-            boxes[i] = before;
-        }
-        boxes.push_back({piece.first, piece.end, piece.every});
-        add_piece(index + 1, boxes, least, best);
-        boxes.pop_back();
     }
 
     double load(const Box& box) const {
@@ -272,7 +235,7 @@ class TablePlanner {
         std::vector<PlannedRead> reads;
         reads.reserve(boxes.size());
         for (const Box& box : boxes)
-            reads.push_back({{table_, box.first, box.end - box.first}, box.every, {}, false});
+            reads.push_back({{table_, box.first, box.end - box.first}, box.every, {}});
         for (const Piece& piece : pieces_) {
             const auto index = find_box_for(boxes, piece) - boxes.cbegin();
             reads[static_cast<std::size_t>(index)].wants.push_back(piece.want);
@@ -281,29 +244,16 @@ class TablePlanner {
         return reads;
     }
 
-    /// Reads pieces that contain a refused span alone; pieces of the same items share a read.
-    void add_refused(std::vector<PlannedRead>& reads) const {
-        const Piece* before = nullptr;
-        for (const Piece& piece : refused_) {
-            if (before == nullptr || before->first != piece.first || before->end != piece.end)
-                reads.push_back(
-                    {{table_, piece.first, piece.end - piece.first}, piece.every, {}, true});
-            reads.back().wants.push_back(piece.want);
-            before = &piece;
-        }
-    }
-
     const PlanLimits& limits_;
     modbus::Table table_;
     TableMap map_;
     std::vector<double> seconds_;  ///< cost of a read, by number of items
-    std::vector<Piece> pieces_;    ///< sorted; without refused spans
-    std::vector<Piece> refused_;   ///< sorted; the others
+    std::vector<Piece> pieces_;    ///< sorted
 };
 
 /// Returns the read of exactly these pieces.
 PlannedRead read_of(const PlannedRead& whole, std::span<const Piece> pieces) {
-    PlannedRead read{{whole.span.table, pieces.front().first, 0}, Duration::max(), {}, false};
+    PlannedRead read{{whole.span.table, pieces.front().first, 0}, Duration::max(), {}};
     std::uint32_t end = 0;
     for (const Piece& piece : pieces) {
         end = std::max(end, piece.end);
@@ -409,13 +359,6 @@ std::optional<std::pair<PlannedRead, PlannedRead>> bisect(const PlannedRead& rea
     if (at == 0) return std::nullopt;
     const std::span<const Piece> all(pieces);
     return std::pair(read_of(read, all.first(at)), read_of(read, all.subspan(at)));
-}
-
-std::optional<modbus::Span> refused_between(const PlannedRead& left, const PlannedRead& right) {
-    const modbus::Table table = left.span.table;
-    if (table != right.span.table || right.span.first < left.span.end()) return std::nullopt;
-    const std::uint32_t first = left.span.end() - 1;
-    return modbus::Span{table, first, right.span.first + 1 - first};
 }
 
 }  // namespace panelgate::points

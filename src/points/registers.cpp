@@ -12,10 +12,7 @@ namespace {
 
 constexpr std::int64_t kMaxExactInteger = std::int64_t{1}
                                           << 53;  ///< a double holds every integer up to this
-constexpr int kMostDigits = 18;                   ///< digits that always fit in an int64
 constexpr int kRoundTripDigits = 17;              ///< digits that distinguish any two doubles
-constexpr double kPowersOfTen[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8, 1e9,
-                                   1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18};
 
 /// Returns n if the scale is 1/n and there is no offset: dividing by n gives the double nearest to
 /// the number.
@@ -32,32 +29,13 @@ Scaling::Scaling(double scale, double offset)
       offset_(offset),
       divisor_(divisor_of(scale, offset)),
       decimal_scale_(scale),
-      decimal_offset_(offset),
-      whole_(whole()) {}
-
-std::optional<Scaling::Whole> Scaling::whole() const {
-    const int exponent = std::min({0, decimal_scale_.exponent(), decimal_offset_.exponent()});
-    if (exponent < -kMostDigits) return std::nullopt;
-    const auto scale = decimal_scale_.shifted(-exponent).as_int64();
-    const auto offset = decimal_offset_.shifted(-exponent).as_int64();
-    if (!scale || !offset) return std::nullopt;
-    return Whole{*scale, *offset, exponent};
-}
+      decimal_offset_(offset) {}
 
 double Scaling::value_of(double raw) const {
     if (divisor_) return raw / *divisor_;
     const bool is_whole =
         raw == std::floor(raw) && std::abs(raw) <= static_cast<double>(kMaxExactInteger);
-    if (whole_ && is_whole) {
-        std::int64_t sum = 0;
-        const bool fits =
-            !__builtin_mul_overflow(static_cast<std::int64_t>(raw), whole_->scale, &sum) &&
-            !__builtin_add_overflow(sum, whole_->offset, &sum) && sum <= kMaxExactInteger &&
-            sum >= -kMaxExactInteger;
-        // Both are exact, so the quotient is the nearest double.
-        if (fits) return static_cast<double>(sum) / kPowersOfTen[-whole_->exponent];
-    }
-    return raw * scale_ + offset_;
+    return is_whole ? value_of(Decimal(raw)).nearest() : raw * scale_ + offset_;
 }
 
 Decimal Scaling::value_of(const Decimal& raw) const {
@@ -128,10 +106,8 @@ std::vector<std::uint16_t> text_to_words(std::string_view text, unsigned count) 
     return words;
 }
 
-bool is_non_finite(std::string text) {
-    std::ranges::transform(text, text.begin(), [](char c) {
-        return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    });
+bool is_non_finite(std::string_view typed) {
+    std::string text = to_lower(typed);
     if (text.starts_with('-') || text.starts_with('+')) text.erase(0, 1);
     return text == "nan" || text == "inf" || text == "infinity";
 }

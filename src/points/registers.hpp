@@ -33,13 +33,6 @@ class Scaling {
     std::optional<Decimal> exact_raw_of(const Decimal& value) const;
 
   private:
-    /// Scale and offset as integer multiples of 10^exponent.
-    struct Whole {
-        std::int64_t scale = 1;
-        std::int64_t offset = 0;
-        int exponent = 0;  ///< 0 or less
-    };
-    std::optional<Whole> whole() const;
     std::optional<Decimal> raw_shown_as(double value) const;
 
     double scale_;
@@ -47,7 +40,6 @@ class Scaling {
     std::optional<double> divisor_;  ///< n if the value is raw / n
     Decimal decimal_scale_;
     Decimal decimal_offset_;
-    std::optional<Whole> whole_;  ///< nullopt: too many digits between them
 };
 
 /// Returns the text in these registers, high byte first, up to the first NUL, at most `length`
@@ -58,7 +50,7 @@ std::string text_of_words(const std::vector<std::uint16_t>& words, unsigned leng
 std::vector<std::uint16_t> text_to_words(std::string_view text, unsigned count);
 
 /// True for "NaN", "-inf", "Infinity" in any case.
-bool is_non_finite(std::string text);
+bool is_non_finite(std::string_view typed);
 
 // Conversions between a point's registers and its raw number, shared by decode and encode.
 

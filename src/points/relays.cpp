@@ -1,7 +1,7 @@
 #include "panelgate/points/relays.hpp"
 
 #include <algorithm>
-#include <cstdlib>
+#include <array>
 #include <set>
 #include <utility>
 
@@ -13,17 +13,9 @@
 namespace panelgate::points {
 
 std::string_view label(RelayState state) {
-    switch (state) {
-        case RelayState::waiting:
-            return "waiting";
-        case RelayState::ok:
-            return "ok";
-        case RelayState::source_failing:
-            return "source failing";
-        case RelayState::target_failing:
-            return "target failing";
-    }
-    std::abort();
+    static constexpr std::array<std::string_view, 4> kLabels{"waiting", "ok", "source failing",
+                                                             "target failing"};
+    return kLabels.at(static_cast<std::size_t>(state));
 }
 
 std::string text_of(const RelayStatus& relay) {

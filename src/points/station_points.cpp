@@ -50,12 +50,6 @@ Items items_written(ByteView request, std::uint32_t count) {
     }
 }
 
-Items items_read(const modbus::Span& span, ByteView reply) {
-    if (!modbus::is_bit_table(span.table)) return modbus::registers_of(reply);
-    const std::vector<bool> bits = modbus::bits_of(reply, span.count);
-    return {bits.begin(), bits.end()};
-}
-
 /// False only if the panel refused the write.
 bool may_have_written(const tap::Transaction& heard) {
     return heard.doubtful || !modbus::exception_of(heard.reply);
@@ -83,7 +77,7 @@ std::vector<std::size_t> HeardValues::on_heard(const tap::Transaction& heard) {
 /// Returns false if the read failed.
 bool HeardValues::apply_read(const modbus::Span& span, const tap::Transaction& heard) {
     if (heard.end != tap::End::answered || modbus::exception_of(heard.reply)) return false;
-    const Items items = items_read(span, heard.reply);
+    const Items items = items_of(span, heard.reply);
     if (items.size() < span.count) return false;
     // 17h reads after its own write (AP 6.17).
     const bool writes = heard.request[0] == modbus::kReadWriteMultipleRegisters;

@@ -1,7 +1,6 @@
 #include "panelgate/points/station_polls.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <map>
 #include <tuple>
 #include <utility>
@@ -15,7 +14,6 @@ namespace panelgate::points {
 PollSchedule::PollSchedule(std::span<const Duration> intervals, TimePoint start,
                            const Settings& settings)
     : start_(start), settings_(settings), entries_(intervals.size()) {
-    settings_.max_outstanding = std::max<std::size_t>(settings_.max_outstanding, 1);
     settings_.extra_burst = std::max<std::size_t>(settings_.extra_burst, 1);
     set_phases(intervals);
     for (std::size_t i = 0; i < entries_.size(); ++i) queue_.emplace(entries_[i].due, i);
@@ -42,55 +40,40 @@ void PollSchedule::set_phases(std::span<const Duration> intervals) {
         for (Duration::rep k = 0; k < count; ++k) {
             const Duration phase = k * step + offset;
             entries_[members[static_cast<std::size_t>(k)]] = {
-                every, phase, start_ + std::min(phase, first), false, false};
+                every, phase, start_ + std::min(phase, first), false};
             first += first_step;
         }
         offset += shift;
     }
 }
 
-/// Moves an entry to its first turn after `now`. Returns how many turns this passes, including the
-/// due one.
-std::uint64_t PollSchedule::advance(std::size_t index, TimePoint now) {
+/// Moves an entry to its first turn after `now`.
+void PollSchedule::advance(std::size_t index, TimePoint now) {
     Entry& entry = entries_[index];
     const TimePoint origin = start_ + entry.phase;
-    const auto turn_after = [&](TimePoint time) -> Duration::rep {
-        return time < origin ? 0 : (time - origin) / entry.every + 1;
-    };
-    const auto passed = turn_after(now) - turn_after(entry.due);
+    const Duration::rep turns = now < origin ? 0 : (now - origin) / entry.every + 1;
     queue_.erase({entry.due, index});
-    entry.due = origin + turn_after(now) * entry.every;
+    entry.due = origin + turns * entry.every;
     entry.is_extra = false;
     queue_.emplace(entry.due, index);
-    return static_cast<std::uint64_t>(passed) + 1;
 }
 
 std::optional<TimePoint> PollSchedule::next_due() const {
-    if (queue_.empty() || outstanding_ >= settings_.max_outstanding) return std::nullopt;
+    if (queue_.empty() || under_way_) return std::nullopt;
     return queue_.begin()->first;
 }
 
-std::vector<std::size_t> PollSchedule::take_due(TimePoint now) {
-    std::vector<std::size_t> due;
-    while (!queue_.empty() && queue_.begin()->first <= now &&
-           outstanding_ < settings_.max_outstanding) {
-        const std::size_t index = queue_.begin()->second;
-        const std::uint64_t turns = advance(index, now);
-        if (entries_[index].under_way) {
-            counters_.skipped += turns;
-            continue;
-        }
-        counters_.missed += turns - 1;
-        entries_[index].under_way = true;
-        ++outstanding_;
-        due.push_back(index);
-    }
-    return due;
+std::optional<std::size_t> PollSchedule::take_due(TimePoint now) {
+    const auto due = next_due();
+    if (!due || *due > now) return std::nullopt;
+    under_way_ = queue_.begin()->second;
+    advance(*under_way_, now);
+    return under_way_;
 }
 
 void PollSchedule::request_extra_turn(std::size_t index, TimePoint now) {
     Entry& entry = entries_[index];
-    if (entry.under_way || entry.is_extra) return;
+    if (under_way_ == index || entry.is_extra) return;
     const Duration burst =
         settings_.extra_every * static_cast<Duration::rep>(settings_.extra_burst - 1);
     const TimePoint turn = std::max({now, extra_free_ - burst, last_extra_ + 1ns});
@@ -103,18 +86,17 @@ void PollSchedule::request_extra_turn(std::size_t index, TimePoint now) {
 
 void PollSchedule::retry_at(std::size_t index, TimePoint when) {
     Entry& entry = entries_[index];
-    if (entry.under_way || entry.due <= when) return;
+    if (under_way_ == index || entry.due <= when) return;
     queue_.erase({entry.due, index});
     entry.due = when;
     queue_.emplace(entry.due, index);
 }
 
 void PollSchedule::on_done(std::size_t index, TimePoint now) {
-    if (index >= entries_.size() || !entries_[index].under_way) return;
-    entries_[index].under_way = false;
-    --outstanding_;
+    if (under_way_ != index) return;
+    under_way_.reset();
     // A turn due meanwhile is lost, or this entry would overtake those waiting.
-    if (entries_[index].due <= now) counters_.skipped += advance(index, now);
+    if (entries_[index].due <= now) advance(index, now);
 }
 
 namespace {
@@ -134,24 +116,17 @@ PollSchedule schedule_of(const std::vector<PlannedRead>& plan, TimePoint start) 
     return PollSchedule(intervals_of(plan), start, PollSchedule::Settings());
 }
 
-std::vector<std::uint16_t> items_of(const PlannedRead& read, ByteView reply) {
-    if (!modbus::is_bit_table(read.span.table)) return modbus::registers_of(reply);
-    const std::vector<bool> bits = modbus::bits_of(reply, read.span.count);
+}  // namespace
+
+std::vector<std::uint16_t> items_of(const modbus::Span& span, ByteView reply) {
+    if (!modbus::is_bit_table(span.table)) return modbus::registers_of(reply);
+    const std::vector<bool> bits = modbus::bits_of(reply, span.count);
     return {bits.begin(), bits.end()};
 }
 
-}  // namespace
-
 std::string_view label(Quality quality) {
-    switch (quality) {
-        case Quality::good:
-            return "good";
-        case Quality::stale:
-            return "stale";
-        case Quality::bad:
-            return "bad";
-    }
-    std::abort();
+    if (quality == Quality::good) return "good";
+    return quality == Quality::stale ? "stale" : "bad";
 }
 
 std::optional<bool> SharedMemory::changes(const modbus::Span& written,
@@ -204,12 +179,10 @@ void adopt_readings(const std::vector<Want>& wants, std::vector<Reading>& readin
     }
 }
 
-std::vector<StationPolls::Due> StationPolls::take_due(TimePoint now) {
-    std::vector<Due> due;
-    for (const std::size_t read : schedule_.take_due(now)) {
-        due.push_back({read, modbus::Request::read(plan_[read].span)});
-    }
-    return due;
+std::optional<StationPolls::Due> StationPolls::take_due(TimePoint now) {
+    const auto read = schedule_.take_due(now);
+    if (!read) return std::nullopt;
+    return Due{*read, modbus::Request::read(plan_[*read].span)};
 }
 
 std::vector<std::size_t> StationPolls::on_answer(TimePoint now, std::size_t read,
@@ -277,7 +250,7 @@ bool StationPolls::is_outdated(const PlannedRead& read) const {
 
 /// Returns false if the reply holds fewer items than requested; no bus returns that.
 bool StationPolls::store(const PlannedRead& read, ByteView reply, TimePoint sampled) {
-    const std::vector<std::uint16_t> items = items_of(read, reply);
+    const std::vector<std::uint16_t> items = items_of(read.span, reply);
     if (items.size() < read.span.count) return false;
     for (const std::size_t index : read.wants) {
         const modbus::Span& want = wants_[index].span;

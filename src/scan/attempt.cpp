@@ -112,6 +112,19 @@ bool offers(const profile::PanelProfile& panel, const SerialFormat& format) {
             allows(panel.serial.stop_bits, format.stop_bits));
 }
 
+std::optional<SerialFormat> common_format(const profile::Catalogue& profiles,
+                                          const std::vector<const profile::PanelProfile*>& panels) {
+    for (const SerialFormat& format : likely_formats(profiles, {})) {
+        const auto fits = [&](const auto* panel) { return offers(*panel, format); };
+        if (std::ranges::all_of(panels, fits)) return format;
+    }
+    return std::nullopt;
+}
+
+namespace {
+
+/// True if a profile describes a panel at this address that sends the CRC's high byte first. No
+/// `format`: a remote line.
 bool may_be_high_first(const profile::Catalogue& profiles, std::uint8_t station,
                        const std::optional<SerialFormat>& format) {
     if (format && format->mode == SerialMode::ascii) return false;
@@ -122,22 +135,8 @@ bool may_be_high_first(const profile::Catalogue& profiles, std::uint8_t station,
     });
 }
 
-std::optional<SerialFormat> common_format(const profile::Catalogue& profiles,
-                                          const std::vector<const profile::PanelProfile*>& panels) {
-    for (const SerialFormat& format : likely_formats(profiles, {})) {
-        const auto fits = [&](const auto* panel) { return offers(*panel, format); };
-        if (std::ranges::all_of(panels, fits)) return format;
-    }
-    return std::nullopt;
-}
-
-SearchPlan::SearchPlan(const std::vector<SerialFormat>& formats,
-                       const std::vector<std::uint8_t>& stations) {
-    add(formats, stations);
-}
-
-void SearchPlan::add(const std::vector<SerialFormat>& formats,
-                     const std::vector<std::uint8_t>& stations) {
+void add_rounds(std::deque<Turn>& turns, const std::vector<SerialFormat>& formats,
+                const std::vector<std::uint8_t>& stations) {
     std::size_t from = 0;
     for (std::size_t round = 0; from < stations.size(); ++round) {
         const std::size_t left = stations.size() - from;
@@ -145,54 +144,54 @@ void SearchPlan::add(const std::vector<SerialFormat>& formats,
             round < std::size(kRounds) ? std::min(kRounds[round], left) : left;
         for (const SerialFormat& format : formats) {
             for (std::size_t i = from; i < from + count; ++i)
-                cells_.push_back({.format = format, .station = stations[i]});
+                turns.push_back({.format = format, .station = stations[i]});
         }
         from += count;
     }
 }
 
-void SearchPlan::add_high_first(const profile::Catalogue& profiles, const Settings& settings,
-                                const std::vector<SerialFormat>& formats,
-                                const std::vector<std::uint8_t>& stations) {
+}  // namespace
+
+std::deque<Turn> search_turns(const profile::Catalogue& profiles, const Settings& settings) {
+    const std::vector<SerialFormat> formats = likely_formats(profiles, settings);
+    const std::vector<std::uint8_t> stations = likely_stations(profiles, settings);
+    std::deque<Turn> turns;
+    add_rounds(turns, formats, stations);
     for (const SerialFormat& format : formats) {
         const auto known = settings.remote ? std::nullopt : std::optional(format);
         for (const std::uint8_t station : stations) {
             if (may_be_high_first(profiles, station, known))
-                cells_.push_back({format, station, modbus::CrcOrder::high_first});
+                turns.push_back({format, station, modbus::CrcOrder::high_first});
         }
     }
-}
-
-std::optional<Cell> SearchPlan::next() {
-    if (at_ == cells_.size()) return std::nullopt;
-    return cells_[at_++];
-}
-
-bool SearchPlan::is_last_of_format() const {
-    return at_ == cells_.size() || (at_ > 0 && cells_[at_].format != cells_[at_ - 1].format);
-}
-
-void SearchPlan::hint(const Cell& cell) {
-    std::array<std::vector<Cell>, 3> by_distance;
-    for (std::size_t i = at_; i < cells_.size(); ++i) {
-        const bool same_rate = cells_[i].format.baud == cell.format.baud;
-        const std::size_t distance = cells_[i].station != cell.station ? 2 : same_rate ? 0 : 1;
-        by_distance[distance].push_back(cells_[i]);
+    add_rounds(turns, ascii_formats(settings), stations);
+    for (std::size_t i = 0; i < turns.size(); ++i) {
+        const bool leaves = i + 1 == turns.size() || turns[i + 1].format != turns[i].format;
+        turns[i].timeout = leaves ? settings.leave_timeout : settings.search_timeout;
     }
-    cells_.resize(at_);
-    for (const std::vector<Cell>& cells : by_distance)
-        cells_.insert(cells_.end(), cells.begin(), cells.end());
+    return turns;
 }
 
-Duration SearchPlan::cost(const Settings& settings) const {
-    Duration total{};
-    for (std::size_t i = at_; i < cells_.size(); ++i) {
-        total += settings.search_timeout + frame_time(cells_[i].format, modbus::kReadRequestAdu);
-        const bool changes = i + 1 == cells_.size() || cells_[i + 1].format != cells_[i].format;
-        if (changes)
-            total += settings.leave_timeout - settings.search_timeout + settings.after_format;
+std::deque<Turn> asking_turns(const profile::Catalogue& profiles, const Settings& settings,
+                              const SerialFormat& format,
+                              const std::optional<SerialFormat>& known) {
+    constexpr auto kLow = modbus::CrcOrder::low_first;
+    const std::vector<std::uint8_t> stations = likely_stations(profiles, settings);
+    std::deque<Turn> turns;
+    for (const std::uint8_t station : stations)
+        turns.push_back({format, station, kLow, settings.first_timeout, true});
+    if (settings.quick) {
+        turns.back().timeout = settings.second_timeout;  // behind it nobody is heard
+        return turns;
     }
-    return total;
+    for (const std::uint8_t station : stations)
+        turns.push_back({format, station, kLow, settings.second_timeout});
+    for (const std::uint8_t station : stations) {
+        if (format.mode == SerialMode::rtu && may_be_high_first(profiles, station, known))
+            turns.push_back(
+                {format, station, modbus::CrcOrder::high_first, settings.first_timeout});
+    }
+    return turns;
 }
 
 namespace {

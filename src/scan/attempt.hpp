@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <vector>
 
@@ -40,43 +41,23 @@ bool offers(const profile::PanelProfile& panel, const SerialFormat& format);
 std::optional<SerialFormat> common_format(const profile::Catalogue& profiles,
                                           const std::vector<const profile::PanelProfile*>& panels);
 
-/// True if a profile describes a panel at this address that sends the CRC's high byte first. No
-/// `format`: a remote line.
-bool may_be_high_first(const profile::Catalogue& profiles, std::uint8_t station,
-                       const std::optional<SerialFormat>& format);
-
-/// One request while the format is unknown.
-struct Cell {
+/// A request to a station that has not answered yet.
+struct Turn {
     SerialFormat format;
     std::uint8_t station = 0;
     modbus::CrcOrder crc_order = modbus::CrcOrder::low_first;
-    friend bool operator==(const Cell&, const Cell&) = default;
+    Duration timeout{};    ///< from the end of the request to the first byte of its reply
+    bool hurried = false;  ///< late replies to such turns are heard during those behind
 };
 
-/// All formats with all stations, in rounds: a few stations in every format, then more. All
-/// stations of a line share a format, so the first reply ends this.
-class SearchPlan {
-  public:
-    SearchPlan(const std::vector<SerialFormat>& formats, const std::vector<std::uint8_t>& stations);
-    /// Appends other formats, for when no station has answered at all.
-    void add(const std::vector<SerialFormat>& formats, const std::vector<std::uint8_t>& stations);
-    /// Appends requests with the CRC's high byte first, for when no station has answered at all.
-    void add_high_first(const profile::Catalogue& profiles, const Settings& settings,
-                        const std::vector<SerialFormat>& formats,
-                        const std::vector<std::uint8_t>& stations);
-
-    std::optional<Cell> next();
-    /// True if the next request has another format, or there is none.
-    bool is_last_of_format() const;
-    /// After a damaged answer: tries this station first in the other parities, then in the other
-    /// rates.
-    void hint(const Cell& cell);
-    Duration cost(const Settings& settings) const;  ///< of the remaining requests
-
-  private:
-    std::vector<Cell> cells_;
-    std::size_t at_ = 0;
-};
+/// Returns the turns while the format is unknown, in rounds: a few stations in every format, then
+/// more; then with the CRC's high byte first, then in ASCII. All stations of a line share a format,
+/// so the first reply ends the search.
+std::deque<Turn> search_turns(const profile::Catalogue& profiles, const Settings& settings);
+/// Returns the turns in the format found: a hurried pass, a patient one, and one with the CRC's
+/// high byte first. `settings.quick`: only the first. No `known` format: a remote line.
+std::deque<Turn> asking_turns(const profile::Catalogue& profiles, const Settings& settings,
+                              const SerialFormat& format, const std::optional<SerialFormat>& known);
 
 /// Maximum bytes kept while listening; the rest is dropped.
 inline constexpr std::size_t kMaxHeard = 4096;

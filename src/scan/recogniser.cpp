@@ -1,7 +1,6 @@
 #include "recogniser.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <string>
 #include <utility>
 
@@ -15,6 +14,7 @@ namespace panelgate::scan {
 
 namespace {
 
+using modbus::ExceptionCode;
 using profile::PanelProfile;
 
 constexpr const char* kGeneric = "generic";
@@ -100,39 +100,23 @@ Recogniser::Recogniser(const profile::Catalogue& profiles, std::uint8_t station,
 }
 
 Recogniser::Answer Recogniser::expected(const PanelProfile& profile, const Bytes& probe) {
-    switch (profile::judge(profile, probe)) {
-        case profile::Judgement::fine:
-            return Answer::granted;
-        case profile::Judgement::illegal_function:
-            return Answer::no_function;
-        case profile::Judgement::illegal_value:
-        case profile::Judgement::illegal_address:
-        case profile::Judgement::write_protected:
-            return Answer::refused;
-    }
-    std::abort();
+    const profile::Judgement judgement = profile::judge(profile, probe);
+    if (judgement == profile::Judgement::fine) return Answer::granted;
+    return judgement == profile::Judgement::illegal_function ? Answer::no_function
+                                                             : Answer::refused;
 }
 
-/// Returns nullopt if the reply does not show what the station supports: silence, busy, a failure.
+/// Returns nullopt if the reply does not show what the station supports: silence, busy, a failure,
+/// a vendor's code.
 std::optional<Recogniser::Answer> Recogniser::classify(const std::optional<Bytes>& reply) {
     if (!reply) return std::nullopt;
     const auto code = modbus::exception_of(*reply);
     if (!code) return Answer::granted;
-    switch (static_cast<modbus::ExceptionCode>(*code)) {
-        case modbus::ExceptionCode::illegal_function:
-            return Answer::no_function;
-        case modbus::ExceptionCode::illegal_data_address:
-        case modbus::ExceptionCode::illegal_data_value:
-            return Answer::refused;
-        case modbus::ExceptionCode::server_device_failure:
-        case modbus::ExceptionCode::acknowledge:
-        case modbus::ExceptionCode::server_device_busy:
-        case modbus::ExceptionCode::memory_parity_error:
-        case modbus::ExceptionCode::gateway_path_unavailable:
-        case modbus::ExceptionCode::gateway_target_failed:
-            return std::nullopt;
-    }
-    return std::nullopt;  // vendor-specific
+    const auto known = static_cast<ExceptionCode>(*code);
+    if (known == ExceptionCode::illegal_function) return Answer::no_function;
+    const bool about_items =
+        known == ExceptionCode::illegal_data_address || known == ExceptionCode::illegal_data_value;
+    return about_items ? std::optional(Answer::refused) : std::nullopt;
 }
 
 /// A panel's identification weighs more than where its memory ends, which varies within a family.

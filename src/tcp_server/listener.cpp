@@ -86,9 +86,7 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
         if (shared_->settings.tls)
             shared_->handshakes = std::make_shared<tls::Handshakes>(
                 executor, "modbus_tcp " + shared_->settings.name(), *shared_->settings.tls);
-        if (!shared_->settings.udp) return;
-        datagrams_ =
-            std::make_shared<Datagrams>(executor, shared_, [this] { notify_when_empty(); });
+        if (shared_->settings.udp) datagrams_ = std::make_shared<Datagrams>(executor, shared_);
     }
 
     void start();
@@ -280,7 +278,7 @@ void Listener::Core::stop(std::function<void()> done) {
     done_ = std::move(done);
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // finish() may erase
     for (const auto& session : sessions) session->finish();
-    if (datagrams_) datagrams_->finish();
+    if (datagrams_) datagrams_->finish([this] { notify_when_empty(); });
     notify_when_empty();
 }
 
@@ -289,6 +287,7 @@ void Listener::Core::close_now() {
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // close() erases
     for (const auto& session : sessions) session->close();
     if (datagrams_) datagrams_->close();
+    notify_when_empty();
 }
 
 Listener::Listener(const asio::any_io_executor& executor, rt::Clock& clock, Settings settings,

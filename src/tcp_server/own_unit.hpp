@@ -44,9 +44,9 @@ struct Diagnostics {
 
 /// Returns the diagnostics unit's reply. Never uses a bus. Pure.
 ///
-/// 02, 03 and 04 read the map of register_map.hpp; 08 returns its counters (AP 6.8), 11 and 17
-/// describe the gateway, 2B/0E returns the objects of identify(). Every other function, including
-/// those for serial lines only (SER-01), is exception 01; a malformed request of these 03.
+/// 02, 03 and 04 read the map that describe_register_map() documents; 2B/0E identifies the gateway
+/// (AP 6.21). Every other function, including those for serial lines only (SER-01), is exception
+/// 01; a malformed request of these functions 03.
 Bytes answer_diagnostics(ByteView request, const Diagnostics& state);
 
 /// Returns the gateway's current state as `who` may see it: a line or station of which he may read

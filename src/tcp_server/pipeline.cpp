@@ -14,55 +14,6 @@
 
 namespace panelgate::tcp_server {
 
-ReplyQueue::Ticket ReplyQueue::open(std::uint16_t transaction, std::uint8_t unit, Bytes pdu) {
-    slots_.push_back(Slot{transaction, unit, std::move(pdu), false, {}});
-    ++unanswered_;
-    return first_ + slots_.size() - 1;
-}
-
-void ReplyQueue::push(std::uint16_t transaction, std::uint8_t unit, const Bytes& pdu) {
-    settle(open(transaction, unit), pdu);
-}
-
-void ReplyQueue::settle(Ticket ticket, const Bytes& pdu) {
-    Slot& slot = at(ticket);
-    if (modbus::is_answered(framing_, slot.unit))
-        slot.adu = modbus::encode_reply(framing_, slot.transaction, slot.unit, pdu);
-    close(slot);
-}
-
-void ReplyQueue::drop(Ticket ticket) { close(at(ticket)); }
-
-void ReplyQueue::close(Slot& slot) {
-    slot.settled = true;
-    --unanswered_;
-    while (ready_ < slots_.size() && slots_[ready_].settled) ++ready_;
-    skip_silent();
-}
-
-std::optional<bool> ReplyQueue::matches_newest(std::uint16_t transaction, std::uint8_t unit,
-                                               ByteView pdu, Invalidates invalidates) const {
-    for (std::size_t i = slots_.size(); i-- > 0;) {
-        const Slot& slot = slots_[i];
-        if (slot.transaction == transaction)
-            return slot.unit == unit && std::ranges::equal(slot.request, pdu);
-        if (invalidates(slot.request, pdu)) return false;
-    }
-    return std::nullopt;
-}
-
-void ReplyQueue::pop() {
-    slots_.front().adu.clear();
-    skip_silent();
-}
-
-void ReplyQueue::skip_silent() {
-    for (; ready_ > 0 && slots_.front().adu.empty(); --ready_) {
-        slots_.pop_front();
-        ++first_;
-    }
-}
-
 namespace {
 
 template <class... T>
@@ -118,29 +69,25 @@ struct BroadcastOutcome {
 
 }  // namespace
 
-Pipeline::Pipeline(std::shared_ptr<Shared> shared, Caller caller, std::function<void()> on_answer,
-                   Transport transport)
-    : shared_(std::move(shared)),
-      caller_(std::move(caller)),
-      on_answer_(std::move(on_answer)),
-      transport_(transport),
-      replies_(shared_->settings.framing) {}
+Pipeline::Pipeline(std::shared_ptr<Shared> shared, Caller caller, std::function<void()> on_answer)
+    : shared_(std::move(shared)), caller_(std::move(caller)), on_answer_(std::move(on_answer)) {}
 
 /// A reply occupies room until the client has taken it, so a slow reader is served slowly.
 /// Retransmissions occupy room too; otherwise a client repeating one request would never be
 /// throttled.
 bool Pipeline::has_room() const {
     const Settings& settings = shared_->settings;
-    return replies_.size() + waiting_.size() + joined_ < settings.in_flight + settings.waiting;
+    return slots_.size() + joined_ < settings.in_flight + settings.waiting;
 }
 
-/// True if a retransmission of this request may share its answer.
+/// True if a retransmission of this request may share its answer. The network may duplicate a
+/// datagram, so datagrams join by default.
 bool Pipeline::may_join(ByteView pdu) const {
     const Settings& settings = shared_->settings;
     if (!modbus::has_transactions(settings.framing)) return false;
     switch (settings.retransmissions) {
         case Retransmissions::join_writes:
-            return transport_ == Transport::datagrams || !modbus::is_pure_read(pdu);
+            return caller_.who()->face == Face::udp || !modbus::is_pure_read(pdu);
         case Retransmissions::join:
             return true;
         case Retransmissions::pass:
@@ -153,17 +100,12 @@ bool Pipeline::may_join(ByteView pdu) const {
 /// on, off, on. A read after a write must see its result.
 bool Pipeline::is_joined(const modbus::Adu& adu) const {
     if (!may_join(adu.pdu)) return false;
-    for (std::size_t i = waiting_.size(); i-- > 0;) {
-        if (waiting_[i].transaction == adu.transaction) return waiting_[i] == adu;
-        if (invalidates(waiting_[i].pdu, adu.pdu)) return false;
+    for (std::size_t i = slots_.size(); i-- > 0;) {
+        const modbus::Adu& earlier = slots_[i].request;
+        if (earlier.transaction == adu.transaction) return earlier == adu;
+        if (invalidates(earlier.pdu, adu.pdu)) return false;
     }
-    return replies_.matches_newest(adu.transaction, adu.unit, adu.pdu, invalidates).value_or(false);
-}
-
-/// Opens a slot for a request that goes to the bus.
-ReplyQueue::Ticket Pipeline::open(const modbus::Adu& adu) {
-    const bool joinable = may_join(adu.pdu);
-    return replies_.open(adu.transaction, adu.unit, joinable ? adu.pdu : Bytes());
+    return false;
 }
 
 void Pipeline::take(modbus::Adu adu) {
@@ -175,18 +117,13 @@ void Pipeline::take(modbus::Adu adu) {
     }
     ++shared_->counters.requests;
     if (!modbus::is_answered(shared_->settings.framing, adu.unit)) ++shared_->counters.unanswered;
-    waiting_.push_back(std::move(adu));
+    slots_.push_back(Slot{std::move(adu)});
     admit();
 }
 
-bool Pipeline::joins(const modbus::Adu& adu) {
-    const bool joined = is_joined(adu);
-    if (joined) ++shared_->counters.joined;
-    return joined;
-}
-
 void Pipeline::pop() {
-    replies_.pop();
+    slots_.front().reply.clear();
+    skip_silent();
     admit();
     if (empty()) joined_ = 0;
 }
@@ -195,31 +132,32 @@ void Pipeline::pop() {
 /// registers: those reflect the state after the preceding requests have started.
 void Pipeline::admit() {
     const std::size_t places = shared_->settings.in_flight;
-    while (!waiting_.empty() && (refusing_waiting_ || replies_.in_flight() < places)) {
-        const modbus::Adu adu = std::move(waiting_.front());
-        waiting_.pop_front();
-        serve(adu);
+    while (started_ < slots_.size() && (refusing_waiting_ || unanswered_ + ready_ < places)) {
+        ++unanswered_;
+        serve(first_ + started_++);
     }
 }
 
-void Pipeline::serve(const modbus::Adu& adu) {
+void Pipeline::serve(Ticket ticket) {
+    const modbus::Adu& adu = slots_[static_cast<std::size_t>(ticket - first_)].request;
+    const std::uint8_t function = adu.pdu[0];
     std::visit(Overloaded{
                    [&](const Refuse& refusal) {
                        if (refusal.asked.empty()) tell_stray(adu);
                        for (const Target& target : refusal.asked)
                            caller_.count_refused(target.bus, target.station, adu.pdu);
-                       answer(adu, [function = adu.pdu[0], code = refusal.code] {
+                       answer(ticket, [function, code = refusal.code] {
                            return modbus::encode_exception(function, code);
                        });
                    },
                    [&](const Diagnose&) {
                        tell_stray(adu);
-                       answer(adu, [pdu = adu.pdu, shared = shared_.get(), who = caller_.who()] {
+                       answer(ticket, [pdu = adu.pdu, shared = shared_.get(), who = caller_.who()] {
                            return answer_diagnostics(pdu, own_state(*shared, who));
                        });
                    },
-                   [&](Forward forwarding) { forward(adu, std::move(forwarding)); },
-                   [&](const Broadcast& broadcasting) { broadcast(adu, broadcasting); },
+                   [&](Forward forwarding) { forward(ticket, function, std::move(forwarding)); },
+                   [&](const Broadcast& all) { broadcast(ticket, function, all); },
                },
                decide(adu.unit, adu.pdu, shared_->settings, shared_->units, caller_.reads_only(),
                       caller_.who()));
@@ -231,10 +169,8 @@ void Pipeline::tell_stray(const modbus::Adu& adu) const {
         shared_->stray(caller_.who(), adu.unit, adu.pdu);
 }
 
-void Pipeline::answer(const modbus::Adu& adu, OwnPdu pdu) {
-    if (shared_->own_answers->try_acquire())
-        return replies_.push(adu.transaction, adu.unit, counted(pdu()));
-    const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
+void Pipeline::answer(Ticket ticket, OwnPdu pdu) {
+    if (shared_->own_answers->try_acquire()) return put(ticket, pdu());
     shared_->own_answers->wait([weak = weak_from_this(), ticket, pdu = std::move(pdu)] {
         const auto self = weak.lock();
         if (!self || self->closed_) return false;
@@ -243,28 +179,22 @@ void Pipeline::answer(const modbus::Adu& adu, OwnPdu pdu) {
     });
 }
 
-void Pipeline::refuse(const modbus::Adu& adu, Fault fault) {
-    replies_.push(adu.transaction, adu.unit, counted(exception_reply(adu.pdu[0], fault)));
-}
-
-void Pipeline::forward(const modbus::Adu& adu, Forward forwarding) {
-    if (refusing_waiting_) return refuse(adu, Fault::cancelled);
-    const ReplyQueue::Ticket ticket = open(adu);
+void Pipeline::forward(Ticket ticket, std::uint8_t function, Forward forwarding) {
+    if (refusing_waiting_) return put(ticket, exception_reply(function, Fault::cancelled));
     caller_.transact(forwarding.target.bus, forwarding.target.station,
                      std::move(forwarding.request),
-                     [weak = weak_from_this(), ticket, function = adu.pdu[0]](bus::Answer answer) {
+                     [weak = weak_from_this(), ticket, function](bus::Answer answer) {
                          const auto self = weak.lock();
                          if (self) self->settle(ticket, reply_pdu(function, std::move(answer.pdu)));
                      });
 }
 
-void Pipeline::broadcast(const modbus::Adu& adu, const Broadcast& broadcasting) {
-    if (refusing_waiting_) return refuse(adu, Fault::cancelled);
-    const ReplyQueue::Ticket ticket = open(adu);
+void Pipeline::broadcast(Ticket ticket, std::uint8_t function, const Broadcast& broadcasting) {
+    if (refusing_waiting_) return put(ticket, exception_reply(function, Fault::cancelled));
     const auto outcome = std::make_shared<BroadcastOutcome>();
     outcome->open = broadcasting.lines.size();
     const auto on_answer = [weak = weak_from_this(), outcome, ticket,
-                            function = adu.pdu[0]](bus::Answer answer) {
+                            function](bus::Answer answer) {
         outcome->add(std::move(answer));
         const auto self = weak.lock();
         if (!self || outcome->open != 0) return;
@@ -274,25 +204,38 @@ void Pipeline::broadcast(const modbus::Adu& adu, const Broadcast& broadcasting) 
         caller_.transact(line, 0, broadcasting.request, on_answer);
 }
 
-Bytes Pipeline::counted(Bytes reply) {
+void Pipeline::put(Ticket ticket, std::optional<Bytes> pdu) {
     constexpr auto kBusy = static_cast<std::uint8_t>(modbus::ExceptionCode::server_device_busy);
-    const auto code = modbus::exception_of(reply);
-    if (code) ++shared_->counters.exceptions;
-    if (code == kBusy) ++shared_->counters.busy;
-    return reply;
-}
-
-void Pipeline::settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu) {
-    if (closed_) return;
+    Slot& slot = slots_[static_cast<std::size_t>(ticket - first_)];
+    const modbus::Framing framing = shared_->settings.framing;
     if (pdu) {
-        replies_.settle(ticket, counted(std::move(*pdu)));
+        const auto code = modbus::exception_of(*pdu);
+        if (code) ++shared_->counters.exceptions;
+        if (code == kBusy) ++shared_->counters.busy;
+        if (modbus::is_answered(framing, slot.request.unit))
+            slot.reply =
+                modbus::encode_reply(framing, slot.request.transaction, slot.request.unit, *pdu);
     } else {
         ++shared_->counters.unanswered;
-        replies_.drop(ticket);
     }
+    slot.answered = true;
+    --unanswered_;
+    while (ready_ < started_ && slots_[ready_].answered) ++ready_;
+    skip_silent();
+}
+
+void Pipeline::settle(Ticket ticket, std::optional<Bytes> pdu) {
+    if (closed_) return;
+    put(ticket, std::move(pdu));
     admit();
     if (empty()) joined_ = 0;
     on_answer_();
+}
+
+/// Removes what is answered and has nothing to send from the front.
+void Pipeline::skip_silent() {
+    for (; ready_ > 0 && slots_.front().reply.empty(); --ready_, --started_, ++first_)
+        slots_.pop_front();
 }
 
 void Pipeline::refuse_waiting() {
@@ -301,9 +244,7 @@ void Pipeline::refuse_waiting() {
 }
 
 void Pipeline::close() {
-    if (std::exchange(closed_, true)) return;
-    waiting_.clear();
-    caller_.withdraw();
+    if (!std::exchange(closed_, true)) caller_.withdraw();
 }
 
 }  // namespace panelgate::tcp_server

@@ -29,7 +29,7 @@ namespace panelgate::tcp_server {
 class Session : public std::enable_shared_from_this<Session> {
   public:
     using ClosedHandler = std::function<void(const std::shared_ptr<Session>&)>;
-    /// Finds a place for a client of this address; false: there is none.
+    /// Finds a place for a client of this address; false: no place is left.
     using PlaceHandler = std::function<bool(const boost::asio::ip::tcp::endpoint&)>;
 
     Session(boost::asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,

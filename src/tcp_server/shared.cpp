@@ -26,7 +26,7 @@ void OwnAnswers::begin_period() {
     given_ = 0;
 }
 
-/// A give() may queue another answer; that one waits behind the others.
+/// A give() may queue another answer, which waits behind the answers queued before.
 void OwnAnswers::serve_waiting() {
     begin_period();
     while (!waiting_.empty() && given_ < most_) {

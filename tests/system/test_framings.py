@@ -204,12 +204,11 @@ class Framings(unittest.TestCase):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
             client.settimeout(harness.PATIENCE)
             client.connect(("127.0.0.1", self.port(TCP)))
-            for i in range(150):
+            for i in range(80):  # what a connection may have open
                 client.send(harness.adu(i, 1, harness.read_registers(i)))
-            answers = [client.recv(300) for _ in range(150)]
-        self.assertEqual(sorted(struct.unpack_from(">H", one)[0] for one in answers),
-                         list(range(150)))
-        self.assertTrue(all(one[7:] == b"\x83\x06" or one[7:9] == b"\x03\x02" for one in answers))
+            answers = [client.recv(300) for _ in range(80)]
+        self.assertEqual([struct.unpack_from(">H", one)[0] for one in answers], list(range(80)))
+        self.assertTrue(all(one[7:9] == b"\x03\x02" for one in answers))
         self.assertEqual(self.protocol_errors(), errors)
 
     def test_nobody_answers_a_broadcast(self):

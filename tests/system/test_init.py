@@ -99,7 +99,7 @@ class Init(unittest.TestCase):
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=theirs, text=True)
             seen = ""
             # Those that were quick have been looked at, the others are asked with patience.
-            while (not re.search(r"(?s)looking at.* found: 38400 8N1, station", seen)
+            while (not re.search(r"(?s)looking at.*left at most: 38400 8N1, station", seen)
                    and process.poll() is None):
                 if select.select([ours], [], [], 0.1)[0]:
                     seen += os.read(ours, 4096).decode()

@@ -1,11 +1,9 @@
 """The gateway as a device: unit 255 answers foreign clients like a panel would, and its map is printed
 by `panelgate profiles gateway`."""
-import struct
 import unittest
 
 from pymodbus.client import ModbusTcpClient
 from pymodbus.mei_message import ReadDeviceInformationRequest
-from pymodbus.other_message import ReportSlaveIdRequest
 
 import config
 import harness
@@ -63,22 +61,9 @@ class OwnUnit(unittest.TestCase):
         basic = self.client.execute(ReadDeviceInformationRequest(1, 0, unit=UNIT)).information
         self.assertEqual(basic[0], b"panelgate")
         whole = self.client.execute(ReadDeviceInformationRequest(3, 0, unit=UNIT)).information
-        self.assertEqual({0, 1, 2, 3, 4, 5, 6, 0x80}, set(whole))
+        self.assertEqual({0, 1, 2, 3, 4, 5, 6}, set(whole))
         self.assertEqual(whole[3].decode(), self.program.url("/").replace(
             str(self.program.http_port()), "0"), "as configured")
-        self.assertEqual(whole[0x80], b"floor1")
-        reply = self.client.execute(ReportSlaveIdRequest(unit=UNIT))
-        self.assertTrue(reply.identifier.startswith(b"P\xffpanelgate "), reply.identifier)
-
-    def test_it_counts_as_a_serial_device_does(self):
-        with self.program.client() as client:
-            self.assertEqual(client.ask(UNIT, bytes.fromhex("080000A537")),
-                             bytes.fromhex("080000A537"))
-            before, = struct.unpack(">H", client.ask(UNIT, bytes.fromhex("08000D0000"))[3:])
-            client.ask(UNIT, bytes.fromhex("0600000001"))
-            after, = struct.unpack(">H", client.ask(UNIT, bytes.fromhex("08000D0000"))[3:])
-            self.assertEqual(after - before, 1)
-            self.assertEqual(len(client.ask(UNIT, b"\x0b")), 5)
 
     def test_its_map_is_printed(self):
         printed = harness.run("profiles", "gateway")

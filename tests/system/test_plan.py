@@ -88,39 +88,13 @@ class Check(unittest.TestCase):
             self.assertLess(advice["load_percent"], plan["lines"][0]["load_percent"])
 
     def test_advice_that_is_followed_brings_what_it_says(self):
-        def text(baud=9600, every="60ms"):
-            return config.gateway(config.line(baud=baud, stations=press("press", 31, every)))
-        advice = {re.search(r"baud: \d+|every \w+", one["what"])[0]: one["load_percent"]
-                  for one in self.plan(text(), code=BAD_CONFIG)["lines"][0]["advice"]
-                  if not one["what"].startswith("all")}
-        self.assertEqual(list(advice), ["baud: 19200"])
-        for word, load in advice.items():
-            key, value = word.replace(":", "").split()
-            followed = text(baud=int(value)) if key == "baud" else text(every=value)
-            [line] = self.plan(followed)["lines"]
-            self.assertEqual(line["verdict"], "fine")
-            self.assertAlmostEqual(line["load_percent"], load, 2)
-
-    def test_advice_keeps_a_gap_that_is_set_and_what_is_read_again(self):
-        def text(baud=1200, every=100):
-            stations = (press("press", 31, f"{20 * every}ms") + ", {id: 5, name: mixer, profile: "
-                        f"generic, poll: [{{read: 400001, count: 60, every: {20 * every}ms}}]}}")
-            return config.gateway(
-                config.line(baud=baud, device="tcp://127.0.0.1:9", stations=stations,
-                            timing="{frame_gap: 20ms}"),
-                relays=f"[{{from: press/400101, count: 4, to: mixer/400201, every: {every}ms}}]")
-        [line] = self.plan(text(), code=BAD_CONFIG)["lines"]
-        told = {one["what"]: one["load_percent"] for one in line["advice"]}
-        baud = next(what for what in told if what.startswith("serial"))
-        times = next(what for what in told if what.startswith("all intervals"))
-        loads = list(told.values())
-        self.assertEqual(loads, sorted(loads))
-        [quicker] = self.plan(text(baud=int(re.search(r"\d+", baud)[0])), "--allow-overload")["lines"]
-        self.assertAlmostEqual(quicker["load_percent"], told[baud], 2)
-        factor = float(re.search(r"[\d.]+", times)[0])
-        [rarer] = self.plan(text(every=round(100 * factor)))["lines"]
-        self.assertEqual(rarer["verdict"], "fine")
-        self.assertAlmostEqual(rarer["load_percent"], told[times], 2)
+        def text(baud=9600):
+            return config.gateway(config.line(baud=baud, stations=press("press", 31, "60ms")))
+        [told] = self.plan(text(), code=BAD_CONFIG)["lines"][0]["advice"]
+        self.assertIn("baud: 19200", told["what"])
+        [line] = self.plan(text(baud=19200))["lines"]
+        self.assertEqual(line["verdict"], "fine")
+        self.assertAlmostEqual(line["load_percent"], told["load_percent"], 2)
 
     def test_what_is_too_much_while_values_change_is_told_in_that_figure(self):
         def text(baud):

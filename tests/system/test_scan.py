@@ -115,7 +115,7 @@ class Scan(unittest.TestCase):
             print(f"six addresses: {took:.1f} s", flush=True)
             self.assertLess(took, LIMIT)
             self.assertEqual((shown.returncode, piped.returncode), (0, 0), err)
-            self.assertRegex(err, r"^(panelgate: (\d+ %, about \d+ s left, \d found: 38400 8N1, |found station ).*\n)+$")
+            self.assertRegex(err, r"^(panelgate: (\d found, \d+ questions left at most: 38400 8N1, |found station ).*\n)+$")
             self.check_named(err)
             self.check_table(links["a"], table)
             self.check_progress(drawn)
@@ -133,17 +133,17 @@ class Scan(unittest.TestCase):
         lines = drawn.replace("\x1b[K", "").replace("\n", "").split("\r")
         self.assertLess(max(map(len, lines)), COLUMNS)
         self.check_named(drawn)
-        self.assertRegex(drawn, r"\d+ %, about \d+ s left, \d found: 38400 8N1, station")
+        self.assertRegex(drawn, r"\d found, \d+ questions left at most: 38400 8N1, station")
         self.assertTrue(drawn.endswith("\r\x1b[K"), repr(drawn[-80:]))
-        shares = [int(share) for share in re.findall(r"(\d+) %", drawn)]
-        self.assertGreater(shares[-1], 80)
+        left = [int(count) for count in re.findall(r"(\d+) questions left", drawn)]
+        self.assertLess(left[-1], left[0] / 10)
 
     def check_named(self, told):
         """Each panel, before the scan is at its end."""
         named = re.findall(r"panelgate: found station (\d+): ([\w-]+)", told)
         self.assertEqual({int(address): profile for address, profile in named}, FOUND)
         last = max(found.end() for found in re.finditer("found station", told))
-        self.assertRegex(told[last:], r"\d+ %, about")
+        self.assertRegex(told[last:], r"found, \d+ questions left")
 
     def test_a_quick_scan_ends_with_a_configuration_to_paste(self):
         with simulated(six("a")) as links:

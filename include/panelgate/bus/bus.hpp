@@ -41,13 +41,14 @@ struct TransactionEvent {
 /// A write by any face, once, when it has ended: what an audit records. Valid for the call only.
 struct WriteEnd {
     WhoRef who{};
-    Bytes pdu{};  ///< as asked; what was refused before it was submitted may be anything
+    Bytes pdu{};  ///< as asked; any bytes, if refused before the request was submitted
     std::optional<modbus::Span> items{};  ///< that it writes, if it says so
     bool logged = true;                   ///< false: the gateway's own (relays), only for the audit
     bool transmitted = false;
     arbiter::Transaction transaction = 0;     ///< the last one made for it; 0: none
     std::optional<std::uint8_t> exception{};  ///< the panel's
-    /// What refused it: a rule of `access` by its name, or the label of another Rule; "" nothing.
+    /// The rule that refused the write: of `access` by its name, else the label of its Rule; "":
+    /// the write was not refused.
     std::string rule{};
     bool denied = false;       ///< by a rule of `access`
     std::uint8_t station = 0;  ///< 0: a broadcast
@@ -72,11 +73,29 @@ struct Settings {
     /// True while no write may be sent, as it could not be recorded. May be empty.
     std::function<bool()> refuses_writes{};
     std::shared_ptr<const access::LineRules> access{};  ///< null: everybody may do everything
-    Admit admit{};  ///< what doors say now; empty: what they said. Must not call the bus
+    Admit
+        admit{};  ///< what doors allow now; empty: what doors allowed before. Must not call the bus
+};
+
+struct LineRecords;
+
+/// What a line shows of its records, whether the line is driven or only listened to.
+class RecordedBus : public LineBus {
+  public:
+    void count_denied(std::string_view rule) override;
+    void name_client(ClientId client, std::string name) override;
+    TracePart trace(std::size_t last) const override;
+    TracePart trace_since(std::uint64_t sequence, std::size_t most) const override;
+    std::vector<IncidentHead> incidents() const override;
+    std::optional<Incident> incident(std::uint64_t id) override;
+    bool tells(const WhoRef& who, std::uint8_t station) const override;
+
+  private:
+    virtual LineRecords& records() const = 0;
 };
 
 /// Drives one line with one arbiter. Not thread-safe: use it only on the executor's thread.
-class Bus final : public LineBus {
+class Bus final : public RecordedBus {
   public:
     /// Answers are delivered from the executor's loop. The executor and `clock` outlive the bus.
     Bus(boost::asio::any_io_executor executor, rt::Clock& clock, Settings settings,
@@ -93,7 +112,6 @@ class Bus final : public LineBus {
 
     void transact(Request request, AnswerHandler handler) override;
     void count_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) override;
-    void count_denied(std::string_view rule) override;
     void cancel(ClientId client) override;
     LineStatus status() const override;
     std::vector<ClientShare> clients() const override;
@@ -101,12 +119,6 @@ class Bus final : public LineBus {
     OutcomeCounts outcomes(std::uint8_t station) const override;
     std::optional<Refusal> write_refusal(std::uint8_t station) const override;
     std::optional<Refusal> refusal_of(const Request& request) const override;
-    TracePart trace(std::size_t last) const override;
-    TracePart trace_since(std::uint64_t sequence, std::size_t most) const override;
-    std::vector<IncidentHead> incidents() const override;
-    std::optional<Incident> incident(std::uint64_t id) override;
-    bool tells(const WhoRef& who, std::uint8_t station) const override;
-    void name_client(ClientId client, std::string name) override;
 
     TimePoint clear_at() const override;
     void rest_until(TimePoint until) override;
@@ -115,6 +127,7 @@ class Bus final : public LineBus {
     bool idle() const;
 
   private:
+    LineRecords& records() const override;
     void close();
 
     struct State;

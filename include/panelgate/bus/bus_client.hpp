@@ -171,8 +171,7 @@ class RequestPort {
     virtual void transact(Request request, AnswerHandler handler) = 0;
     /// Returns why transact() would refuse every write to this station (0: every broadcast), if so.
     /// For callers that must know before the write is complete, or before they ask other lines.
-    virtual std::optional<Refusal> write_refusal(std::uint8_t station) const {
-        static_cast<void>(station);
+    virtual std::optional<Refusal> write_refusal(std::uint8_t /*station*/) const {
         return std::nullopt;
     }
     /// Returns why transact() would refuse this request (0: a broadcast), if so: for callers that
@@ -183,21 +182,14 @@ class RequestPort {
     }
     /// Counts (and logs, if it is a write) a request that the caller refused before submitting it:
     /// a PDU that contradicts its function, or a write on a read-only listener.
-    virtual void count_refused(std::uint8_t station, ByteView pdu, const WhoRef& who) {
-        static_cast<void>(station);
-        static_cast<void>(pdu);
-        static_cast<void>(who);
-    }
+    virtual void count_refused(std::uint8_t /*station*/, ByteView /*pdu*/, const WhoRef& /*who*/) {}
     /// Counts what the caller refused by a rule of `access`, without asking the line.
-    virtual void count_denied(std::string_view rule) { static_cast<void>(rule); }
+    virtual void count_denied(std::string_view /*rule*/) {}
     /// Removes a client: its waiting requests are answered Fault::cancelled and never transmitted;
     /// a request on the wire completes and is answered normally.
     virtual void cancel(ClientId client) = 0;
     /// Sets the client's name for clients() and the trace, until cancel(). The last name applies.
-    virtual void name_client(ClientId client, std::string name) {
-        static_cast<void>(client);
-        static_cast<void>(name);
-    }
+    virtual void name_client(ClientId /*client*/, std::string /*name*/) {}
 };
 
 /// What is known of a line: for REST, metrics and the diagnostics unit. Nothing is sent.
@@ -211,32 +203,22 @@ class LineView {
     virtual std::vector<ClientShare> clients() const { return {}; }
     virtual StationStatus station_status(std::uint8_t station) const = 0;
     /// Returns the outcomes of all requests to a listed station.
-    virtual OutcomeCounts outcomes(std::uint8_t station) const {
-        static_cast<void>(station);
-        return {};
-    }
+    virtual OutcomeCounts outcomes(std::uint8_t /*station*/) const { return {}; }
     /// Returns the last frames, decisions and finished transactions, oldest first, at most `last`
     /// of each.
     virtual TracePart trace(std::size_t last) const = 0;
     /// Returns the first entries after this sequence number, oldest first, at most `most` of each.
-    virtual TracePart trace_since(std::uint64_t sequence, std::size_t most) const {
-        static_cast<void>(sequence);
-        static_cast<void>(most);
+    virtual TracePart trace_since(std::uint64_t /*sequence*/, std::size_t /*most*/) const {
         return {};
     }
     /// Returns the recorded incidents, oldest first, at most IncidentSettings::incidents.
     virtual std::vector<IncidentHead> incidents() const { return {}; }
     /// Returns an incident and marks it as read; nullopt if the incident is not recorded.
-    virtual std::optional<Incident> incident(std::uint64_t id) {
-        static_cast<void>(id);
+    virtual std::optional<Incident> incident(std::uint64_t /*id*/) {
         return std::nullopt;
     }
     /// True if `who` may read something of this station (0: of the line), by the rules of `access`.
-    virtual bool tells(const WhoRef& who, std::uint8_t station) const {
-        static_cast<void>(who);
-        static_cast<void>(station);
-        return true;
-    }
+    virtual bool tells(const WhoRef& /*who*/, std::uint8_t /*station*/) const { return true; }
 };
 
 /// Both. A bus lives as long as the program's io_context runs, and outlives its clients.
@@ -261,7 +243,7 @@ class LineBus : public BusClient {
     /// Returns when no request sent on this wire can still be answered (P1).
     virtual TimePoint clear_at() const { return {}; }
     /// Sends no request before `until`.
-    virtual void rest_until(TimePoint until) { static_cast<void>(until); }
+    virtual void rest_until(TimePoint /*until*/) {}
     virtual LineReport report() const = 0;
 };
 

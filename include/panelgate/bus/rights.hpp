@@ -92,7 +92,8 @@ struct Refusal {
     /// the role that lacks a right.
     std::string why{};
     std::string_view lacking{};  ///< the right that a role lacks; empty: something else refuses
-    std::string_view door{};     ///< why its door lets it in no more, a clause; empty: it does
+    std::string_view
+        door{};  ///< why the door lets the client in no more, a clause; empty: the door does
 
     friend bool operator==(const Refusal&, const Refusal&) = default;
 };
@@ -108,7 +109,8 @@ struct Admission {
     std::string_view rule{};  ///< what keeps him out: "token", "allow", "access"; empty: his role
     std::string_view why{};   ///< a clause for the user
 };
-/// What somebody may do at a station, 0 all of them. Nothing: what he could when he came in.
+/// What a client may do at a station (0: at all stations). nullopt: as much as when the client came
+/// in.
 using Admit = std::function<std::optional<Admission>(const WhoRef&, std::uint8_t station)>;
 
 /// Returns why the door would not let this request in any more, if so.

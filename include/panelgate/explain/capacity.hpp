@@ -2,20 +2,20 @@
 
 #include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "panelgate/config/config.hpp"
-#include "panelgate/plan/advice.hpp"
 #include "panelgate/plan/line_plan.hpp"
 
 namespace panelgate::explain {
 
-/// The planned load of a line, and advice where it is too high.
+/// The planned load of a line, and what helps where it is too high.
 struct Capacity {
     plan::Line line;
     plan::LinePlan plan;
-    std::vector<plan::Advice> advice;
+    std::optional<plan::Advice> advice;
     std::vector<std::string> warnings;  ///< about requests that cannot work at any load
 };
 
@@ -23,7 +23,7 @@ struct Capacity {
 /// that is only listened to has no load of ours.
 std::vector<Capacity> capacities(const config::Config& config);
 
-/// "line floor1 is planned to be busy for 93 % …; …": the overload and the best advice.
+/// "line floor1 is planned to be busy for 93 % …; …": the overload and what helps.
 std::string overload_text(const Capacity& capacity);
 /// The plan of one line as text, several lines long.
 std::string plan_text(const Capacity& capacity);

@@ -82,7 +82,7 @@ class BrokerDesk {
         std::make_shared<std::atomic<std::size_t>>(0);  ///< refusals on their way to the session
     mqtt::Counters counters_;                           ///< of writes, and of earlier sessions
     mqtt::Client client_;
-    std::unique_ptr<mqtt::GracefulClose> closing_;
+    std::shared_ptr<mqtt::GracefulClose> closing_;
 };
 
 }  // namespace panelgate::gateway

@@ -13,26 +13,11 @@
 
 namespace panelgate::mqtt {
 
-class Connection;
-
-/// Closes a connection gracefully: sends what is queued, then keeps the socket until the broker has
-/// closed it. Closing a socket the broker still writes to would reset the connection and lose what
-/// the broker has not read yet, including the farewell.
+/// A connection that is being closed gracefully: it is closed at once when this ends.
 class GracefulClose {
   public:
-    /// Owns the socket; closes it after `within` at the latest. The clock must outlive this.
-    GracefulClose(boost::asio::any_io_executor executor, int socket, rt::Clock& clock,
-                  std::shared_ptr<Connection> connection, Duration within);
-    /// Closes it.
-    ~GracefulClose();
-    GracefulClose(const GracefulClose&) = delete;
-    GracefulClose& operator=(const GracefulClose&) = delete;
-
-    bool done() const;
-
-  private:
-    struct State;
-    std::shared_ptr<State> state_;
+    virtual ~GracefulClose() = default;
+    virtual bool done() const = 0;
 };
 
 /// Publishes the publisher's messages and reconnects forever. Unacknowledged messages of a lost
@@ -52,7 +37,7 @@ class Client {
     void start();
     /// Disconnects from the broker; the returned object keeps the connection until that is done.
     /// Null if not connected.
-    std::unique_ptr<GracefulClose> stop();
+    std::shared_ptr<GracefulClose> stop();
     /// Must be called when the publisher has new messages.
     void wake();
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -15,36 +16,53 @@
 
 namespace panelgate::mqtt {
 
-/// A queue of messages, each resent until the broker acknowledges it, in order, with a number range
-/// of its own. Pure.
+/// A queue of entries, each sent again until the broker acknowledges it, in order. When full, the
+/// oldest waiting entry is dropped and counted. Pure.
+template <class Entry>
 class Kept {
   public:
-    using Numbered = std::map<std::uint64_t, Message>;
+    using Numbered = std::map<std::uint64_t, Entry>;
 
-    /// `first`: the lowest number of its exclusive range.
-    explicit Kept(std::uint64_t first) : first_(first), free_(first), next_(first) {}
+    /// `first`: the lowest number of its exclusive range. `limit`: in entries, more than are ever
+    /// in flight.
+    explicit Kept(std::uint64_t first, std::size_t limit = std::numeric_limits<std::size_t>::max())
+        : first_(first), free_(first), next_(first), limit_(limit) {}
 
-    void add(Message message) { messages_.emplace(free_++, std::move(message)); }
-    /// Returns the next message and marks it as in flight.
-    std::optional<Numbered::value_type> next() {
-        const auto found = messages_.lower_bound(next_);
-        if (found == messages_.end()) return std::nullopt;
-        next_ = found->first + 1;
-        return *found;
+    void add(Entry entry) {
+        const auto waits = entries_.lower_bound(next_);
+        if (entries_.size() >= limit_ && waits != entries_.end()) {
+            entries_.erase(waits);
+            ++dropped_;
+        }
+        entries_.emplace_hint(entries_.end(), free_++, std::move(entry));
     }
-    /// Unknown numbers are ignored.
-    void delivered(std::uint64_t number) { messages_.erase(number); }
-    /// Messages in flight must be sent again.
+    /// Returns the next entry and marks it as in flight; null if none waits.
+    const typename Numbered::value_type* next() {
+        const auto found = entries_.lower_bound(next_);
+        if (found == entries_.end()) return nullptr;
+        next_ = found->first + 1;
+        return &*found;
+    }
+    /// The broker has acknowledged it, or it need not be sent. Numbers of others are ignored.
+    void delivered(std::uint64_t number) {
+        if (number < next_) entries_.erase(number);
+    }
+    /// Entries in flight must be sent again.
     void lost() { next_ = first_; }
 
-    std::size_t size() const { return messages_.size(); }
-    const Numbered& messages() const { return messages_; }
+    std::size_t size() const { return entries_.size(); }
+    const Numbered& entries() const { return entries_; }
+    std::uint64_t dropped() const { return dropped_; }
+    /// Returns the number of the next entry added.
+    std::uint64_t next_number() const { return free_; }
 
   private:
     std::uint64_t first_;
     std::uint64_t free_;
     std::uint64_t next_;  ///< lower ones are in flight
-    Numbered messages_;
+    std::size_t limit_;
+    std::uint64_t dropped_ = 0;
+    Numbered entries_;
 };
 
 /// Decides what to send to the broker next: births, then the changes made while the broker was
@@ -106,21 +124,22 @@ class Publisher {
     }
     std::string topic_of(std::size_t point) const { return format_->topic_of(point); }
 
-    const Store& store() const { return store_; }
+    const Kept<Change>& store() const { return store_; }
 
   private:
     std::optional<Message> next_before(WallTime now);
     std::optional<Message> next_behind();
+    void change(std::size_t subject, State state);
     void clear_stale_topics(const Publisher& before);
 
     Settings settings_;
     std::unique_ptr<const Subjects> subjects_;  ///< referenced by format_
     std::unique_ptr<MessageFormat> format_;
     States states_;
-    Store store_;
-    Kept results_;
+    Kept<Change> store_;
+    Kept<Message> results_;
     std::uint64_t results_dropped_ = 0;
-    Kept cleared_;  ///< topics to clear
+    Kept<Message> cleared_;  ///< topics to clear
     bool connected_ = false;
     bool again_ = false;      ///< a rebirth follows this one
     std::size_t before_ = 0;  ///< birth steps done

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "panelgate/base/network.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/tls/settings.hpp"
 
@@ -16,8 +17,8 @@ inline std::string_view label(Format format) {
     return format == Format::json ? "json" : "sparkplug";
 }
 
-/// The contents of `ca`, `certificate` and `key`. Others make no other session: they are for its
-/// next connection.
+/// The contents of `ca`, `certificate` and `key`. Changed contents leave the session as it is: they
+/// count for the session's next connection.
 struct Files : tls::Material {
     friend bool operator==(const Files&, const Files&) { return true; }
 };
@@ -55,10 +56,19 @@ struct Settings {
     Files files{};
 
     /// Its files, as those of a client.
-    tls::Settings client() const;
+    tls::Settings client() const {
+        tls::Settings made;
+        made.ca = ca;
+        made.certificate = certificate;
+        made.key = key;
+        made.material = files;
+        return made;
+    }
 
     /// Returns "mqtt://HOST:PORT" or "mqtts://HOST:PORT".
-    std::string broker() const;
+    std::string broker() const {
+        return (tls ? "mqtts://" : "mqtt://") + endpoint_text(host, port);
+    }
     friend bool operator==(const Settings&, const Settings&) = default;
 };
 

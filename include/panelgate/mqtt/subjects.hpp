@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -90,41 +89,6 @@ struct Change {
     std::uint64_t number = 0;  ///< increasing
     std::size_t subject = 0;
     State state{};
-};
-
-/// The changes not acknowledged by the broker, in order: first those sent, then those waiting. When
-/// full, the oldest waiting one is dropped and counted. Pure.
-class Store {
-  public:
-    /// `limit`: in changes; more than the in-flight limit.
-    explicit Store(std::size_t limit) : limit_(limit) {}
-
-    void add(std::size_t subject, State state);
-    /// Returns the next change to send, null if none waits. Valid until sent() or skip().
-    const Change* next() const;
-    void sent();
-    /// Drops next() without sending it.
-    void skip();
-    /// The broker has acknowledged it; unknown numbers are ignored.
-    void delivered(std::uint64_t number);
-    /// Unacknowledged changes must be sent again.
-    void lost() { sent_ = 0; }
-
-    const std::deque<Change>& changes() const { return changes_; }
-    std::size_t size() const { return changes_.size(); }
-    std::size_t in_flight() const { return sent_; }
-    std::uint64_t dropped() const { return dropped_; }
-    /// Returns the number of the next change added.
-    std::uint64_t next_number() const { return next_number_; }
-
-  private:
-    void erase(std::size_t place);
-
-    std::size_t limit_;
-    std::deque<Change> changes_;
-    std::size_t sent_ = 0;
-    std::uint64_t dropped_ = 0;
-    std::uint64_t next_number_ = 1;
 };
 
 /// A point write requested through the broker.

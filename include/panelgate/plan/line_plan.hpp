@@ -34,13 +34,14 @@ struct Station {
     bool repeats = true;
     /// Silence after its replies, if configured; nullopt: from the serial format and the profile.
     std::optional<Duration> frame_gap;
-    Duration station_gap{};  ///< rest of the station behind its reply, in which others are asked
+    Duration
+        station_gap{};  ///< rest of the station behind a reply; other stations are asked meanwhile
     Duration after_write{};  ///< the same behind a write
     std::vector<PolledItem> asked;
     points::SharedMemory memory{};  ///< decides what is read again after a write
 };
 
-/// A relay's part on one line. `from` and `to`: its endpoints on this line, at least one.
+/// A relay's part on one line. `from` and `to`: the relay's ends on this line, at least one end.
 struct Relay {
     struct End {
         std::size_t station = 0;  ///< index into Line::stations
@@ -56,8 +57,6 @@ struct Relay {
 
     /// Returns the longest interval between writes.
     Duration writes_every() const { return refresh ? std::max(every, *refresh) : every; }
-    /// True if `other` is known, on this line, to continue where this relay ends.
-    bool continues_in(const Relay& other) const;
 };
 
 /// The static data of a line.
@@ -70,12 +69,6 @@ struct Line {
     bool listens = false;    ///< listen mode: nothing is sent
 };
 
-/// Returns the silence after the station's replies.
-Duration gap_of(const Line& line, const Station& station);
-/// Returns the limits and costs of the station's reads on this line.
-points::PlanLimits limits_of(const Line& line, const Station& station);
-/// Returns the line at another rate. Configured gaps stay.
-Line at_rate(const Line& line, int baud);
 /// Returns the line with every interval multiplied by `times` (above 0), up to points::kSlowest;
 /// `refresh` stays.
 Line at_intervals(const Line& line, double times);
@@ -92,7 +85,6 @@ struct Poll {
     std::string station;
     std::string read;  ///< first item in the panel's notation
     std::uint32_t count = 1;
-    std::vector<std::size_t> asked;  ///< indices into Station::asked of what it serves
     Duration every{};
     Duration wire{};  ///< request, both gaps, think time, reply
     double load = 0;
@@ -133,9 +125,9 @@ struct LinePlan {
     Duration client_read = 1ms;   ///< of kClientRead registers, from the slowest station
 
     /// Returns the share of time left for clients.
-    double free_share() const;
+    double free_share() const { return listens ? 0 : std::max(0.0, kFull - load); }
     /// Returns the reads of kClientRead registers per second that fit into the time left.
-    double free_reads() const;
+    double free_reads() const { return free_share() / to_seconds(client_read); }
 };
 
 enum class Verdict : std::uint8_t { fine, high, overload };
@@ -156,11 +148,22 @@ struct HighestRate {
 /// intervals; a relay's refresh stays. nullopt for an idle line. `plan` is the line's plan.
 std::optional<HighestRate> highest_rate(const Line& line, const LinePlan& plan);
 
-/// Rounds up to a round number of milliseconds with at most two significant digits.
-inline Duration rounded_up(Duration duration) {
-    Duration unit = 1ms;
-    while (duration > 20 * unit) unit *= 10;
-    return (duration + unit - Duration(1)) / unit * unit;
-}
+/// A change that makes a line fine.
+struct Advice {
+    std::string what;  ///< "serial: {baud: 38400} (of all panels, too)"
+    double load = 0;   ///< the line's load after the change
+    double most = 0;   ///< … with all values changing that relays wait for
+};
+
+/// Returns what helps a line that is not fine: the next rate that all panels have and that is
+/// enough, else longer intervals; nullopt for a line that is fine, or where neither helps. `plan`
+/// is the line's plan.
+std::optional<Advice> advise(const Line& line, const LinePlan& plan);
+
+/// Returns warnings of what fails even on an idle line, with the remedy: panels whose planned reply
+/// comes after their timeout, panels that rest for longer than their polls and relays allow, and a
+/// request so long that, with one other before it, it misses the queue's deadline. `plan` is the
+/// line's plan.
+std::vector<std::string> warnings(const Line& line, const LinePlan& plan);
 
 }  // namespace panelgate::plan

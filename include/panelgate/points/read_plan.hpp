@@ -35,9 +35,6 @@ struct PlanLimits {
     Duration gap = 1750us;      ///< silence after the reply
     Duration think_time = 1ms;  ///< the panel's, after the silence that ends the request
     std::array<TableLimits, modbus::kTables.size()> tables;  ///< by modbus::Table
-    /// Learned from exceptions 02 and 03: no read may contain one of these spans whole. The caller
-    /// limits their number.
-    std::vector<modbus::Span> refused;
 
     TableLimits& of(modbus::Table table) { return tables[static_cast<std::size_t>(table)]; }
     const TableLimits& of(modbus::Table table) const {
@@ -57,8 +54,6 @@ struct PlannedRead {
     modbus::Span span;
     Duration every{};                ///< shortest interval of its wants
     std::vector<std::size_t> wants;  ///< indices of the wants it serves, ascending
-    /// One of its wants contains a refused span: expect an exception.
-    bool refused = false;
 };
 
 /// Returns how long a read of `count` items occupies the line: request, the silence that ends it,
@@ -72,11 +67,10 @@ Duration write_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t
 /// equal, the wire time is minimal. Otherwise it is the better of two plans (one interval after
 /// another, then joined if that costs no more per second; or all at once), which is rarely above
 /// the minimum. A want lies whole in one read; a want larger than the maximum read is cut into
-/// several. Every item of a read is in a want or readable by the profile. A read contains a refused
-/// span only if it is exactly one want (or a piece of a cut one), with `refused` set. A want may be
-/// served by a read with a shorter interval that contains it. Invalid wants, and wants in
-/// unreadable tables, are not planned. Complexity: O(n log n + n * max_items), a few milliseconds
-/// for thousands of points.
+/// several. Every item of a read is in a want or readable by the profile. A want may be served by a
+/// read with a shorter interval that contains it. Invalid wants, and wants in unreadable tables,
+/// are not planned. Complexity: O(n log n + n * max_items), a few milliseconds for thousands of
+/// points.
 std::vector<PlannedRead> plan_reads(std::span<const Want> wants, const PlanLimits& limits);
 
 /// Splits a read after exception 02 or 03 into two that share its wants, cut at the widest hole, or
@@ -84,32 +78,5 @@ std::vector<PlannedRead> plan_reads(std::span<const Want> wants, const PlanLimit
 /// this span itself. `wants`: those that the plan was made from.
 std::optional<std::pair<PlannedRead, PlannedRead>> bisect(const PlannedRead& read,
                                                           std::span<const Want> wants);
-
-/// If both halves of a split read succeed, the panel refuses something between them: returns the
-/// smallest span that no read may contain then. nullopt if the halves overlap: then only the split
-/// read itself is known to be refused.
-std::optional<modbus::Span> refused_between(const PlannedRead& left, const PlannedRead& right);
-
-/// True if the want is valid, as Want requires.
-bool is_plannable(const Want& want);
-
-/// How far reads of one table may extend, given readable areas, wants and refused spans.
-class TableMap {
-  public:
-    TableMap(std::span<const Want> wants, const PlanLimits& limits, modbus::Table table);
-
-    /// Returns the maximum end (one past the last item) of a read from `first`, which must be
-    /// wanted or readable. Less than a want's end if the want contains a refused span.
-    std::uint32_t reach(std::uint32_t first) const;
-
-  private:
-    struct Piece {
-        std::uint32_t first = 0;
-        std::uint32_t end = 0;
-    };
-    std::uint32_t max_items_;
-    std::vector<Piece> open_;     ///< disjoint, ascending, never adjacent
-    std::vector<Piece> refused_;  ///< ascending; `end` is the minimum of its own and all following
-};
 
 }  // namespace panelgate::points

@@ -19,12 +19,6 @@
 
 namespace panelgate::points {
 
-/// Turns that an entry did not get. Each turn counts once.
-struct ScheduleCounters {
-    std::uint64_t skipped = 0;  ///< the entry was still in progress
-    std::uint64_t missed = 0;   ///< take_due() came so late that the next turn was due as well
-};
-
 /// Schedules the entries of a plan. Entry i has turns at phase + n * interval after the start:
 /// there is no drift, and after a stall an entry is due once, not once per lost turn. Entries of
 /// the same interval are spread evenly over it, and intervals that divide each other do not
@@ -32,9 +26,8 @@ struct ScheduleCounters {
 class PollSchedule {
   public:
     struct Settings {
-        std::size_t max_outstanding = 1;  ///< entries in progress at once; 0 means 1
-        /// Every entry gets its first turn within this time, spread evenly, so that slow ones have
-        /// a value soon.
+        /// Every entry gets its first turn within this time, spread evenly, so that slow entries
+        /// have a value soon.
         Duration first_within = 1s;
         /// Limits of extra turns (request_extra_turn): a burst, then one per interval.
         std::size_t extra_burst = 16;
@@ -44,12 +37,11 @@ class PollSchedule {
 
     PollSchedule(std::span<const Duration> intervals, TimePoint start, const Settings& settings);
 
-    /// Returns when to call take_due() next. nullopt if there are no entries, or if max_outstanding
-    /// are in progress (on_done() comes first).
+    /// Returns when to call take_due() next. nullopt if there are no entries, or if one is in
+    /// progress (on_done() comes first).
     std::optional<TimePoint> next_due() const;
-    /// Returns the entries to start now, the longest due first; they are in progress until
-    /// on_done(). Entries beyond max_outstanding stay due.
-    std::vector<std::size_t> take_due(TimePoint now);
+    /// Returns the entry to start now, the longest due first; it is in progress until on_done().
+    std::optional<std::size_t> take_due(TimePoint now);
     /// Requests an extra turn now, as soon as the limits allow and after earlier requests; the next
     /// regular turn counts if it comes first. Ignored while the entry is in progress.
     void request_extra_turn(std::size_t entry, TimePoint now);
@@ -59,28 +51,23 @@ class PollSchedule {
     /// Ends an entry, successful or not. Ignored if it is not in progress.
     void on_done(std::size_t entry, TimePoint now);
 
-    std::size_t outstanding() const { return outstanding_; }
-    const ScheduleCounters& counters() const { return counters_; }
-
   private:
     struct Entry {
         Duration every{};
         Duration phase{};
         TimePoint due;
-        bool under_way = false;
         bool is_extra = false;  ///< its next turn is an extra one
     };
     void set_phases(std::span<const Duration> intervals);
-    std::uint64_t advance(std::size_t index, TimePoint now);
+    void advance(std::size_t index, TimePoint now);
 
     TimePoint start_;
     Settings settings_;
     std::vector<Entry> entries_;
     std::set<std::pair<TimePoint, std::size_t>> queue_;  ///< all entries by their next turn
-    std::size_t outstanding_ = 0;
+    std::optional<std::size_t> under_way_;
     TimePoint extra_free_;  ///< when the whole burst is available again
     TimePoint last_extra_;
-    ScheduleCounters counters_;
 };
 
 /// The current reading of a want.
@@ -99,6 +86,9 @@ struct Reading {
     bool outdated() const { return sampled && written && *sampled < *written; }
 };
 
+/// Returns the items of a good reply to a read of these; bits as 0 and 1.
+std::vector<std::uint16_t> items_of(const modbus::Span& span, ByteView reply);
+
 enum class Quality : std::uint8_t { good, stale, bad };
 std::string_view label(Quality quality);
 /// Good: read within two intervals, not written since, and the last attempt succeeded. Bad: never
@@ -114,8 +104,8 @@ void adopt_readings(const std::vector<Want>& wants, std::vector<Reading>& readin
 
 /// How the tables of a panel show the same memory.
 struct SharedMemory {
-    /// Returns everything that a write of these items changes; empty: it may change all other
-    /// tables.
+    /// Returns everything that a write of these items changes. Empty: the write may change all
+    /// other tables.
     std::function<std::vector<modbus::Span>(const modbus::Span&)> shown_as;
     /// False: the panel may share more memory than this.
     bool known = true;
@@ -148,7 +138,7 @@ class StationPolls {
     void adopt(const StationPolls& before);
     void apply(SharedMemory memory) { memory_ = std::move(memory); }
 
-    std::vector<Due> take_due(TimePoint now);
+    std::optional<Due> take_due(TimePoint now);
     std::optional<TimePoint> next_due() const { return schedule_.next_due(); }
     /// `sampled`: when the request was sent. Returns the wants of this read. A read refused with 02
     /// or 03 is split until the missing item is read alone.
@@ -167,7 +157,6 @@ class StationPolls {
     /// All readings, in the order of the wants.
     const std::vector<Reading>& readings() const { return readings_; }
     const std::vector<PlannedRead>& plan() const { return plan_; }
-    const ScheduleCounters& counters() const { return schedule_.counters(); }
 
   private:
     bool store(const PlannedRead& read, ByteView reply, TimePoint sampled);

@@ -37,7 +37,7 @@ class Discovery {
         silent,
         damaged,
         unsent,   ///< the line could not send it: it is asked again
-        refused,  ///< the line refuses this address now: it is asked again after the others
+        refused,  ///< the line refuses this address now: the address is asked again later
     };
     struct Answer {
         Reply reply = Reply::silent;

@@ -80,16 +80,6 @@ class ReadRequest {
     modbus::CrcOrder order_;
 };
 
-struct Progress {
-    double share = 0;      ///< 0 to 1
-    Duration remaining{};  ///< an estimate; an upper bound until a station has answered
-    std::string what;      ///< "38400 8N1, station 17"
-    std::size_t found = 0;
-};
-
-/// Returns one line without line end, at most `width` characters.
-std::string format_progress(const Progress& progress, std::size_t width);
-
 /// Returns the table: "DEVICE: 38400 8N1, 6 stations", then a row per station. A non-empty `ending`
 /// is added to the first line in parentheses.
 std::string report_text(const std::string& device, const Result& result,
@@ -99,6 +89,9 @@ std::string report_text(const std::string& device, const Result& result,
 /// an absolute path or tcp://HOST:PORT; `profiles_dir` is empty or an absolute path.
 std::string report_yaml(const std::string& device, const Result& result,
                         const std::string& profiles_dir = {});
+
+/// Returns the line `serial:` of that configuration, indented, with a comment where it is supposed.
+std::string serial_yaml(const Result& result);
 
 /// Returns the entries of these stations only, for the `stations:` of the named line.
 std::string stations_yaml(const std::string& line, const std::vector<StationFinding>& stations);

@@ -17,7 +17,7 @@ struct Counters {
     std::uint64_t exceptions = 0;  ///< sent, including those from panels
     std::uint64_t busy = 0;        ///< exceptions 06
     std::uint64_t unanswered = 0;  ///< requests without a reply: unit 0 where broadcasts are silent
-    std::uint64_t refused = 0;     ///< connections: limit reached and none gives way
+    std::uint64_t refused = 0;     ///< connections and datagrams: full, and none gives way
     std::uint64_t evicted = 0;     ///< connections closed for newer ones (find_place())
     tls::Counters tls{};
 };

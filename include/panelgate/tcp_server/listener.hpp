@@ -58,4 +58,7 @@ class Listener {
     std::shared_ptr<Core> core_;
 };
 
+/// Returns a human-readable register map of the gateway's own unit, ending with a newline.
+std::string describe_register_map();
+
 }  // namespace panelgate::tcp_server

@@ -44,9 +44,6 @@ struct Settings {
     bool udp = false;
     /// Ports with outstanding requests; at most half of max_connections, whatever this says.
     std::size_t udp_peers_per_address = 16;
-    Duration udp_idle = 1min;  ///< then a UDP peer is dropped
-    /// Datagrams over the limit queued for an exception 06 (own_answers); more are dropped.
-    std::size_t udp_busy_answers = 256;
     std::optional<std::uint8_t> diagnostics_unit = 255;
     bool read_only = false;
     std::vector<Network> allow;  ///< empty: all

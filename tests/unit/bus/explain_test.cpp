@@ -1,4 +1,4 @@
-#include "explain.hpp"
+#include "client_names.hpp"
 
 #include <gtest/gtest.h>
 

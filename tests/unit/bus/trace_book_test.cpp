@@ -124,7 +124,7 @@ TEST(TraceStore, TellsATransactionWithItsFrames) {
     line.end();
     line.add(FrameKind::late, "12 03 02 00 09"_hex);
     line.begin("12 06 00 00 00 01"_hex);
-    const auto all = line.store.transactions(9);
+    const auto all = line.store.part(9).transactions;
     ASSERT_EQ(all.size(), 1u) << "the other one is still open";
     EXPECT_EQ(all[0].request, kRequest);
     EXPECT_EQ(all[0].reply, kAnswer);
@@ -140,25 +140,25 @@ TEST(TraceStore, TellsATransactionWithItsFrames) {
 TEST(TraceStore, PagesTransactionsByTheirEnds) {
     Line line(kSmall, 3);
     line.begin(kRequest);
-    EXPECT_EQ(ids(line.store.transactions_since(0, 9)), "1 2 3");
-    EXPECT_EQ(ids(line.store.transactions_since(3, 9)), "2 3");
-    EXPECT_EQ(ids(line.store.transactions_since(3, 1)), "2");
-    EXPECT_EQ(ids(line.store.transactions_since(9, 9)), "");
-    EXPECT_EQ(ids(line.store.transactions(2)), "2 3");
+    EXPECT_EQ(ids(line.store.part_since(0, 9).transactions), "1 2 3");
+    EXPECT_EQ(ids(line.store.part_since(3, 9).transactions), "2 3");
+    EXPECT_EQ(ids(line.store.part_since(3, 1).transactions), "2");
+    EXPECT_EQ(ids(line.store.part_since(9, 9).transactions), "");
+    EXPECT_EQ(ids(line.store.part(2).transactions), "2 3");
     line.end();
-    EXPECT_EQ(ids(line.store.transactions_since(9, 9)), "4");
+    EXPECT_EQ(ids(line.store.part_since(9, 9).transactions), "4");
 }
 
 TEST(TraceStore, ForgetsATransactionWithItsRequest) {
     const Line line({8, 100, 4, 64, 64}, 7);  // bytes for five exchanges of eleven bytes
-    const auto all = line.store.transactions(9);
+    const auto all = line.store.part(9).transactions;
     EXPECT_EQ(ids(all), "3 4 5 6 7");
     for (const TraceTransaction& one : all) {
         EXPECT_EQ(one.request, kRequest);
         EXPECT_EQ(one.reply, kAnswer);
     }
     const Line few({8, 4, 4, 6400, 64}, 7);  // frames for two exchanges
-    EXPECT_EQ(ids(few.store.transactions(9)), "6 7");
+    EXPECT_EQ(ids(few.store.part(9).transactions), "6 7");
 }
 
 TEST(TraceStore, FindsATransactionByItsNumber) {
@@ -177,11 +177,11 @@ TEST(TraceStore, KeepsDecisionsAsLongAsTheirTextsFit) {
     TraceStore store({4, 10, 4, 64, 16});
     for (std::uint64_t i = 1; i <= 3; ++i)
         store.add(RecordedDecision{i, {}, {}}, "decision " + std::to_string(i));
-    const auto decisions = store.decisions(9);
+    const auto decisions = store.part(9).decisions;
     ASSERT_EQ(decisions.size(), 1u);
     EXPECT_EQ(decisions[0].text, "decision 3");
-    EXPECT_EQ(store.decisions_since(2, 9).size(), 1u);
-    EXPECT_TRUE(store.decisions_since(3, 9).empty());
+    EXPECT_EQ(store.part_since(2, 9).decisions.size(), 1u);
+    EXPECT_TRUE(store.part_since(3, 9).decisions.empty());
 }
 
 TEST(TraceStore, CopiesWhatFollowsANumber) {

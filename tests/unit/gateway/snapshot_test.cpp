@@ -55,9 +55,9 @@ class SnapshotTest : public testing::Test {
     void poll() {
         while (points::quality_of(polls->reading(0), 1s, now) != points::Quality::good) {
             now = std::max(now, *polls->next_due());
-            for (const auto& due : polls->take_due(now)) {
+            while (const auto due = polls->take_due(now)) {
                 Bytes reply = Writer().u8(3).u8(2).u16(215).take();
-                polls->on_answer(now, due.read, Result<Bytes>(std::move(reply)), now);
+                polls->on_answer(now, due->read, Result<Bytes>(std::move(reply)), now);
             }
         }
     }

@@ -81,62 +81,46 @@ TEST(MbusdConf, SaysWhatHasNoCounterpartInCommentsAndNotes) {
         "pause = 100\ntimeout = 60\nlogfile = /var/log/\xe9.log\ntrx_control = sysfs_1\n"
         "trx_sysfile = /sys/class/gpio/gpio5/value\nretries = 15\n");
     EXPECT_EQ(load(imported).lines[0].arbiter.unlisted.retries, 10);
-    ASSERT_EQ(imported.notes.size(), 6U);
+    ASSERT_EQ(imported.notes.size(), 5U);
     EXPECT_THAT(imported.notes[0], testing::StartsWith("mbusd.conf:1: pause = 100: between two"));
     EXPECT_THAT(imported.notes[2], HasSubstr("/var/log/?.log: the log goes to standard error"));
     for (const std::string& note : imported.notes)
         EXPECT_THAT(imported.yaml, HasSubstr("\n# " + note.substr(note.find(": ") + 2) + '\n'));
 }
 
-TEST(MbusdConf, NotesRtsThatTheDriverAlreadySwitchesInEitherOrder) {
+TEST(MbusdConf, ADriverThatSwitchesWinsOverRts) {
     const std::string rts = "trx_control = rts_0\n";
     const std::string kernel = "enable_rs485 = yes\n";
-    for (const std::string& text : {rts + kernel, kernel + rts}) {
-        const Imported imported = imported_of(text);
-        EXPECT_EQ(rs485_of(imported), Rs485::kernel) << text;
-        ASSERT_EQ(imported.notes.size(), 1U) << text;
-        EXPECT_THAT(imported.notes[0], HasSubstr("trx_control = rts_0: with enable_rs485 the"));
-        EXPECT_THAT(imported.notes[0], HasSubstr("{mode: rts, rts_on_send: low}"));
-    }
-    const Imported off = imported_of("enable_rs485 = no\n" + rts);
-    EXPECT_EQ(rs485_of(off), Rs485::rts);
-    EXPECT_THAT(off.notes, IsEmpty());
+    for (const std::string& text : {rts + kernel, kernel + rts})
+        EXPECT_EQ(rs485_of(imported_of(text)), Rs485::kernel) << text;
+    EXPECT_EQ(rs485_of(imported_of("enable_rs485 = no\n" + rts)), Rs485::rts);
 }
 
-TEST(MbusdConf, OfARepeatedSettingTheLastCountsAndTheFirstIsReported) {
+TEST(MbusdConf, OfARepeatedSettingTheLastCounts) {
     const Imported imported =
         imported_of("speed = 9600\ntrx_control = rts\nspeed = 38400\ntrx_control = addc\n");
     const Line line = load(imported).lines[0];
     EXPECT_EQ(line.device.serial.baud, 38400);
     EXPECT_EQ(line.device.rs485.mode, Rs485::off);
-    EXPECT_THAT(imported.notes,
-                ElementsAre("mbusd.conf:1: speed = 9600: line 3 sets it again, and that one counts",
-                            "mbusd.conf:2: trx_control = rts: line 4 sets it again, and that one "
-                            "counts"));
 }
 
 TEST(MbusdConf, AdvisesNothingWhereNothingIsLost) {
     EXPECT_THAT(imported_of("pause = 0\ntimeout = 0\n").notes, IsEmpty());
-    EXPECT_THAT(imported_of("pause = 0x14\n").notes,
-                ElementsAre(HasSubstr("mbusd reads this as 20"), HasSubstr("{frame_gap: 20ms}")));
+    EXPECT_THAT(imported_of("pause = 0x14\n").notes, ElementsAre(HasSubstr("{frame_gap: 20ms}")));
 }
 
-TEST(MbusdConf, ReadsNumbersAsMbusdDoesAndSaysSo) {
+TEST(MbusdConf, ReadsNumbersAsMbusdDoes) {
     const Imported imported = imported_of("speed = 9600 # fast\nport = 0x1F6\nwait=+0764\n");
     const Config config = load(imported);
     EXPECT_EQ(config.lines[0].device.serial.baud, 9600);
     EXPECT_EQ(config.modbus_tcp[0].port, 502);
     EXPECT_EQ(config.lines[0].arbiter.unlisted.response_timeout, Duration(500ms));
-    EXPECT_THAT(imported.notes,
-                ElementsAre("mbusd.conf:1: speed = 9600 # fast: mbusd reads this as 9600",
-                            "mbusd.conf:2: port = 0x1F6: mbusd reads this as 502",
-                            "mbusd.conf:3: wait = +0764: mbusd reads this as 500"));
     for (const char* value : {"fast", "-1", "0x", "99999999999999999999", "4294967298", "#9"})
         EXPECT_THAT(faults("port = " + std::string(value)), HasSubstr("1:8: port must be"));
 }
 
-TEST(MbusdConf, TakesFilesOfWindowsAndOfOldMacs) {
-    for (const std::string end : {"\n", "\r\n", "\r"}) {
+TEST(MbusdConf, TakesFilesOfWindows) {
+    for (const std::string end : {"\n", "\r\n"}) {
         const Imported imported =
             imported_of("\xef\xbb\xbf# one" + end + end + "speed = 9600" + end + "port = 503");
         EXPECT_EQ(load(imported).lines[0].device.serial.baud, 9600);

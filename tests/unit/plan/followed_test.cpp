@@ -1,17 +1,13 @@
-// Follows advice on many random lines by its words alone, without the planner's internals.
+// What is said of many random lines holds.
 
-#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <initializer_list>
 #include <random>
-#include <regex>
 #include <string>
-#include <vector>
 
-#include "panelgate/plan/advice.hpp"
 #include "panelgate/plan/line_plan.hpp"
 #include "plant_line.hpp"
 
@@ -71,104 +67,32 @@ class AnyLine : private test::PlantLine {
     std::mt19937 random_;
 };
 
-Duration duration_of(const std::string& text) {
-    const Duration unit = text.ends_with("us")   ? Duration(1us)
-                          : text.ends_with("ms") ? Duration(1ms)
-                          : text.ends_with("in") ? Duration(1min)
-                                                 : Duration(1s);
-    return std::stoll(text) * unit;
-}
-
-void follow_read(Line& line, const std::smatch& words) {
-    const auto station = std::ranges::find(line.stations, words[1].str(), &Station::name);
-    const auto first = static_cast<std::uint32_t>(std::stoul(words[2]));
-    const auto last = words[3].matched ? static_cast<std::uint32_t>(std::stoul(words[3])) : first;
-    for (PolledItem& asked : station->asked) {
-        const std::uint32_t at = asked.want.span.first;
-        if (first <= at && at <= last)
-            asked.want.every = std::max(asked.want.every, duration_of(words[4]));
-    }
-}
-
-void follow_intervals(Line& line, const std::smatch& words) {
-    const double times = std::stod(words[1]);
-    const auto longer = [&](Duration every) {
-        const auto made = std::chrono::duration_cast<Duration>(every * times);
-        const Duration most = words[2].matched ? std::min<Duration>(made, 24h) : made;
-        return Duration(std::chrono::round<std::chrono::microseconds>(most));
-    };
-    for (Station& station : line.stations) {
-        for (PolledItem& asked : station.asked) asked.want.every = longer(asked.want.every);
-    }
-    for (Relay& relay : line.relays) relay.every = longer(relay.every);
-}
-
-void follow_merges(Line& line, std::string pairs) {
-    static const std::regex kPair(R"((copy\d+) and (copy\d+))");
-    for (std::smatch words; std::regex_search(pairs, words, kPair); pairs = words.suffix()) {
-        const auto first = std::ranges::find(line.relays, words[1].str(), &Relay::name);
-        const auto next = std::ranges::find(line.relays, words[2].str(), &Relay::name);
-        ASSERT_TRUE(first != line.relays.end() && next != line.relays.end());
-        ASSERT_EQ(first->to->span.end(), next->to->span.first);
-        first->from->span.count += next->from->span.count;
-        first->to->span.count += next->to->span.count;
-        line.relays.erase(next);
-    }
-}
-
-/// Returns the line after the change.
-Line followed(const Line& before, const std::string& what) {
-    static const std::regex kRate(R"(serial: \{baud: (\d+)\} \(of all panels, too\))");
-    static const std::regex kRead(
-        R"(read (\w+) R(\d+)(?: to R(\d+)| \(\d+\)) every (\d+\w+) instead of \d+\w+(?: to \d+\w+)?)");
-    static const std::regex kAll(
-        R"(all intervals ([\d.]+) times as long(?: \((24h at most)?(?:, )?(?:refresh as it is)?\))?)");
-    static const std::regex kMerge(R"(one relay instead of (.*))");
-    Line line = before;
-    std::smatch words;
-    if (std::regex_match(what, words, kRate)) {
-        line.serial.baud = std::stoi(words[1]);
-    } else if (std::regex_match(what, words, kRead)) {
-        follow_read(line, words);
-    } else if (std::regex_match(what, words, kAll)) {
-        follow_intervals(line, words);
-    } else if (std::regex_match(what, words, kMerge)) {
-        follow_merges(line, words[1]);
-    } else {
-        ADD_FAILURE() << "what does this mean? " << what;
-    }
-    return line;
-}
-
-void expect_to_hold(const LinePlan& before, const Advice& told, const LinePlan& after) {
-    EXPECT_NEAR(told.load, after.load, 1e-3 * after.load);
-    EXPECT_NEAR(told.most, after.most, 1e-3 * after.most);
-    const bool changing = is_high_by_changes(before);
-    EXPECT_LE(changing ? after.most : after.load,
-              (changing ? before.most : before.load) - kMinGain + 1e-3);
-    if (told.what.starts_with("read ") || told.what.starts_with("all ")) {
-        EXPECT_LE(told.load, kHigh);
-        EXPECT_LE(told.most, kFull);
-    }
-}
-
-TEST(FollowedTest, AdviceBringsWhatItSays) {
+TEST(RandomLines, WhatHelpsMakesALineFine) {
     int told = 0;
     for (unsigned seed = 0; seed < kLines; ++seed) {
-        const AnyLine any(seed);
-        const LinePlan before = make_plan(any.made());
-        const std::vector<Advice> all = advise(any.made(), before);
-        if (verdict(before) == Verdict::fine) EXPECT_THAT(all, testing::IsEmpty());
-        for (const Advice& one : all) {
-            SCOPED_TRACE("line " + std::to_string(seed) + ", " + one.what);
-            expect_to_hold(before, one, make_plan(followed(any.made(), one.what)));
-            ++told;
+        const AnyLine source(seed);
+        Line any = source.made();
+        const auto helps = advise(any, make_plan(any));
+        EXPECT_FALSE(helps && verdict(make_plan(any)) == Verdict::fine);
+        if (!helps) continue;
+        SCOPED_TRACE("line " + std::to_string(seed) + ", " + helps->what);
+        const double number = std::stod(helps->what.substr(helps->what.find_first_of("123456789")));
+        if (helps->what.starts_with("serial: {baud: ")) {
+            any.serial.baud = static_cast<int>(number);
+        } else {
+            ASSERT_TRUE(helps->what.starts_with("all intervals "));
+            any = at_intervals(any, number);
         }
+        const LinePlan after = make_plan(any);
+        EXPECT_EQ(verdict(after), Verdict::fine);
+        EXPECT_NEAR(helps->load, after.load, 1e-3 * after.load);
+        EXPECT_NEAR(helps->most, after.most, 1e-3 * after.most);
+        ++told;
     }
-    EXPECT_GT(told, kLines) << "of so many lines";
+    EXPECT_GT(told, kLines / 3) << "of so many lines";
 }
 
-TEST(FollowedTest, TheHighestRateIsFineAndTheNextIsNot) {
+TEST(RandomLines, TheHighestRateIsFineAndTheNextIsNot) {
     for (unsigned seed = 0; seed < kLines / 5; ++seed) {
         const AnyLine any(seed);
         const auto highest = highest_rate(any.made(), make_plan(any.made()));

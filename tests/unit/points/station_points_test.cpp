@@ -40,11 +40,11 @@ std::vector<Point> temperature_and_state() {
 void poll(StationPolls& polls, TimePoint& now, std::uint16_t state) {
     for (int i = 0; i < 2; ++i) {
         now = std::max(now, *polls.next_due());
-        for (const auto& due : polls.take_due(now)) {
-            const Bytes reply = due.request.pdu()[2] == 100
+        while (const auto due = polls.take_due(now)) {
+            const Bytes reply = due->request.pdu()[2] == 100
                                     ? Writer().u8(3).u8(4).u16(215).u16(state).take()
                                     : Writer().u8(3).u8(16).raw(Bytes(16)).take();
-            polls.on_answer(now, due.read, reply, now);
+            polls.on_answer(now, due->read, reply, now);
         }
     }
 }

@@ -64,9 +64,9 @@ std::vector<Bytes> play(StationPolls& polls, TimePoint from, Duration span,
     while (const auto next = polls.next_due()) {
         now = std::max(now, *next);
         if (now >= from + span) break;
-        for (const auto& due : polls.take_due(now)) {
-            asked.push_back(due.request.pdu());
-            polls.on_answer(now + 5ms, due.read, answer(due.request.pdu()), now);
+        if (const auto due = polls.take_due(now)) {
+            asked.push_back(due->request.pdu());
+            polls.on_answer(now + 5ms, due->read, answer(due->request.pdu()), now);
         }
     }
     return asked;
@@ -181,13 +181,13 @@ TEST(StationPolls, P10AReadThatAWriteOvertakesIsOldAndAskedAgain) {
     const TimePoint asked = kStart + 5s;
     polls.on_write(asked + 1ms, item(7));
     polls.on_written(asked + 2ms, item(7));
-    ASSERT_EQ(first.size(), 1u);
-    polls.on_answer(asked + 3ms, first[0].read, Bytes{3, 2, 0, 1}, asked);
+    ASSERT_TRUE(first);
+    polls.on_answer(asked + 3ms, first->read, Bytes{3, 2, 0, 1}, asked);
     EXPECT_EQ(quality_of(polls.reading(0), 60s, asked + 3ms), Quality::stale);
     EXPECT_LE(*polls.next_due(), asked + 3ms);
     const auto again = polls.take_due(asked + 3ms);
-    ASSERT_EQ(again.size(), 1u);
-    polls.on_answer(asked + 9ms, again[0].read, Bytes{3, 2, 0, 2}, asked + 3ms);
+    ASSERT_TRUE(again);
+    polls.on_answer(asked + 9ms, again->read, Bytes{3, 2, 0, 2}, asked + 3ms);
     EXPECT_EQ(quality_of(polls.reading(0), 60s, asked + 9ms), Quality::good);
     EXPECT_GT(*polls.next_due(), asked + 1s);
 }

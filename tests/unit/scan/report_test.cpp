@@ -1,4 +1,4 @@
-// What a user types to scan and reads of it: options, report, advice, progress.
+// What a user types to scan and reads of it: options, report, advice.
 #include "panelgate/scan/report.hpp"
 
 #include <gmock/gmock.h>
@@ -188,16 +188,6 @@ TEST(ScanReport, AdvisesInWholeSentences) {
                     HasSubstr("1 byte came"), HasSubstr("wiring, termination"),
                     HasSubstr("something answers at 19200 8E1, and every reply is damaged")));
     EXPECT_THAT(advice("/dev/x", Result{}), IsEmpty()) << "interrupted: not all was asked";
-}
-
-TEST(ScanProgress, FitsItsWidth) {
-    const Progress progress{0.424, 11200ms, "38400 8N1, station 17", 3};
-    EXPECT_EQ(format_progress(progress, 80),
-              " 42 %, about 12 s left, 3 found: 38400 8N1, station 17");
-    EXPECT_EQ(format_progress(progress, 20), " 42 %, about 12 s le");
-    EXPECT_EQ(format_progress({0, 130s, "38400 8N1, listening", 0}, 80),
-              "  0 %, at most 3 min left, 0 found: 38400 8N1, listening");
-    EXPECT_EQ(format_progress({1, {}, "x", 1}, 80), "100 %, about 0 s left, 1 found: x");
 }
 
 }  // namespace

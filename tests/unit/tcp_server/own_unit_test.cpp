@@ -11,7 +11,7 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
-#include "panelgate/tcp_server/register_map_text.hpp"
+#include "panelgate/tcp_server/listener.hpp"
 #include "support/hex.hpp"
 
 namespace panelgate::tcp_server::own_unit_test {
@@ -80,9 +80,6 @@ TEST(Diagnostics, ShowsItsRegistersAndInputs) {
         {"02 0000 0010", "02 02 80 00"},
         {"02 0007 0001", "02 01 01"},
         {"02 00ff 0002", "82 02"},
-        // What was sent to be given back.
-        {"08 0000 a537", "08 0000 a537"},
-        {"08 0000 0102 0304", "08 0000 0102 0304"},
     });
     EXPECT_EQ(ask("02 0000 0100"_hex).size(), 34U);
 }
@@ -114,35 +111,10 @@ TEST(Diagnostics, RefusesMalformedRequestsAndEveryOtherFunction) {
             EXPECT_EQ(ask(pdu), (Bytes{static_cast<std::uint8_t>(pdu[0] | 0x80), code})) << request;
         }
     };
-    expect_refused(
-        3, {"03 0000 0000", "03 0000 007e", "03 0000", "02 0000 0000", "02 0000 07d1", "08 000b",
-            "08 000b 0001", "0b 00", "11 00", "2b 0e 01", "2b", "2b 0e 05 00"});
-    expect_refused(1, {"01 0000 0001", "06 0000 0001", "07", "0c", "14 00", "41", "08 0001 0000",
-                       "08 0004 0000", "08 000a 0000", "2b 0d 01 00"});
-}
-
-TEST(Diagnostics, CountsAsASerialDeviceDoes) {
-    expect_replies({
-        {"08 0002 0000", "08 0002 0000"},
-        {"08 000b 0000", "08 000b 1174"},  // 70004 - 65536
-        {"08 000c 0000", "08 000c 0004"},
-        {"08 000d 0000", "08 000d 0009"},
-        {"08 000e 0000", "08 000e 1170"},  // 70000 - 65536
-        {"08 000f 0000", "08 000f 0003"},
-        {"08 0010 0000", "08 0010 0000"},
-        {"08 0011 0000", "08 0011 0002"},
-        {"08 0012 0000", "08 0012 0000"},
-        {"0b", "0b 0000 1167"},  // without the 9 exceptions
-    });
-}
-
-TEST(Diagnostics, ReportsItsId) {
-    const Bytes reply = ask("11"_hex);
-    ASSERT_GT(reply.size(), 4U);
-    EXPECT_EQ(reply[1], reply.size() - 2);
-    EXPECT_EQ(reply[2], 'P');
-    EXPECT_EQ(reply[3], 0xFF) << "it runs";
-    EXPECT_EQ(std::string(reply.begin() + 4, reply.end()), "panelgate 1.2.34");
+    expect_refused(3, {"03 0000 0000", "03 0000 007e", "03 0000", "02 0000 0000", "02 0000 07d1",
+                       "2b 0e 01", "2b", "2b 0e 05 00"});
+    expect_refused(1, {"01 0000 0001", "06 0000 0001", "07", "08 0000 a537", "0b", "0c", "11",
+                       "14 00", "41", "2b 0d 01 00"});
 }
 
 /// The objects of a reply to 2B/0E, by id.
@@ -158,37 +130,26 @@ std::map<int, std::string> objects(const Bytes& reply) {
     return found;
 }
 
-TEST(Diagnostics, IdentifiesItselfInThreeLevels) {
+TEST(Diagnostics, IdentifiesItselfInTwoLevels) {
     const std::map<int, std::string> basic = {{0, "panelgate"}, {1, "panelgate"}, {2, "1.2.34"}};
     std::map<int, std::string> regular = basic;
     regular.merge(std::map<int, std::string>{
         {3, "http://gateway:8080/"}, {4, "panelgate"}, {5, "Modbus gateway"}, {6, "gateway"}});
-    std::map<int, std::string> extended = regular;
-    extended.merge(std::map<int, std::string>{{0x80, "floor1"}, {0x81, "hall"}});
     EXPECT_EQ(objects(ask("2b 0e 01 00"_hex)), basic);
     EXPECT_EQ(objects(ask("2b 0e 02 00"_hex)), regular);
-    EXPECT_EQ(objects(ask("2b 0e 03 00"_hex)), extended);
-    EXPECT_EQ(objects(ask("2b 0e 03 80"_hex)).size(), 2U) << "from there on";
+    EXPECT_EQ(objects(ask("2b 0e 03 00"_hex)), regular) << "there is no third level";
+    EXPECT_EQ(objects(ask("2b 0e 02 05"_hex)).size(), 2U) << "from there on";
     EXPECT_EQ(objects(ask("2b 0e 01 05"_hex)), basic) << "a stream restarts";
-    EXPECT_EQ(ask("2b 0e 04 81"_hex), "2b 0e 04 83 00 00 01 81 04 68616c6c"_hex);
-    EXPECT_EQ(ask("2b 0e 04 82"_hex), "ab 02"_hex);
+    EXPECT_EQ(ask("2b 0e 04 06"_hex), "2b 0e 04 82 00 00 01 06 07 67617465776179"_hex);
+    EXPECT_EQ(ask("2b 0e 04 07"_hex), "ab 02"_hex);
 }
 
-TEST(Diagnostics, WhatDoesNotFitOneReplyFollows) {
+TEST(Diagnostics, TheLongestIdentificationFitsOneReply) {
     Diagnostics state = two_lines();
-    for (int i = 2; i < 40; ++i) state.lines.push_back({"line-" + std::to_string(i) + "-of-many"});
-    std::map<int, std::string> all;
-    Bytes request = "2b 0e 03 00"_hex;
-    for (int part = 0; part < 20; ++part) {
-        const Bytes reply = answer_diagnostics(request, state);
-        ASSERT_LE(reply.size(), modbus::kMaxPdu);
-        all.merge(objects(reply));
-        if (reply[4] == 0) break;
-        EXPECT_EQ(reply[4], 0xFF);
-        request[3] = reply[5];
-    }
-    EXPECT_EQ(all.size(), 7U + 40U);
-    EXPECT_EQ(all[0x80 + 39], "line-39-of-many");
+    state.url = state.host = state.version = std::string(300, 'x');
+    const Bytes reply = answer_diagnostics("2b 0e 02 00"_hex, state);
+    EXPECT_LE(reply.size(), modbus::kMaxPdu);
+    EXPECT_EQ(objects(reply).size(), 7U);
 }
 
 TEST(Diagnostics, ThePrintedMapNamesWhatIsThere) {

@@ -103,7 +103,7 @@ TEST_F(Session, AnswersWhatNeedsNoLineByItself) {
         {255, "04 0004 0002"_hex, "04 04 0001 0005"_hex},
         {255, "03 0007 0001"_hex, "03 02 0000"_hex},
         {255, "06 0000 0001"_hex, "86 01"_hex},
-        {255, "2b 0e 04 02"_hex, "2b 0e 04 83 00 00 01 02 05 312e322e33"_hex},
+        {255, "2b 0e 04 02"_hex, "2b 0e 04 82 00 00 01 02 05 312e322e33"_hex},
     };
     Client client = connect();
     for (const auto& [unit, request, reply] : rows)

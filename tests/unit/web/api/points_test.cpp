@@ -40,12 +40,12 @@ class ApiPoints : public HttpRig {
     /// Each point's register holds this.
     void poll(std::uint16_t value) {
         now = std::max(now, *polls->next_due());
-        for (const auto& due : polls->take_due(now)) {
+        while (const auto due = polls->take_due(now)) {
             Writer reply;
-            const unsigned count = polls->plan()[due.read].span.count;
+            const unsigned count = polls->plan()[due->read].span.count;
             reply.u8(3).u8(2 * count);
             for (unsigned i = 0; i < count; ++i) reply.u16(value);
-            polls->on_answer(now, due.read, Result<Bytes>(reply.take()), now);
+            polls->on_answer(now, due->read, Result<Bytes>(reply.take()), now);
         }
     }
     Reply put(const std::string& body, const char* query = "") {
