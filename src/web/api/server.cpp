@@ -58,9 +58,7 @@ std::uint16_t Server::port() const { return listener_->port(); }
 
 void Server::stop(Duration reading) { listener_->stop(reading); }
 
-void Server::renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context) {
-    listener_->renew(settings, std::move(context));
-}
+void Server::renew(const tls::Settings& settings) { listener_->renew(settings); }
 
 Counters Server::counters() const { return listener_->counters(); }
 
