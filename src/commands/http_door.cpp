@@ -214,7 +214,7 @@ class Question {
             target.address, std::to_string(target.port), tcp::resolver::numeric_service,
             [&](const error_code& error, const tcp::resolver::results_type& found) {
                 if (error) return end(error);
-                asio::async_connect(stream_.socket(), found,
+                asio::async_connect(socket_, found,
                                     [&](const error_code& failed, const tcp::endpoint&) {
                                         failed ? end(failed) : greet(target.address);
                                     });
@@ -225,27 +225,32 @@ class Question {
 
   private:
     void greet(const std::string& server) {
-        if (!trust_) return send_request();
-        tls::connect(stream_, *trust_, server, [this](const std::string& why) {
-            reply_.secure = why.empty();
-            reply_.refused = why;
-            if (why.empty()) send_request();
-        });
+        if (!trust_) {
+            stream_.emplace(std::move(socket_));
+            return send_request();
+        }
+        tls::connect(std::move(socket_), *trust_, server,
+                     [this](const std::string& why, tls::Stream stream) {
+                         stream_.emplace(std::move(stream));
+                         reply_.secure = why.empty();
+                         reply_.refused = why;
+                         if (why.empty()) send_request();
+                     });
     }
     void send_request() {
-        asio::async_write(stream_, asio::buffer(request_),
+        asio::async_write(*stream_, asio::buffer(request_),
                           [this](const error_code& error, std::size_t) {
                               if (error) return end(error);
                               listen();
                           });
     }
     void listen() {
-        stream_.async_read_some(asio::buffer(buffer_),
-                                [this](const error_code& error, std::size_t size) {
-                                    reply_.text.append(buffer_, size);
-                                    if (error) return end(error);
-                                    if (!enough_(reply_) && reply_.text.size() < most_) listen();
-                                });
+        stream_->async_read_some(asio::buffer(buffer_),
+                                 [this](const error_code& error, std::size_t size) {
+                                     reply_.text.append(buffer_, size);
+                                     if (error) return end(error);
+                                     if (!enough_(reply_) && reply_.text.size() < most_) listen();
+                                 });
     }
     void end(const error_code& error) { reply_.error = error; }
 
@@ -255,7 +260,8 @@ class Question {
     asio::io_context io_{1};
     asio::ip::tcp::resolver resolver_{io_};
     const std::optional<tls::Trust>& trust_;
-    tls::Stream stream_{asio::ip::tcp::socket(io_)};
+    asio::ip::tcp::socket socket_{io_};
+    std::optional<tls::Stream> stream_;
     char buffer_[4096]{};
     HttpReply reply_;
 };

@@ -411,7 +411,7 @@ const Keys<tls::Settings>& tls_keys() {
                    [](const Settings& tls) { return tls.ca; })
             .weaker(By::any)
             .example("/etc/panelgate/tls/ca.crt")
-            .change_needs(kTlsCloses)
+            .change_needs(kTlsRenewed)
             .word("client", &Settings::client, kClients,
                   "Whether clients show a certificate: none, optional, required.")
             .weaker(By::falling, {}, {"none", "optional", "required"})
@@ -434,7 +434,7 @@ const Keys<tls::Settings>& tls_keys() {
             .word("min_version", &Settings::lowest, kVersions,
                   "Oldest version that is spoken: TLSv1.2 or TLSv1.3.")
             .weaker(By::leaving, "TLSv1.3")
-            .change_needs(kTlsCloses);
+            .change_needs(kTlsRenewed);
     return kKeys;
 }
 

@@ -293,7 +293,7 @@ bool may_close(const std::vector<Network>& before, const std::vector<Network>& a
 bool has_other_rules(const std::optional<tls::Settings>& before,
                      const std::optional<tls::Settings>& after) {
     const auto rules = [](const tls::Settings& of) {
-        return std::tie(of.ca, of.crl, of.client, of.role_from_certificate, of.lowest);
+        return std::tie(of.crl, of.client, of.role_from_certificate);
     };
     return before && after && rules(*before) != rules(*after);
 }

@@ -9,9 +9,8 @@
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/gateway/prepare.hpp"
 #include "panelgate/rt/log.hpp"
-#include "panelgate/tls/client_context.hpp"
+#include "panelgate/tls/context.hpp"
 #include "panelgate/tls/judge.hpp"
-#include "panelgate/tls/replacement.hpp"
 
 namespace panelgate::gateway {
 namespace {
@@ -61,70 +60,59 @@ std::string read_again(const tls::Settings& settings, tls::Material& files) {
 /// What comes into use of new files.
 struct Taken {
     tls::Settings settings;
-    std::string why;  ///< it is not all of them; "" if it is
-    rt::LogLevel level = rt::LogLevel::error;
-    bool usable = false;  ///< a context can be made of the settings
+    std::string why{};  ///< the files are not all taken; "" if they are
 };
 
-/// `next` has the files to judge beside those of `used`.
-Taken judged(const ServedCertificate& used, tls::Settings next, tls::Arrival arrival,
-             std::int64_t now) {
+/// `next` has the files to try.
+Taken attempt(const ServedCertificate& used, tls::Settings next) {
     next.made = nullptr;
-    Taken taken{std::move(next), "", rt::LogLevel::warn, true};
     try {
-        if (used.server.empty()) {
-            taken.settings.made = std::make_shared<const tls::Context>(taken.settings);
-            taken.why = tls::why_kept(used.settings, taken.settings, arrival, now);
-        } else {
-            const tls::ClientContext usable(taken.settings, used.server);
-            taken.why = tls::why_client_kept(used.settings, taken.settings, now);
-        }
+        if (used.server.empty())
+            next.made = std::make_shared<const tls::Context>(next);
+        else
+            const tls::ClientContext usable(next, used.server);
     } catch (const tls::Unusable& why) {
-        return Taken{std::move(taken.settings), why.what()};
+        return {used.settings, why.what()};
     }
-    return taken;
+    return {std::move(next)};
 }
 
-/// Each kind of file stands for itself: a list of revoked certificates must not wait until a bad
-/// pair is mended. `fresh` has the new files.
-Taken take(const ServedCertificate& used, const tls::Settings& fresh, tls::Arrival arrival,
-           std::int64_t now) {
-    const auto attempt = [&](const tls::Material& files) {
-        tls::Settings next = fresh;
-        next.material = files;
-        return judged(used, std::move(next), arrival, now);
-    };
-    Taken whole = attempt(fresh.material);
+/// A list of revoked certificates does not wait until a bad pair is mended.
+Taken take(const ServedCertificate& used, const tls::Material& files) {
+    tls::Settings next = used.settings;
+    next.material = files;
+    Taken whole = attempt(used, next);
     if (whole.why.empty()) return whole;
-    Taken taken = attempt(used.settings.material);
-    using File = std::string tls::Material::*;
-    const std::array<std::vector<File>, 4> parts{
-        {{&tls::Material::ca, &tls::Material::crl},
-         {&tls::Material::crl},
-         {&tls::Material::ca},
-         {&tls::Material::certificate, &tls::Material::key}}};
-    for (const auto& part : parts) {
-        tls::Material files = taken.settings.material;
-        for (const File file : part) files.*file = fresh.material.*file;
-        if (files == taken.settings.material) continue;
-        if (Taken some = attempt(files); some.why.empty()) taken = std::move(some);
-    }
-    taken.why = whole.why;
-    taken.level = whole.level;
-    return taken;
+    next.material = used.settings.material;
+    next.material.ca = files.ca;
+    next.material.crl = files.crl;
+    Taken some = attempt(used, next);
+    return some.why.empty() ? Taken{std::move(some.settings), whole.why} : whole;
+}
+
+/// "certificate, key".
+std::string changed_files(const tls::Material& before, const tls::Material& now) {
+    using tls::Material;
+    constexpr std::array<std::pair<const char*, std::string Material::*>, 4> kFiles{
+        {{"certificate", &Material::certificate},
+         {"key", &Material::key},
+         {"ca", &Material::ca},
+         {"crl", &Material::crl}}};
+    std::string text;
+    for (const auto& [key, file] : kFiles)
+        if (before.*file != now.*file) text += (text.empty() ? "" : ", ") + std::string(key);
+    return text;
 }
 
 /// A line each time: nobody should have to ask since when a certificate is in use.
 void log_renewed(const std::string& listener, const tls::Material& before,
                  const tls::Material& now) {
     const tls::Summary own = tls::summary_of(now.certificate);
-    std::vector<rt::LogField> fields{{"listener", listener},
-                                     {"files", tls::changed_files(before, now)}};
+    std::vector<rt::LogField> fields{{"listener", listener}, {"files", changed_files(before, now)}};
     if (own.end != 0)
         fields.insert(fields.end(), {{"subject", own.subject},
                                      {"issuer", own.issuer},
                                      {"serial", own.serial},
-                                     {"valid_from", tls::date_text(own.begin)},
                                      {"expires", tls::date_text(own.end)}});
     const std::size_t what = std::hash<std::string>()(now.certificate + now.key + now.ca + now.crl);
     rt::log_each("certificate renewed", listener, std::to_string(what), fields);
@@ -132,28 +120,14 @@ void log_renewed(const std::string& listener, const tls::Material& before,
 
 }  // namespace
 
-std::vector<ServedCertificate> keep_good_certificates(config::Config& next,
-                                                      const std::vector<ServedCertificate>& in_use,
-                                                      std::int64_t now, bool rollback,
-                                                      std::vector<std::string>& warnings) {
-    std::vector<ServedCertificate> kept;
+void keep_certificates(config::Config& next, const std::vector<ServedCertificate>& in_use) {
     const auto keep = [&](const std::string& listener, tls::Settings& fresh) {
         const auto used = std::ranges::find(in_use, listener, &ServedCertificate::listener);
         if (used == in_use.end() || used->settings.material == fresh.material) return;
-        if (rollback) {
-            tls::Settings stays = fresh;
-            stays.material = used->settings.material;
-            Taken former = judged(*used, std::move(stays), tls::Arrival::asked_for, now);
-            if (former.usable) fresh = std::move(former.settings);
-            return;
-        }
-        Taken taken = take(*used, fresh, tls::Arrival::asked_for, now);
-        // Other keys may want what the former files do not have: then the new ones are in use.
-        if (taken.why.empty() || !taken.usable) return;
-        warnings.push_back(listener + ": certificate not renewed: " + taken.why +
-                           "; the former one stays in use");
-        kept.push_back({listener, fresh});
-        fresh = std::move(taken.settings);
+        tls::Settings stays = fresh;
+        stays.material = used->settings.material;
+        if (Taken taken = attempt(*used, std::move(stays)); taken.why.empty())
+            fresh = std::move(taken.settings);
     };
     for_each_tls(next, keep);
     if (next.mqtt && next.mqtt->tls) {
@@ -161,7 +135,6 @@ std::vector<ServedCertificate> keep_good_certificates(config::Config& next,
         keep("mqtt " + next.mqtt->broker(), client);
         next.mqtt->files = mqtt::Files{client.material};
     }
-    return kept;
 }
 
 std::vector<std::string> certificate_doubts(const config::Config& config, std::int64_t now) {
@@ -214,9 +187,7 @@ struct CertificateWatch::Look {
     }
     void make(std::size_t at, tls::Material files) {
         const Served& used = served[at];
-        tls::Settings next = used.settings;
-        next.material = files;
-        Taken taken = take(used, next, tls::Arrival::noticed, now);
+        Taken taken = take(used, files);
         std::vector<std::string> doubts =
             used.server.empty() ? tls::doubts(taken.settings, {}, now)
                                 : tls::client_doubts(taken.settings, used.server, now);
@@ -250,11 +221,6 @@ void CertificateWatch::follow(const config::Config& config) {
     std::erase_if(renewals_, is_gone);
     ++round_;
     if (idle && !served_.empty()) later();
-}
-
-void CertificateWatch::refused(const Served& files) {
-    refused_[files.listener] = files.settings.material;
-    ++renewals_[files.listener].kept;
 }
 
 std::map<std::string, tls::Renewals> CertificateWatch::renewals() const {
@@ -298,7 +264,7 @@ void CertificateWatch::judge(Look& look) {
 void CertificateWatch::take_over(const Fresh& fresh) {
     Served& served = served_[fresh.at];
     const tls::Settings& next = fresh.taken.settings;
-    if (fresh.taken.usable && next.material != served.settings.material) {
+    if (next.material != served.settings.material) {
         const tls::Material before = served.settings.material;
         served.settings = next;
         ++renewals_[served.listener].replaced;
@@ -311,7 +277,7 @@ void CertificateWatch::take_over(const Fresh& fresh) {
     if (fresh.taken.why.empty() || refused_[served.listener] == fresh.files) return;
     refused_[served.listener] = fresh.files;
     ++renewals_[served.listener].kept;
-    rt::log(fresh.taken.level, "certificate not renewed",
+    rt::log(rt::LogLevel::error, "certificate not renewed",
             {{"listener", served.listener}, {"reason", fresh.taken.why}});
 }
 

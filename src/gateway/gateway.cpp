@@ -271,7 +271,7 @@ void Gateway::watch_certificates() {
         certificates_ = std::make_unique<CertificateWatch>(
             executor_, clock_, [this](const CertificateWatch::Served& served) {
                 if (served.server.empty())
-                    servers_.renew(served.listener, served.settings, served.settings.made);
+                    servers_.renew(served.listener, served.settings);
                 else
                     northbound_.renew(served.settings.material);
             });
@@ -281,11 +281,6 @@ void Gateway::watch_certificates() {
 std::vector<ServedCertificate> Gateway::certificates() const {
     if (!certificates_) return {};
     return certificates_->served();
-}
-
-void Gateway::refused_certificates(const std::vector<ServedCertificate>& files) {
-    if (!certificates_) return;
-    for (const ServedCertificate& one : files) certificates_->refused(one);
 }
 
 void Gateway::record(const web::ReloadVerdict& verdict) {

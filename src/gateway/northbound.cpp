@@ -9,7 +9,7 @@
 #include "panelgate/base/words.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/rt/log.hpp"
-#include "panelgate/tls/replacement.hpp"
+#include "panelgate/tls/judge.hpp"
 #include "panelgate/web/http/json_text.hpp"
 #include "panelgate/web/http/problem.hpp"
 

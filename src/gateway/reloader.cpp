@@ -117,13 +117,11 @@ struct Reloader::Job {
     std::shared_ptr<const config::Config> rollback;  ///< null: read the file
     bool may_be_weaker = false;                      ///< for a rollback
     std::vector<ServedCertificate> certificates;     ///< in use
-    std::vector<ServedCertificate> refused{};        ///< files that do not replace them
     std::shared_ptr<const config::Config> next;      ///< null: there is none
     web::SharedText shown;
     web::ReloadVerdict verdict;
 
     void read();
-    void keep_certificates(config::Config& made);
     void compare();
     void refuse_tokens();
 };
@@ -148,16 +146,11 @@ config::Config with_tokens_of(const config::Config& config, const config::Config
     return made;
 }
 
-void Reloader::Job::keep_certificates(config::Config& made) {
-    refused = keep_good_certificates(made, certificates, seconds_since_1970(), rollback != nullptr,
-                                     verdict.warnings);
-}
-
 /// Runs in the worker: all that takes long.
 void Reloader::Job::read() try {
     if (rollback) {
         config::Config made = may_be_weaker ? *rollback : with_tokens_of(*rollback, *running);
-        keep_certificates(made);
+        keep_certificates(made, certificates);
         next = std::make_shared<const config::Config>(std::move(made));
         verdict.weaker = explain::weaker(*running, *next);
         if (!verdict.weaker.empty() && !may_be_weaker) {
@@ -178,7 +171,6 @@ void Reloader::Job::read() try {
             return;
         }
         config::share_profiles(*loaded.config, *running);
-        keep_certificates(*loaded.config);
         for (const StartMessage& message : prepare(*loaded.config))
             verdict.warnings.push_back(message.event == "configuration"
                                            ? message.text
@@ -275,7 +267,6 @@ void Reloader::apply(const std::shared_ptr<Job>& job) {
             job->verdict.why = error.what();
         }
     }
-    gateway_->refused_certificates(job->refused);
     end(job);
 }
 

@@ -8,8 +8,6 @@
 #include <string_view>
 #include <utility>
 
-#include "panelgate/tls/context.hpp"
-
 namespace panelgate::mqtt {
 
 namespace {

@@ -12,7 +12,7 @@
 
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/mqtt/subjects.hpp"
-#include "panelgate/tls/client_context.hpp"
+#include "panelgate/tls/context.hpp"
 
 struct mosquitto;
 

@@ -19,7 +19,7 @@
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/rt/acceptor.hpp"
 #include "panelgate/tcp_server/dispatch.hpp"
-#include "panelgate/tls/roles.hpp"
+#include "panelgate/tls/peer.hpp"
 #include "places.hpp"
 #include "session.hpp"
 #include "shared.hpp"
@@ -91,7 +91,7 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
 
     void start();
     void apply(Settings settings, UnitMap units);
-    void renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context);
+    void renew(const tls::Settings& settings);
     std::uint16_t port() const { return acceptor_.port(); }
     Counters counters() const;
     void stop(std::function<void()> done);
@@ -99,13 +99,14 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
 
   private:
     void on_accepted(tcp::socket socket);
-    void admit(tcp::socket socket, const tcp::endpoint& peer);
+    void on_secured(tls::Stream stream);
+    void admit(tls::Stream stream, const tcp::endpoint& peer);
     bool make_room(const tcp::endpoint& peer);
     void evict(Session& victim, bool idle, const tcp::endpoint& peer);
     void count_refused(const tcp::endpoint& peer, const Place& place);
     void on_closed(const std::shared_ptr<Session>& session);
     void apply_roles(const Settings& before);
-    void review();
+    void dismiss_revoked();
     void notify_when_empty();
 
     std::shared_ptr<Shared> shared_;
@@ -132,24 +133,23 @@ void Listener::Core::start() {
 void Listener::Core::apply(Settings settings, UnitMap units) {
     allowed_ = rt::AccessList(settings.allow);
     if (datagrams_) datagrams_->allow(allowed_);
-    const bool others =
-        shared_->handshakes && settings.tls && shared_->handshakes->apply(*settings.tls);
+    if (shared_->handshakes && settings.tls) shared_->handshakes->apply(*settings.tls);
     const Settings before = std::exchange(shared_->settings, std::move(settings));
     shared_->units = std::move(units);
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // close() erases
     for (const auto& session : sessions) {
         if (!allowed_.allows(session->peer())) session->close();
     }
-    if (shared_->handshakes) apply_roles(before);
-    if (others) review();
+    if (!shared_->handshakes) return;
+    apply_roles(before);
+    dismiss_revoked();
 }
 
-void Listener::Core::renew(const tls::Settings& settings,
-                           std::shared_ptr<const tls::Context> context) {
+void Listener::Core::renew(const tls::Settings& settings) {
     if (!shared_->handshakes) return;
-    const bool others = shared_->handshakes->apply(settings, std::move(context));
+    shared_->handshakes->apply(settings);
     shared_->settings.tls = settings;
-    if (others) review();
+    dismiss_revoked();
 }
 
 /// Without roles from certificates everybody writes.
@@ -163,14 +163,12 @@ void Listener::Core::apply_roles(const Settings& before) {
     }
 }
 
-void Listener::Core::review() {
-    std::vector<tls::Handshakes::Guest> guests;
-    for (const auto& session : sessions_) {
-        Session* const one = session.get();
-        guests.push_back(
-            {session, &one->stream(), [one](const std::string& why) { one->dismiss(why); }});
+void Listener::Core::dismiss_revoked() {
+    const std::set<std::shared_ptr<Session>> sessions = sessions_;  // dismiss() erases
+    for (const auto& session : sessions) {
+        const std::string why = shared_->handshakes->why_leave(session->stream());
+        if (!why.empty()) session->dismiss(why);
     }
-    shared_->handshakes->review(std::move(guests));
 }
 
 Counters Listener::Core::counters() const {
@@ -188,9 +186,23 @@ void Listener::Core::on_accepted(tcp::socket socket) {
     if (!allowed_.allows(peer.address())) {
         shared_->log(rt::LogLevel::info, "connection refused",
                      {{"client", text(peer)}, {"reason", "not in the allow list"}});
-    } else if (shared_->handshakes || make_room(peer)) {
-        admit(std::move(socket), peer);
+    } else if (shared_->handshakes) {
+        set_up(socket);
+        shared_->handshakes->begin(std::move(socket), [weak = weak_from_this()](tls::Stream stream) {
+            if (const auto self = weak.lock()) self->on_secured(std::move(stream));
+        });
+    } else if (make_room(peer)) {
+        set_up(socket);
+        admit(tls::Stream(std::move(socket)), peer);
     }
+}
+
+/// `allow` may have changed during the handshake.
+void Listener::Core::on_secured(tls::Stream stream) {
+    error_code gone;
+    const tcp::endpoint peer = stream.socket().remote_endpoint(gone);
+    if (!gone && !done_ && allowed_.allows(peer.address()) && make_room(peer))
+        admit(std::move(stream), peer);
 }
 
 /// Beyond a limit a connection gives way to the newcomer, or the newcomer is refused (P9). Nobody
@@ -202,7 +214,6 @@ bool Listener::Core::make_room(const tcp::endpoint& peer) {
     guests.reserve(sessions_.size());
     seated.reserve(sessions_.size());
     for (const auto& session : sessions_) {
-        if (session->is_at_the_door()) continue;
         guests.push_back(session->guest());
         seated.push_back(session);
     }
@@ -240,10 +251,9 @@ void Listener::Core::count_refused(const tcp::endpoint& peer, const Place& place
                   {"of_its_address", std::to_string(place.own)}});
 }
 
-void Listener::Core::admit(tcp::socket socket, const tcp::endpoint& peer) {
-    set_up(socket);
+void Listener::Core::admit(tls::Stream stream, const tcp::endpoint& peer) {
     const auto session = std::make_shared<Session>(
-        std::move(socket), shared_,
+        std::move(stream), shared_,
         [weak = weak_from_this()](const std::shared_ptr<Session>& closed) {
             if (const auto self = weak.lock()) self->on_closed(closed);
         });
@@ -253,17 +263,12 @@ void Listener::Core::admit(tcp::socket socket, const tcp::endpoint& peer) {
                            .address = peer.address().to_string(),
                            .listener = shared_->settings.name(),
                            .standing = Role::operator_});
-    session->start(Caller(text(peer), std::move(who)),
-                   [weak = weak_from_this()](const tcp::endpoint& client) {
-                       const auto self = weak.lock();
-                       return self && self->make_room(client);
-                   });
+    session->start(Caller(text(peer), std::move(who)));
 }
 
 void Listener::Core::on_closed(const std::shared_ptr<Session>& session) {
     sessions_.erase(session);
-    const bool had_place = !session->is_at_the_door();
-    if (had_place && std::exchange(full_, false))
+    if (std::exchange(full_, false))
         shared_->log(rt::LogLevel::info, "connections accepted again");
     notify_when_empty();
 }
@@ -276,6 +281,7 @@ void Listener::Core::notify_when_empty() {
 void Listener::Core::stop(std::function<void()> done) {
     acceptor_.close();
     done_ = std::move(done);
+    if (shared_->handshakes) shared_->handshakes->stop();
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // finish() may erase
     for (const auto& session : sessions) session->finish();
     if (datagrams_) datagrams_->finish([this] { notify_when_empty(); });
@@ -284,6 +290,7 @@ void Listener::Core::stop(std::function<void()> done) {
 
 void Listener::Core::close_now() {
     acceptor_.close();
+    if (shared_->handshakes) shared_->handshakes->stop();
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // close() erases
     for (const auto& session : sessions) session->close();
     if (datagrams_) datagrams_->close();
@@ -301,9 +308,7 @@ void Listener::start() { core_->start(); }
 void Listener::apply(Settings settings, UnitMap units) {
     core_->apply(std::move(settings), std::move(units));
 }
-void Listener::renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context) {
-    core_->renew(settings, std::move(context));
-}
+void Listener::renew(const tls::Settings& settings) { core_->renew(settings); }
 std::uint16_t Listener::port() const { return core_->port(); }
 Counters Listener::counters() const { return core_->counters(); }
 void Listener::stop(std::function<void()> done) { core_->stop(std::move(done)); }

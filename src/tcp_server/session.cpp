@@ -13,7 +13,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/pool.hpp"
-#include "panelgate/tls/roles.hpp"
+#include "panelgate/tls/peer.hpp"
 
 namespace panelgate::tcp_server {
 namespace {
@@ -25,9 +25,8 @@ constexpr Duration kAnotherLook = 20ms;
 
 }  // namespace
 
-Session::Session(asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
-                 ClosedHandler on_closed)
-    : stream_(std::move(socket)),
+Session::Session(tls::Stream stream, std::shared_ptr<Shared> shared, ClosedHandler on_closed)
+    : stream_(std::move(stream)),
       shared_(std::move(shared)),
       on_closed_(std::move(on_closed)),
       active_(shared_->clock.now()),
@@ -35,29 +34,16 @@ Session::Session(asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
       due_alarm_(shared_->clock.make_alarm()),
       output_alarm_(shared_->clock.make_alarm()) {}
 
-void Session::start(Caller caller, PlaceHandler take_place) {
+void Session::start(Caller caller) {
     host_ = caller.host();
     pipeline_ = std::make_shared<Pipeline>(shared_, std::move(caller), [weak = weak_from_this()] {
         if (const auto self = weak.lock()) self->go_on();
     });
-    if (!shared_->handshakes) return read();
-    handshaking_ = true;
-    take_place_ = std::move(take_place);
-    error_code gone;
-    const asio::ip::tcp::endpoint client = stream_.socket().remote_endpoint(gone);
-    shared_->handshakes->begin(shared_from_this(), stream_, pipeline_->client(),
-                               client.address().to_string(),
-                               [this](bool secure) { on_secure(secure); });
+    if (stream_.is_secure()) take_certificate();
+    read();
 }
 
-/// The handshake keeps the session until here.
-void Session::on_secure(bool secure) {
-    const PlaceHandler take_place = std::exchange(take_place_, nullptr);
-    if (closed_) return;
-    error_code gone;
-    const asio::ip::tcp::endpoint client = stream_.socket().remote_endpoint(gone);
-    if (!secure || gone || !take_place(client)) return close();
-    handshaking_ = false;
+void Session::take_certificate() {
     const tls::Peer& peer = stream_.peer();
     const auto role = tls::certified_role(shared_->settings.tls, peer);
     if (role && !role->doubt.empty())
@@ -65,8 +51,6 @@ void Session::on_secure(bool secure) {
             rt::LogLevel::warn, "certificate without a role",
             {{"client", pipeline_->client()}, {"subject", peer.subject}, {"reason", role->doubt}});
     pipeline_->certify(peer.subject, role ? std::optional(role->word) : std::nullopt);
-    active_ = shared_->clock.now();
-    go_on();
 }
 
 Guest Session::guest() const {
@@ -83,7 +67,6 @@ asio::ip::address Session::peer() const {
 /// Refuses queued requests; otherwise a pipelining client could delay the end indefinitely.
 void Session::finish() {
     if (closed_) return;
-    if (handshaking_) return close();
     if (input_state_ == Input::served) input_state_ = Input::discarded;
     cancel_due();
     pipeline_->refuse_waiting();
@@ -122,7 +105,7 @@ void Session::go_on() {
 // finishing is discarded: closing a socket with unread input would reset replies in transit.
 
 void Session::read() {
-    if (closed_ || handshaking_ || reading_ || input_state_ == Input::ended) return;
+    if (closed_ || reading_ || input_state_ == Input::ended) return;
     if (input_state_ == Input::served && !pipeline_->has_room()) return watch_for_reset();
     reading_ = true;
     auto handler = [self = shared_from_this()](const error_code& error, std::size_t size) {
@@ -225,7 +208,7 @@ void Session::watch_for_reset() {
 
 /// Usually the kernel accepts a reply at once; the rest is written asynchronously.
 void Session::write() {
-    if (closed_ || handshaking_ || writing_) return;
+    if (closed_ || writing_) return;
     while (const Bytes* adu = pipeline_->front()) {
         error_code error;
         const std::size_t taken = stream_.write_some(asio::buffer(*adu), error);

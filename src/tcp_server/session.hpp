@@ -2,7 +2,6 @@
 
 #include <array>
 #include <boost/asio/ip/address.hpp>
-#include <boost/asio/ip/tcp.hpp>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -29,14 +28,11 @@ namespace panelgate::tcp_server {
 class Session : public std::enable_shared_from_this<Session> {
   public:
     using ClosedHandler = std::function<void(const std::shared_ptr<Session>&)>;
-    /// Finds a place for a client of this address; false: no place is left.
-    using PlaceHandler = std::function<bool(const boost::asio::ip::tcp::endpoint&)>;
 
-    Session(boost::asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
-            ClosedHandler on_closed);
+    /// With TLS the handshake is over.
+    Session(tls::Stream stream, std::shared_ptr<Shared> shared, ClosedHandler on_closed);
 
-    /// `take_place` is called at the end of its TLS handshake: not at all without TLS.
-    void start(Caller caller, PlaceHandler take_place);
+    void start(Caller caller);
     /// Returns the peer's address; for a closed connection, the unspecified address, which no allow
     /// list admits.
     boost::asio::ip::address peer() const;
@@ -45,8 +41,6 @@ class Session : public std::enable_shared_from_this<Session> {
     /// Returns what its place depends on. It is idle unless requests or replies are outstanding, or
     /// a half-sent ADU still goes on.
     Guest guest() const;
-    /// True while its TLS handshake runs: it has no place yet.
-    bool is_at_the_door() const { return handshaking_; }
     /// Takes no more requests, answers those in flight, refuses queued ones, then closes.
     void finish();
     /// Closes at once, because of what its certificate no longer allows; logged.
@@ -63,7 +57,7 @@ class Session : public std::enable_shared_from_this<Session> {
         ended,      ///< the same, after end of input
     };
 
-    void on_secure(bool secure);
+    void take_certificate();
     void go_on();
     void read();
     void on_read(const boost::system::error_code& error, std::size_t size);
@@ -84,14 +78,12 @@ class Session : public std::enable_shared_from_this<Session> {
     tls::Stream stream_;
     std::shared_ptr<Shared> shared_;
     ClosedHandler on_closed_;
-    PlaceHandler take_place_;
     std::shared_ptr<Pipeline> pipeline_;
     std::uint64_t host_{};  ///< of its address
     TimePoint active_;      ///< its last input
 
     Input input_state_ = Input::served;
     std::array<std::uint8_t, 4096> input_{};
-    bool handshaking_ = false;  ///< nothing is read or written yet
     bool reading_ = false;
     bool watching_for_reset_ = false;
     /// Holds at most one incomplete request whenever a read starts.

@@ -1,66 +1,54 @@
 #include "native.hpp"
-#include "panelgate/base/text.hpp"
 
 #include <openssl/asn1.h>
 #include <openssl/err.h>
 #include <openssl/pem.h>
+#include <openssl/x509_vfy.h>
 #include <algorithm>
 #include <array>
-#include <cstdint>
 #include <ctime>
+
+#include "panelgate/base/text.hpp"
 
 namespace panelgate::tls {
 namespace {
 
 constexpr std::size_t kLongestName = 200;
-/// Characters that end a line, or turn the rest of it round, where a log is shown.
+/// Characters that end a line, or turn the rest of the line round, where a log is shown.
 constexpr std::array<std::string_view, 13> kTurnsLines{
     "\u0085", "\u2028", "\u2029", "\u200e", "\u200f", "\u202a", "\u202b",
     "\u202c", "\u202d", "\u202e", "\u2066", "\u2067", "\u2069"};
 
+/// Nobody is asked for a password.
 int no_password(char*, int, int, void*) { return 0; }
 
 template <class T, class Read>
-std::vector<Owned<T>> all_of(std::string_view pem, Read read) {
+std::vector<Owned<T>> all_of(std::string_view pem, bool* damaged, Read read) {
     std::vector<Owned<T>> found;
-    const Owned<BIO> in = reader_of(pem);
-    while (T* one = read(in.get())) found.emplace_back(one);
+    const Owned<BIO> in(BIO_new_mem_buf(pem.data(), static_cast<int>(pem.size())));
+    ERR_clear_error();
+    while (T* one = read(in.get(), nullptr, no_password, nullptr)) found.emplace_back(one);
+    if (damaged != nullptr)
+        *damaged = ERR_GET_REASON(ERR_peek_last_error()) != PEM_R_NO_START_LINE;
     ERR_clear_error();
     return found;
 }
 
 }  // namespace
 
-Owned<BIO> reader_of(std::string_view text) {
-    return Owned<BIO>(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
+std::vector<Owned<X509>> certificates_of(std::string_view pem, bool* damaged) {
+    return all_of<X509>(pem, damaged, PEM_read_bio_X509);
 }
 
-std::vector<Owned<X509>> certificates_of(std::string_view pem) {
-    return all_of<X509>(
-        pem, [](BIO* in) { return PEM_read_bio_X509(in, nullptr, no_password, nullptr); });
+std::vector<Owned<X509_CRL>> lists_of(std::string_view pem, bool* damaged) {
+    return all_of<X509_CRL>(pem, damaged, PEM_read_bio_X509_CRL);
 }
 
-std::vector<Owned<X509_CRL>> lists_of(std::string_view pem) {
-    return all_of<X509_CRL>(
-        pem, [](BIO* in) { return PEM_read_bio_X509_CRL(in, nullptr, no_password, nullptr); });
-}
-
-bool has_signed(const X509* authority, X509_CRL* list) {
-    const bool signed_it =
-        X509_NAME_cmp(X509_get_subject_name(authority), X509_CRL_get_issuer(list)) == 0 &&
-        X509_CRL_verify(list, X509_get0_pubkey(authority)) == 1;
+Owned<EVP_PKEY> key_of(std::string_view pem) {
+    const Owned<BIO> in(BIO_new_mem_buf(pem.data(), static_cast<int>(pem.size())));
+    Owned<EVP_PKEY> key(PEM_read_bio_PrivateKey(in.get(), nullptr, no_password, nullptr));
     ERR_clear_error();
-    return signed_it;
-}
-
-std::vector<X509*> without_list(const std::vector<Owned<X509>>& authorities,
-                                const std::vector<Owned<X509_CRL>>& lists) {
-    std::vector<X509*> found;
-    for (const auto& authority : authorities)
-        if (std::ranges::none_of(
-                lists, [&](const auto& list) { return has_signed(authority.get(), list.get()); }))
-            found.push_back(authority.get());
-    return found;
+    return key;
 }
 
 bool expect_peer(X509_VERIFY_PARAM* verification, const std::string& server) {
@@ -69,17 +57,9 @@ bool expect_peer(X509_VERIFY_PARAM* verification, const std::string& server) {
     return true;
 }
 
-Owned<EVP_PKEY> key_of(std::string_view pem) {
-    const Owned<BIO> in = reader_of(pem);
-    Owned<EVP_PKEY> key(PEM_read_bio_PrivateKey(in.get(), nullptr, no_password, nullptr));
-    ERR_clear_error();
-    return key;
-}
-
 std::int64_t seconds_of(const ASN1_TIME* time) {
     std::tm parts{};
-    if (ASN1_TIME_to_tm(time, &parts) != 1) return 0;
-    return ::timegm(&parts);
+    return ASN1_TIME_to_tm(time, &parts) == 1 ? ::timegm(&parts) : 0;
 }
 
 std::string name_text(const X509_NAME* name) {
@@ -101,20 +81,36 @@ std::string subject_of(const X509* certificate) {
     return name_text(X509_get_subject_name(certificate));
 }
 
-bool is_whole(std::string_view pem, std::string_view kind, std::size_t read) {
-    constexpr std::string_view kDashes = "-----";
-    const auto count = [&](std::string_view mark) {
-        std::size_t found = 0;
-        for (std::size_t at = pem.find(mark); at != pem.npos; at = pem.find(mark, at + 1)) {
-            const std::string_view rest = pem.substr(at + mark.size());
-            const std::size_t end = rest.find(kDashes);
-            if (end != rest.npos && rest.substr(0, end).ends_with(kind)) ++found;
-        }
-        return found;
-    };
-    const std::size_t last = pem.rfind("-----END ");
-    const bool begins_another = last != pem.npos && pem.find("-----B", last) != pem.npos;
-    return !begins_another && count("-----BEGIN ") == read && count("-----END ") == read;
+Outcome outcome_of_chain(int result) {
+    switch (result) {
+        case X509_V_ERR_CERT_HAS_EXPIRED:
+        case X509_V_ERR_CERT_NOT_YET_VALID:
+            return Outcome::expired;
+        case X509_V_ERR_CERT_REVOKED:
+            return Outcome::revoked;
+        default:
+            return Outcome::untrusted;
+    }
+}
+
+std::string words_of_chain(int result) {
+    switch (result) {
+        case X509_V_ERR_CERT_HAS_EXPIRED:
+            return "has expired";
+        case X509_V_ERR_CERT_NOT_YET_VALID:
+            return "is not valid yet; compare the clocks";
+        case X509_V_ERR_CERT_REVOKED:
+            return "is revoked";
+        case X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT_LOCALLY:
+        case X509_V_ERR_UNABLE_TO_VERIFY_LEAF_SIGNATURE:
+        case X509_V_ERR_DEPTH_ZERO_SELF_SIGNED_CERT:
+        case X509_V_ERR_SELF_SIGNED_CERT_IN_CHAIN:
+            return "is not signed by the CA of `ca`";
+        case X509_V_ERR_UNABLE_TO_GET_CRL:
+            return "is of a CA whose list of revoked certificates is not in `crl`";
+        default:
+            return std::string("cannot be trusted: ") + X509_verify_cert_error_string(result);
+    }
 }
 
 }  // namespace panelgate::tls

@@ -4,10 +4,13 @@
 #include <openssl/evp.h>
 #include <openssl/ssl.h>
 #include <openssl/x509.h>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "panelgate/tls/counters.hpp"
 
 namespace panelgate::tls {
 
@@ -17,35 +20,34 @@ struct Free {
     void operator()(EVP_PKEY* key) const { EVP_PKEY_free(key); }
     void operator()(X509* certificate) const { X509_free(certificate); }
     void operator()(X509_CRL* list) const { X509_CRL_free(list); }
-    void operator()(SSL* ssl) const { SSL_free(ssl); }
-    void operator()(X509_STORE* store) const { X509_STORE_free(store); }
-    void operator()(X509_STORE_CTX* judging) const { X509_STORE_CTX_free(judging); }
-    /// Not what is in it.
-    void operator()(STACK_OF(X509) * stack) const { sk_X509_free(stack); }
 };
 template <class T>
 using Owned = std::unique_ptr<T, Free>;
 
-/// A view of text; it must outlive the result.
-Owned<BIO> reader_of(std::string_view text);
-/// All certificates of a PEM text, in order; what is none is skipped.
-std::vector<Owned<X509>> certificates_of(std::string_view pem);
-std::vector<Owned<X509_CRL>> lists_of(std::string_view pem);
-/// Those CAs that have signed none of the lists.
-std::vector<X509*> without_list(const std::vector<Owned<X509>>& authorities,
-                                const std::vector<Owned<X509_CRL>>& lists);
-/// CAs may have the same name, but not the same key.
-bool has_signed(const X509* authority, X509_CRL* list);
-/// Wants the other side's certificate to be of this address or name. True if it is a name.
-bool expect_peer(X509_VERIFY_PARAM* verification, const std::string& server);
-/// Null if there is none, or it is encrypted: nobody is asked for a password.
+/// Returns the certificates of a PEM text, in order; other objects are skipped. `damaged`, where
+/// given, becomes true for a text that ends within an object.
+std::vector<Owned<X509>> certificates_of(std::string_view pem, bool* damaged = nullptr);
+/// The same of lists of revoked certificates.
+std::vector<Owned<X509_CRL>> lists_of(std::string_view pem, bool* damaged = nullptr);
+/// Returns the key of a PEM text; null if there is none, or a password would be needed.
 Owned<EVP_PKEY> key_of(std::string_view pem);
-/// Seconds since 1970.
+
+/// Wants the other side's certificate to be of this address or name. True for a name.
+bool expect_peer(X509_VERIFY_PARAM* verification, const std::string& server);
+
+/// Returns a time in seconds since 1970.
 std::int64_t seconds_of(const ASN1_TIME* time);
+/// "CN=panel PC 3,O=Plant" as a line of a log may show it: at most 200 bytes, no control character.
 std::string name_text(const X509_NAME* name);
 std::string subject_of(const X509* certificate);
-/// True if all of a PEM text could be read, which holds `read` objects of a kind ("CERTIFICATE"):
-/// false for one that is cut off or damaged.
-bool is_whole(std::string_view pem, std::string_view kind, std::size_t read);
+
+/// Why a client is not let in.
+struct Refusal {
+    Outcome outcome = Outcome::broken;
+    std::string why;
+};
+/// Says what a verification (X509_V_ERR_*) found wrong with a certificate: "has expired".
+std::string words_of_chain(int result);
+Outcome outcome_of_chain(int result);
 
 }  // namespace panelgate::tls

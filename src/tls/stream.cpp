@@ -1,109 +1,65 @@
 #include "panelgate/tls/stream.hpp"
 
-#include <linux/sockios.h>
 #include <openssl/err.h>
 #include <openssl/ssl.h>
-#include <sys/ioctl.h>
+#include <poll.h>
 #include <sys/socket.h>
-#include <algorithm>
 #include <boost/asio/error.hpp>
+#include <boost/asio/ssl/error.hpp>
 #include <cerrno>
-#include <span>
-
-#include "engine.hpp"
-#include "proof.hpp"
 
 namespace panelgate::tls {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-namespace {
-
-/// The client's own: it ends the connection.
-bool is_alert(int reason) { return reason >= SSL_AD_REASON_OFFSET; }
-
-/// What others left would be taken for this connection's. Looking is cheaper than clearing.
-void forget_errors() {
-    if (ERR_peek_error() != 0) ERR_clear_error();
-}
-
-}  // namespace
-
-Stream::Stream(tcp::socket socket) : socket_(std::move(socket)), timer_(socket_.get_executor()) {
+Stream::Stream(tcp::socket socket) : plain_(std::move(socket)), timer_(plain_.get_executor()) {
     error_code ignored;
-    socket_.non_blocking(true, ignored);
+    plain_.non_blocking(true, ignored);
 }
 
-Stream::~Stream() = default;
+Stream::Stream(std::unique_ptr<Secure> secure)
+    : plain_(secure->get_executor()),
+      secure_(std::move(secure)),
+      peer_(peer_of(certificate())),
+      timer_(plain_.get_executor()) {}
 
-void Stream::secure(std::shared_ptr<Engine> engine) {
-    engine_ = std::move(engine);
-    engine_->use_socket(socket_.native_handle());
-    peer_ = peer_of(SSL_get0_peer_certificate(engine_->native()));
+x509_st* Stream::certificate() const {
+    return secure_ ? SSL_get0_peer_certificate(secure_->native_handle()) : nullptr;
 }
 
-std::shared_ptr<const Proof> Stream::proof() const {
-    return engine_ ? std::make_shared<const Proof>(engine_->native()) : nullptr;
-}
-
-bool Stream::holds_input() const { return engine_->holds_input(); }
-
-asio::mutable_buffer Stream::room() {
-    const std::span<char> room = engine_->room();
-    return {room.data(), room.size()};
-}
-
-void Stream::arrived(std::size_t size) { engine_->arrived(size); }
-
-/// Of SSL_read, SSL_peek and SSL_write.
-Stream::Step Stream::step_of(int result) {
-    if (result > 0) return {static_cast<std::size_t>(result), {}, Need::nothing};
-    const int why = SSL_get_error(engine_->native(), result);
-    const bool is_damaged = why == SSL_ERROR_SSL && !is_alert(ERR_GET_REASON(ERR_peek_error()));
-    forget_errors();
-    if (why == SSL_ERROR_WANT_READ) return {0, {}, Need::readable};
-    if (why == SSL_ERROR_WANT_WRITE) return {0, {}, Need::writable};
-    if (why == SSL_ERROR_ZERO_RETURN) return {0, asio::error::eof, Need::nothing};
-    if (is_damaged) return {0, make_error_code(kDamaged), Need::nothing};
-    return {0, asio::error::connection_reset, Need::nothing};
-}
-
-Stream::Step Stream::read_secure(asio::mutable_buffer into) {
-    if (!socket_.is_open()) return {0, asio::error::bad_descriptor, Need::nothing};
-    if (into.size() == 0) return {};
-    forget_errors();
-    constexpr std::size_t kMost = 1 << 20;
-    return step_of(
-        SSL_read(engine_->native(), into.data(), static_cast<int>(std::min(into.size(), kMost))));
-}
-
-Stream::Step Stream::write_secure(asio::const_buffer bytes) {
-    if (!socket_.is_open()) return {0, asio::error::bad_descriptor, Need::nothing};
-    if (bytes.size() == 0) return {};
-    forget_errors();
-    constexpr std::size_t kMost = 1 << 20;
-    return step_of(SSL_write(engine_->native(), bytes.data(),
-                             static_cast<int>(std::min(bytes.size(), kMost))));
+/// Translates what a TLS operation ends with into the words of sockets. An alert of the client ends
+/// the connection as a reset does.
+error_code Stream::told(error_code error) const {
+    if (error == asio::ssl::error::stream_truncated) return asio::error::eof;
+    if (error.category() != asio::error::get_ssl_category()) return error;
+    const int reason = ERR_GET_REASON(static_cast<unsigned long>(error.value()));
+    if (reason >= SSL_AD_REASON_OFFSET) return asio::error::connection_reset;
+    return make_error_code(kDamaged);
 }
 
 std::size_t Stream::write_some(asio::const_buffer bytes, error_code& error) {
-    if (!engine_) return socket_.write_some(bytes, error);
-    const Step step = write_secure(bytes);
-    error = step.need == Need::nothing ? step.error : error_code(asio::error::would_block);
-    return step.bytes;
+    if (!secure_) return plain_.write_some(bytes, error);
+    error = asio::error::would_block;
+    return 0;
+}
+
+void Stream::write_aside(asio::const_buffer text) {
+    error_code ignored;
+    if (!secure_)
+        plain_.write_some(text, ignored);
+    else
+        secure_->async_write_some(text, [kept = secure_](const error_code&, std::size_t) {});
 }
 
 Stream::Input Stream::look() {
-    char byte = 0;
-    if (engine_) {
-        forget_errors();
-        const Step step = step_of(SSL_peek(engine_->native(), &byte, 1));
-        if (step.need != Need::nothing) return Input::none;
-        if (step.error == asio::error::eof) return Input::end;
-        return step.error ? Input::broken : Input::bytes;
+    const int socket = this->socket().native_handle();
+    if (secure_) {
+        pollfd end{socket, POLLRDHUP, 0};
+        if (::poll(&end, 1, 0) == 1 && (end.revents & POLLRDHUP) != 0) return Input::end;
     }
-    const auto size = ::recv(socket_.native_handle(), &byte, 1, MSG_PEEK | MSG_DONTWAIT);
+    char byte = 0;
+    const auto size = ::recv(socket, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
     if (size > 0) return Input::bytes;
     if (size == 0) return Input::end;
     return errno == EAGAIN || errno == EWOULDBLOCK ? Input::none : Input::broken;
@@ -111,13 +67,7 @@ Stream::Input Stream::look() {
 
 std::size_t Stream::available() const {
     error_code ignored;
-    return socket_.available(ignored);
-}
-
-bool Stream::all_is_sent() const {
-    int bytes = 0;
-    const int socket = const_cast<tcp::socket&>(socket_).native_handle();
-    return ::ioctl(socket, SIOCOUTQ, &bytes) == 0 && bytes == 0;
+    return socket().available(ignored);
 }
 
 void Stream::expires_after(Duration patience) {
@@ -129,27 +79,24 @@ void Stream::expires_after(Duration patience) {
         });
 }
 
+/// Asio hands the alert to the socket at once, unless a write is pending; then the alert is lost.
+void Stream::say_goodbye() {
+    if (!secure_ || (SSL_get_shutdown(secure_->native_handle()) & SSL_SENT_SHUTDOWN) != 0) return;
+    secure_->async_shutdown([kept = secure_](const error_code&) {});
+}
+
 void Stream::shutdown_send() {
     error_code ignored;
-    if (engine_) {
-        forget_errors();
-        SSL_shutdown(engine_->native());
-        forget_errors();
-    }
-    socket_.shutdown(tcp::socket::shutdown_send, ignored);
+    say_goodbye();
+    socket().shutdown(tcp::socket::shutdown_send, ignored);
 }
 
 void Stream::close() {
-    if (!socket_.is_open()) return;
-    if (engine_) {
-        forget_errors();
-        SSL_shutdown(engine_->native());
-        forget_errors();
-        engine_->use_socket(-1);
-    }
+    if (!socket().is_open()) return;
     error_code ignored;
     timer_.cancel();
-    socket_.close(ignored);
+    say_goodbye();
+    socket().close(ignored);
 }
 
 }  // namespace panelgate::tls

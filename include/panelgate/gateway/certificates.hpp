@@ -13,7 +13,6 @@
 #include "panelgate/config/config.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/rt/process.hpp"
-#include "panelgate/tls/context.hpp"
 #include "panelgate/tls/counters.hpp"
 #include "panelgate/tls/settings.hpp"
 
@@ -31,18 +30,13 @@ struct ServedCertificate {
     std::string server{};  ///< the broker's name; "": it is a listener
 };
 
-/// Before a configuration takes the place of the running one: where new files must not replace
-/// those in use (tls::why_kept()), it keeps those. Returns what was not taken, and adds a warning
-/// for each. `rollback`: the files are read by no rollback, so all stay.
-std::vector<ServedCertificate> keep_good_certificates(config::Config& next,
-                                                      const std::vector<ServedCertificate>& in_use,
-                                                      std::int64_t now, bool rollback,
-                                                      std::vector<std::string>& warnings);
+/// Before a rollback, which reads no file: what is in use stays in use.
+void keep_certificates(config::Config& next, const std::vector<ServedCertificate>& in_use);
 
-/// Takes certificates, keys and lists of revoked ones into use as soon as their files have changed.
-/// A worker reads them, and makes the context when two looks agree; the loop only swaps it. What no
-/// context can be made of, and what must not replace a good one, is logged once, as is a file that
-/// is gone; the former ones stay in use. One thread; the clock outlives it.
+/// Takes certificates, keys and lists of revoked certificates into use as soon as their files have
+/// changed, if a context can be made of them. A worker reads the files, and makes the context when
+/// two looks agree; the loop only swaps it. Files that no context can be made of are logged once,
+/// as is a file that is gone; the former contents stay in use. One thread; the clock outlives it.
 class CertificateWatch {
   public:
     static constexpr Duration kEvery = 1s;
@@ -55,8 +49,6 @@ class CertificateWatch {
     void follow(const config::Config& config);
     /// What is in use.
     const std::vector<Served>& served() const { return served_; }
-    /// These files have been refused, and somebody was told why.
-    void refused(const Served& files);
     /// Of what is served, by the address alone.
     std::map<std::string, tls::Renewals> renewals() const;
     void stop();

@@ -56,8 +56,6 @@ class Gateway {
     const std::shared_ptr<const config::Config>& config() const { return snapshot_->config; }
     /// The certificates in use, which may be newer than the configuration's.
     std::vector<ServedCertificate> certificates() const;
-    /// A reload has refused these files and says why: they are not logged again.
-    void refused_certificates(const std::vector<ServedCertificate>& files);
     /// Stops accepting; accepted requests are answered within their deadline.
     void stop_accepting();
     /// True when no client's answer is outstanding and the broker knows of the end.

@@ -103,8 +103,7 @@ class Servers {
                Duration longest);
 
     /// The files of the `tls` of a listener ("http 127.0.0.1:8443") have changed.
-    void renew(const std::string& listener, const tls::Settings& settings,
-               std::shared_ptr<const tls::Context> context);
+    void renew(const std::string& listener, const tls::Settings& settings);
     void stop_accepting(Duration longest);
     bool drained();
     std::size_t pending_connections() const;

@@ -13,9 +13,6 @@
 namespace boost::asio {
 class any_io_executor;
 }
-namespace panelgate::tls {
-class Context;
-}
 
 namespace panelgate::tcp_server {
 
@@ -40,8 +37,9 @@ class Listener {
     /// Requires settings.is_same_listener(). Throws like the constructor, and then leaves
     /// everything unchanged.
     void apply(Settings settings, UnitMap units);
-    /// For connections to come: the same `tls`, whose files have changed. Ignored without TLS.
-    void renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context);
+    /// Takes the same `tls` with changed files, for connections to come; closes those whose
+    /// certificate is revoked now. Ignored without TLS.
+    void renew(const tls::Settings& settings);
     /// Returns the bound port; 0 before start().
     std::uint16_t port() const;
     Counters counters() const;

@@ -8,6 +8,7 @@
 #include "panelgate/tls/settings.hpp"
 
 struct ssl_ctx_st;
+struct x509_st;
 
 namespace panelgate::tls {
 
@@ -20,26 +21,43 @@ struct Unusable : std::runtime_error {
 };
 
 /// What the connections of a listener have in common: certificate, key, CA, list of revoked
-/// certificates, versions and suites. Immutable; shared by its connections, so that a newer one
-/// replaces it for those to come. May be used by several threads.
+/// certificates, versions and suites. Immutable: new files make a new context, for connections to
+/// come, and each connection keeps its own. May be used by several threads.
 class Context {
   public:
     /// Throws Unusable. Reads no file: settings.material has the contents.
     explicit Context(const Settings& settings);
 
     ssl_ctx_st* native() const { return context_.get(); }
-    /// The end of the certificate's validity, or of one between it and its CA, whichever is first;
-    /// in seconds since 1970.
+    /// Returns the end of the certificate's validity, or of a certificate between it and its CA,
+    /// whichever is first; in seconds since 1970.
     std::int64_t expiry() const { return expiry_; }
-    ClientCertificate client() const { return client_; }
+    /// True if a list of revoked certificates names this certificate. Looks up, computes nothing.
+    bool revokes(x509_st* certificate) const;
 
   private:
-    void use_ca(const Settings& settings);
-    void use_crl(const Settings& settings);
-
     std::shared_ptr<ssl_ctx_st> context_;
     std::int64_t expiry_ = 0;
-    ClientCertificate client_;
+};
+
+/// What a client brings to a connection to one server: whom it trusts, and its own certificate.
+/// For one connection at a time.
+class ClientContext {
+  public:
+    /// Throws Unusable. Reads no file: settings.material has the contents. `server`: the name or
+    /// address that the server's certificate must have. Without `ca` the system's CAs are trusted;
+    /// without `certificate` the client shows none.
+    ClientContext(const Settings& settings, const std::string& server);
+    ClientContext(const ClientContext&) = delete;
+    ClientContext& operator=(const ClientContext&) = delete;
+
+    ssl_ctx_st* native() const { return context_.get(); }
+    /// Returns why the server's certificate was not taken, in one sentence; "" if it was.
+    const std::string& refusal() const { return refusal_; }
+
+  private:
+    std::string refusal_;  ///< the context's verification writes it
+    std::shared_ptr<ssl_ctx_st> context_;
 };
 
 }  // namespace panelgate::tls

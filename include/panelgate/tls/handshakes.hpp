@@ -1,70 +1,67 @@
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
-#include <cstdint>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <functional>
 #include <list>
 #include <memory>
 #include <string>
-#include <vector>
 
-#include "panelgate/rt/process.hpp"
 #include "panelgate/tls/context.hpp"
 #include "panelgate/tls/counters.hpp"
 #include "panelgate/tls/settings.hpp"
+#include "panelgate/tls/stream.hpp"
 
 namespace panelgate::tls {
 
-class Pace;
-class Stream;
-
-/// The handshakes of a listener. What they compute is done by a thread of low priority, so that a
-/// flood of them costs the loop little, and their number is bounded: beyond the limit of an address
-/// its oldest one gives way, beyond that of all the oldest one of the address with most. Each has
-/// `handshake_timeout`, and begins when its address and all together have begun no more than they
-/// may a second. One thread.
+/// The handshakes of a listener. Their number is bounded: beyond the limit of an address its oldest
+/// handshake gives way, beyond the limit of all the oldest handshake of the address with most. A
+/// handshake has `handshake_timeout`, costs no OpenSSL object before the client's first bytes, and
+/// then waits for its turn: one begins each 5 ms, so that a flood leaves the loop to the lines. One
+/// thread.
 class Handshakes : public std::enable_shared_from_this<Handshakes> {
   public:
+    /// Takes a connection whose handshake is done.
+    using Done = std::function<void(Stream)>;
+
     /// `name` is the listener's, for the log. Throws Unusable.
     Handshakes(boost::asio::any_io_executor executor, std::string name, Settings settings);
     ~Handshakes();
 
-    /// For handshakes that end from now on. Files that no context can be made of are logged, and
-    /// the former ones stay in use. True if other clients are let in than before: review() those
-    /// that are.
-    bool apply(const Settings& settings);
-    /// The same, with a context made elsewhere, such as in a worker.
-    bool apply(const Settings& settings, std::shared_ptr<const Context> context);
-    const Settings& settings() const { return settings_; }
-
-    /// Makes the stream secure. `done` is called once, later, with whether it is; a failure is
-    /// logged. `owner` owns the stream; `client` is its name, `address` its address.
-    void begin(std::shared_ptr<void> owner, Stream& stream, std::string client, std::string address,
-               std::function<void(bool secure)> done);
-    /// A client that is let in: who owns its stream, and how it is told to leave.
-    struct Guest {
-        std::weak_ptr<void> owner;
-        const Stream* stream = nullptr;
-        std::function<void(const std::string& why)> leave;
-    };
-    /// Calls `leave`, later, of those who would not be let in any more. Their certificates are
-    /// judged by the thread.
-    void review(std::vector<Guest> guests);
+    /// For handshakes that begin from now on. Files that no context can be made of are logged, and
+    /// the former context stays in use.
+    void apply(const Settings& settings);
+    /// Calls `done` later, at most once: not if the handshake fails, and then the reason is logged
+    /// and the socket closed.
+    void begin(boost::asio::ip::tcp::socket socket, Done done);
+    /// Returns why a connection that was let in before must end by the present settings: its
+    /// certificate is revoked, or it has shown none; "" if it may stay.
+    std::string why_leave(const Stream& stream) const;
+    /// Ends all handshakes.
+    void stop();
     Counters counters() const;
 
   private:
-    class Conversation;
+    struct Conversation;
+    using Ref = std::shared_ptr<Conversation>;
 
     void make_room(const std::string& address);
-    void end(Conversation& conversation, Outcome outcome, const std::string& why);
+    void listen(const Ref& one);
+    void look(const Ref& one);
+    void take_turns();
+    void shake(const Ref& one);
+    void judge(const Ref& one, const boost::system::error_code& error);
+    void fail(const Ref& one, Outcome outcome, const std::string& why);
+    bool end(const Ref& one, Outcome outcome);
 
     std::string name_;
     Settings settings_;
     std::shared_ptr<const Context> context_;
-    std::unique_ptr<Pace> pace_;
-    std::list<Conversation*> running_;  ///< the oldest first; each removes itself
+    std::list<Ref> running_;  ///< the oldest first
+    boost::asio::steady_timer turn_;
+    bool turn_is_armed_ = false;
     Counters counters_;
-    rt::Worker worker_;
 };
 
 }  // namespace panelgate::tls

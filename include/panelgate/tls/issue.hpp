@@ -21,30 +21,26 @@ struct Validity {
     int days = 0;
 };
 
-/// A CA file that cannot sign, or a certificate that is none; the text says what would be right.
+/// The text says what would be right. `wrong_name`: no CA could do what was asked for.
 struct CannotIssue : std::runtime_error {
-    using std::runtime_error::runtime_error;
-};
-
-/// What was asked for cannot be had, whatever the CA: a name that is none, another CA's
-/// certificate.
-struct WrongName : CannotIssue {
-    using CannotIssue::CannotIssue;
+    explicit CannotIssue(const std::string& why, bool wrong_name = false)
+        : std::runtime_error(why), wrong_name(wrong_name) {}
+    bool wrong_name;
 };
 
 // What a small plant needs: ECDSA P-256, X.509v3, SHA-256, random serial numbers. A certificate
-// begins an hour early, because clocks differ, and ends with its CA at the latest. All throw
-// CannotIssue.
+// begins an hour early, because clocks differ, and ends with its CA at the latest. All functions
+// throw CannotIssue.
 
 Issued issue_ca(const std::string& name, const Validity& validity);
-/// `names`: host names and IP addresses; the first one is its subject, as far as that may be long.
+/// `names`: host names and IP addresses; the first name of at most 64 characters is the subject.
 Issued issue_server(const Issued& ca, const std::vector<std::string>& names,
                     const Validity& validity);
 /// With the extension of Modbus/TCP Security for the role, if one is given.
 Issued issue_client(const Issued& ca, const std::string& name,
                     const std::optional<std::string>& role, const Validity& validity);
-/// The CA's list of revoked certificates with this one added, which it has signed; `list` is the
-/// former one, or "".
+/// Returns the CA's list of revoked certificates with this certificate added; `list` is the former
+/// list, or "".
 std::string revoke(const Issued& ca, std::string_view list,
                    const std::optional<std::string_view>& certificate, const Validity& validity);
 

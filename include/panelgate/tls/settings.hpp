@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -14,7 +15,7 @@ namespace panelgate::tls {
 
 class Context;
 
-/// Whether clients show a certificate. One that is shown must always be good.
+/// Whether clients show a certificate. A certificate that is shown must always be good.
 enum class ClientCertificate : std::uint8_t { none, optional, required };
 enum class Version : std::uint8_t { tls12, tls13 };
 
@@ -37,35 +38,30 @@ struct Settings {
     bool role_from_certificate = false;
     Version lowest = Version::tls12;
     Duration handshake_timeout = 10s;
-    std::size_t max_handshakes = 128;  ///< at the same time; beyond it the oldest gives way
+    std::size_t max_handshakes = 128;  ///< at the same time; the oldest gives way to the next
     std::size_t max_handshakes_per_address = 16;
-    /// That begin; the others wait for their turn. A handshake costs the loop some tens of
-    /// microseconds, so a flood of them costs it a percent or two.
-    std::size_t handshakes_per_second = 200;
-    std::size_t handshakes_per_second_per_address = 100;
     Material material{};
     std::vector<OwnRole> own_roles{};       ///< that a client's certificate may name
     std::vector<std::string> rule_roles{};  ///< words besides that rules of `access` go by
-    /// Made of all this by whoever read the files, which takes milliseconds; null: not yet.
+    /// Made of the settings by whoever read the files, which takes milliseconds; null: not yet.
     std::shared_ptr<const Context> made{};
 
     friend bool operator==(const Settings& one, const Settings& other) {
         const auto all = [](const Settings& of) {
             return std::tie(of.certificate, of.key, of.ca, of.crl, of.client,
                             of.role_from_certificate, of.lowest, of.handshake_timeout,
-                            of.max_handshakes, of.max_handshakes_per_address,
-                            of.handshakes_per_second, of.handshakes_per_second_per_address,
-                            of.material, of.own_roles, of.rule_roles);
+                            of.max_handshakes, of.max_handshakes_per_address, of.material,
+                            of.own_roles, of.rule_roles);
         };
         return all(one) == all(other);
     }
 };
 
-/// True if every client has to show a certificate; without TLS none has.
+/// True if every client has to show a certificate; without TLS no client has to.
 inline bool wants_certificate(const std::optional<Settings>& tls) {
     return tls && tls->client == ClientCertificate::required;
 }
-/// True if the role in a client's certificate decides what it may.
+/// True if the role in a client's certificate decides what the client may do.
 inline bool goes_by_certificates(const std::optional<Settings>& tls) {
     return tls && tls->role_from_certificate;
 }

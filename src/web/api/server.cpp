@@ -77,10 +77,8 @@ void Server::stop(Duration reading) {
     crossing_->run([listener = listener_, reading] { listener->stop(reading); });
 }
 
-void Server::renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context) {
-    crossing_->run([listener = listener_, settings, context = std::move(context)] {
-        listener->renew(settings, context);
-    });
+void Server::renew(const tls::Settings& settings) {
+    crossing_->run([listener = listener_, settings] { listener->renew(settings); });
 }
 
 Counters Server::counters() const {

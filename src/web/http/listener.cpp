@@ -10,7 +10,7 @@
 #include "origin.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tls/handshakes.hpp"
-#include "panelgate/tls/roles.hpp"
+#include "panelgate/tls/peer.hpp"
 #include "router.hpp"
 #include "session.hpp"
 #include "shared.hpp"
@@ -69,8 +69,7 @@ bool has_same_right(const Caller& caller, const Settings& before, const Settings
 void HttpListener::apply(std::shared_ptr<const Site> site) {
     allowed_ = rt::AccessList(site->settings.allow);
     const std::shared_ptr<const Site> before = shared_->site;
-    const bool others =
-        handshakes_ && site->settings.tls && handshakes_->apply(*site->settings.tls);
+    if (handshakes_ && site->settings.tls) handshakes_->apply(*site->settings.tls);
     shared_->serve(std::move(site));
     const auto sessions = sessions_;
     for (const auto& [id, session] : sessions) {
@@ -83,8 +82,9 @@ void HttpListener::apply(std::shared_ptr<const Site> site) {
         if (!may_read || !has_same_right(session->caller(), before->settings, now))
             session->end_events();
     }
-    if (handshakes_) apply_roles(before->settings);
-    if (others) review();
+    if (!handshakes_) return;
+    apply_roles(before->settings);
+    dismiss_revoked();
 }
 
 namespace {
@@ -115,21 +115,19 @@ void HttpListener::apply_roles(const Settings& before) {
 }
 
 /// Running requests are answered, such as the one that has asked for the new rules.
-void HttpListener::review() {
-    std::vector<tls::Handshakes::Guest> guests;
-    for (const auto& [id, session] : sessions_) {
-        HttpSession* const one = session.get();
-        guests.push_back({session, &one->stream(), [one, shared = shared_](const std::string& why) {
-                              const Settings& settings = shared->site->settings;
-                              dismiss(settings.name(), *one, why, settings.request_timeout);
-                          }});
+void HttpListener::dismiss_revoked() {
+    const Settings& settings = shared_->site->settings;
+    const auto sessions = sessions_;
+    for (const auto& [id, session] : sessions) {
+        const std::string why = handshakes_->why_leave(session->stream());
+        if (!why.empty()) dismiss(settings.name(), *session, why, settings.request_timeout);
     }
-    handshakes_->review(std::move(guests));
 }
 
-void HttpListener::renew(const tls::Settings& settings,
-                         std::shared_ptr<const tls::Context> context) {
-    if (handshakes_ && handshakes_->apply(settings, std::move(context))) review();
+void HttpListener::renew(const tls::Settings& settings) {
+    if (!handshakes_) return;
+    handshakes_->apply(settings);
+    dismiss_revoked();
 }
 
 Counters HttpListener::counters() const {
@@ -152,13 +150,21 @@ void HttpListener::take(tcp::socket socket) {
                  {"reason", "not in the allow list"}});
         return;
     }
+    if (!handshakes_) return serve(tls::Stream(std::move(socket)));
+    handshakes_->begin(std::move(socket), [weak = weak_from_this()](tls::Stream stream) {
+        if (const auto self = weak.lock()) self->serve(std::move(stream));
+    });
+}
+
+/// `allow` may have changed during the handshake.
+void HttpListener::serve(tls::Stream stream) {
+    error_code gone;
+    const tcp::endpoint peer = stream.socket().remote_endpoint(gone);
+    if (gone || !allowed_.allows(peer.address())) return;
     const auto caller =
         std::make_shared<Caller>(shared_->site->next_caller(), peer.address().to_string());
-    auto session = std::make_shared<HttpSession>(
-        std::move(socket), shared_, caller, handshakes_, [self = weak_from_this(), caller] {
-            const auto listener = self.lock();
-            return listener && listener->make_room(*caller);
-        });
+    const bool probes_only = make_room(*caller);
+    auto session = std::make_shared<HttpSession>(std::move(stream), shared_, caller, probes_only);
     sessions_.emplace(caller->id(), session);
     open_ = sessions_.size();
     asio::co_spawn(
@@ -191,6 +197,7 @@ bool HttpListener::make_room(const Caller& caller) {
 
 void HttpListener::stop(Duration reading) {
     acceptor_.close();
+    if (handshakes_) handshakes_->stop();
     const auto sessions = sessions_;
     for (const auto& [id, session] : sessions) session->stop(reading);
 }

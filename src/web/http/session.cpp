@@ -24,7 +24,7 @@
 #include "origin.hpp"
 #include "panelgate/base/network.hpp"
 #include "panelgate/rt/log.hpp"
-#include "panelgate/tls/roles.hpp"
+#include "panelgate/tls/peer.hpp"
 #include "panelgate/web/http/problem.hpp"
 #include "router.hpp"
 
@@ -68,7 +68,8 @@ void Departure::watch_input() {
 
 void Departure::look_at_input() {
     switch (stream_.look()) {
-        case tls::Stream::Input::bytes:
+        case tls::Stream::Input::bytes:  // with TLS they may announce the end
+            if (stream_.is_secure()) ask_later();
             return;
         case tls::Stream::Input::end:
             return ask_later();
@@ -83,7 +84,7 @@ void Departure::ask_later() {
     timer_.expires_after(grace_);
     timer_.async_wait([this, owner = owner_.lock()](const error_code& cancelled) {
         if (cancelled || !running_ || !socket_.is_open()) return;
-        if (ask_) ask_();
+        if (ask_ && stream_.look() != tls::Stream::Input::bytes) ask_();
         ask_later();
     });
 }
@@ -128,15 +129,12 @@ HttpResponse too_many_streams(decltype(HttpResponse::headers) headers) {
 
 }  // namespace
 
-HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
-                         std::shared_ptr<Caller> caller,
-                         std::shared_ptr<tls::Handshakes> handshakes,
-                         std::function<bool()> take_place)
-    : stream_(std::move(socket)),
+HttpSession::HttpSession(tls::Stream stream, std::shared_ptr<Shared> shared,
+                         std::shared_ptr<Caller> caller, bool probes_only)
+    : stream_(std::move(stream)),
       shared_(std::move(shared)),
-      handshakes_(std::move(handshakes)),
       caller_(std::move(caller)),
-      take_place_(std::move(take_place)),
+      probes_only_(probes_only),
       buffer_(kHeaderLimit + kReadSize + shared_->site->settings.max_body),
       departure_(stream_, shared_->site->settings.half_close_grace),
       turn_(stream_.get_executor()),
@@ -145,39 +143,14 @@ HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<Shared> s
     ErrorCode ignored;
     stream_.socket().set_option(asio::ip::tcp::no_delay(true), ignored);
     local_ = stream_.socket().local_endpoint(ignored).address();
-    if (!handshakes_) probes_only_ = take_place_();
+    take_certificate();
 }
 
 asio::awaitable<void> HttpSession::run(std::shared_ptr<HttpSession> self) {
     self->departure_.start(self, [session = self.get()] { session->abandon(); });
-    asio::awaitable<bool> securing = self->secure();
-    bool more = co_await std::move(securing);
+    bool more = true;
     while (more && !self->stopping_) more = co_await self->serve_one();
     self->abandon();
-}
-
-/// Waits for the handshake, if the listener has TLS; false: it failed, and is logged.
-asio::awaitable<bool> HttpSession::secure() {
-    if (!handshakes_) co_return true;
-    ErrorCode ignored;
-    const tcp::endpoint client = stream_.socket().remote_endpoint(ignored);
-    const std::string name = endpoint_text(caller_->address(), client.port());
-    bool ended = false;
-    bool secure = false;
-    turn_.expires_at(asio::steady_timer::time_point::max());
-    std::function<void(bool)> done = [this, &ended, &secure](bool is_secure) {
-        ended = true;
-        secure = is_secure;
-        turn_.cancel();
-    };
-    handshakes_->begin(shared_from_this(), stream_, name, caller_->address(), std::move(done));
-    while (!ended) {  // stop() cancels the timer, too, and then closes the connection
-        turn_.expires_at(asio::steady_timer::time_point::max());
-        co_await turn_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
-    }
-    if (secure) probes_only_ = take_place_();
-    if (secure) take_certificate();
-    co_return secure;
 }
 
 void HttpSession::take_certificate() {
@@ -272,13 +245,9 @@ asio::awaitable<void> HttpSession::wait_for_rate_limit(const HttpResponse* respo
     co_await turn_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 }
 
-/// Sent before the reply: the socket buffer is empty, so it is written whole; of TLS a part of a
-/// record would have to be finished. Clients skip it (RFC 9110 15.2).
-void HttpSession::send_interim() {
-    ErrorCode ignored;
-    if (stream_.is_secure() && !stream_.all_is_sent()) return;
-    stream_.write_some(asio::buffer(kContinue), ignored);
-}
+/// Sent before the reply: the socket buffer is empty, so it is written whole. Clients skip it (RFC
+/// 9110 15.2).
+void HttpSession::send_interim() { stream_.write_aside(asio::buffer(kContinue)); }
 
 /// Reads one complete request into parser_.
 asio::awaitable<boost::system::error_code> HttpSession::receive() {
@@ -295,7 +264,7 @@ asio::awaitable<boost::system::error_code> HttpSession::receive() {
             space, asio::redirect_error(asio::use_awaitable, error));
         if (error) co_return error;
         buffer_.commit(n);
-        if (!handshakes_ && speaks_tls()) co_return asio::error::no_protocol_option;
+        if (!stream_.is_secure() && speaks_tls()) co_return asio::error::no_protocol_option;
     }
     asked_before_ = true;
     stream_.expires_after(shared_->site->settings.request_timeout);
@@ -375,7 +344,7 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
         response.shared_body = std::make_shared<const std::string>(std::move(response.body));
     if (head || response.shared_body) {
         http::response<http::empty_body> message;
-        set_head(message, response, keep_alive, shared_->site->product, handshakes_ != nullptr);
+        set_head(message, response, keep_alive, shared_->site->product, stream_.is_secure());
         co_await http::async_write(stream_, message,
                                    asio::redirect_error(asio::use_awaitable, error));
         // In pieces of 64 KB, between which the loop serves others: Beast would pass the whole body
@@ -387,7 +356,7 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
         }
     } else {
         http::response<http::string_body> message;
-        set_head(message, response, keep_alive, shared_->site->product, handshakes_ != nullptr);
+        set_head(message, response, keep_alive, shared_->site->product, stream_.is_secure());
         message.body() = std::move(response.body);
         co_await http::async_write(stream_, message,
                                    asio::redirect_error(asio::use_awaitable, error));
@@ -403,7 +372,7 @@ std::string HttpSession::head_of_events(const HttpResponse& response) const {
     return "HTTP/1.1 200 OK\r\nServer: " + shared_->site->product +
            "\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n"
            "X-Content-Type-Options: nosniff\r\n" +
-           (handshakes_ ? "Strict-Transport-Security: " + std::string(kStrictTransport) + "\r\n"
+           (stream_.is_secure() ? "Strict-Transport-Security: " + std::string(kStrictTransport) + "\r\n"
                         : "") +
            more + "Connection: close\r\n\r\n: panelgate\n\n";
 }

@@ -14,7 +14,6 @@
 
 #include "beast_message.hpp"
 #include "panelgate/base/time.hpp"
-#include "panelgate/tls/handshakes.hpp"
 #include "panelgate/tls/stream.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "router.hpp"
@@ -61,11 +60,10 @@ class Departure {
 /// run() has ended; single-threaded.
 class HttpSession : public std::enable_shared_from_this<HttpSession> {
   public:
-    /// `take_place` is called once, when its TLS handshake is over, if there is one. If it returns
-    /// true, a single request is answered, and only a probe.
-    HttpSession(boost::asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
-                std::shared_ptr<Caller> caller, std::shared_ptr<tls::Handshakes> handshakes,
-                std::function<bool()> take_place);
+    /// With TLS the handshake is over. `probes_only`: a single request is answered, and only a
+    /// probe.
+    HttpSession(tls::Stream stream, std::shared_ptr<Shared> shared, std::shared_ptr<Caller> caller,
+                bool probes_only);
 
     /// Serves until the client leaves, breaks the protocol or is idle for too long, or until
     /// stop().
@@ -90,7 +88,6 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     using Parser = boost::beast::http::request_parser<boost::beast::http::string_body>;
     using ErrorCode = boost::system::error_code;
 
-    boost::asio::awaitable<bool> secure();
     boost::asio::awaitable<ErrorCode> receive();
     bool speaks_tls() const;
     std::string head_of_events(const HttpResponse& response) const;
@@ -114,12 +111,10 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
 
     tls::Stream stream_;
     std::shared_ptr<Shared> shared_;
-    std::shared_ptr<tls::Handshakes> handshakes_;  ///< null: plain HTTP
     std::shared_ptr<Caller> caller_;
     boost::asio::ip::address local_;  ///< local address
-    std::function<bool()> take_place_;
     std::string reader_;
-    bool probes_only_ = false;
+    bool probes_only_;
     boost::beast::flat_buffer buffer_;
     std::optional<Parser> parser_;
     Departure departure_;

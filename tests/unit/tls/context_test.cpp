@@ -49,6 +49,18 @@ TEST(Context, SaysInOneSentenceWhatIsWrongWithAFile) {
               "(-----BEGIN X509 CRL-----)");
 }
 
+TEST(Context, FilesThatAreCutOffMakeNone) {
+    const TestPlant plant;
+    const std::string both = plant.ca.certificate + issue_ca("Second", valid()).certificate;
+    Settings settings = plant.settings();
+    settings.material.ca = both;
+    EXPECT_EQ(fault_of(settings), "");
+    for (const std::size_t size : {both.size() - 5, both.size() - 200}) {
+        settings.material.ca = both.substr(0, size);
+        EXPECT_EQ(fault_of(settings).substr(0, 24), "ca: ca.crt is damaged or");
+    }
+}
+
 TEST(Context, KnowsWhenItsCertificateEnds) {
     const TestPlant plant;
     const std::int64_t end = Context(plant.settings()).expiry();

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/write.hpp>
+#include <list>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -23,15 +26,17 @@ class HandshakesTest : public ::testing::Test {
     void serve(const Settings& settings) {
         handshakes = std::make_shared<Handshakes>(io.get_executor(), "127.0.0.1:802", settings);
     }
-    /// Begins one; the result is in `results` then.
-    std::shared_ptr<Stream> begin(asio::ip::tcp::socket socket, const std::string& address = "a") {
-        auto stream = std::make_shared<Stream>(std::move(socket));
-        handshakes->begin(stream, *stream, "127.0.0.1:1", address,
-                          [this](bool secure) { results.push_back(secure); });
-        return stream;
+    /// Begins one; a stream that is let in is in `streams` then.
+    void begin(asio::ip::tcp::socket socket) {
+        handshakes->begin(std::move(socket),
+                          [this](Stream stream) { streams.emplace_back(std::move(stream)); });
     }
-    void run_until(std::size_t ended) {
-        while (results.size() < ended) {
+    std::size_t ended() const {
+        const auto counts = handshakes->counters().handshakes;
+        return std::accumulate(counts.begin(), counts.end(), std::size_t{});
+    }
+    void run_until(std::size_t count) {
+        while (ended() < count) {
             io.restart();
             io.run_one();
         }
@@ -44,36 +49,36 @@ class HandshakesTest : public ::testing::Test {
         std::thread thread([&] {
             if (client.connect(sockets.client.native_handle())) client.read();
         });
-        last = begin(std::move(sockets.server));
-        run_until(1);
-        last->close();
+        const auto before = handshakes->counters().handshakes;
+        begin(std::move(sockets.server));
+        run_until(ended() + 1);
+        for (Stream& stream : streams) stream.close();
         thread.join();
         for (std::size_t i = 0; i < kOutcomeWords.size(); ++i)
-            if (handshakes->counters().handshakes[i] > 0) return static_cast<Outcome>(i);
+            if (handshakes->counters().handshakes[i] > before[i]) return static_cast<Outcome>(i);
         return Outcome::broken;
     }
 
     TestPlant plant;
     asio::io_context io{1};
     std::shared_ptr<Handshakes> handshakes;
-    std::vector<bool> results;
-    std::shared_ptr<Stream> last;
+    std::list<Stream> streams;
 };
 
 TEST_F(HandshakesTest, KnowsWhoIsThereByTheCertificate) {
     serve(plant.settings(ClientCertificate::required));
     const Issued panel = issue_client(plant.ca, "panel PC", "operator", valid());
     EXPECT_EQ(outcome_for(panel), Outcome::done);
-    EXPECT_EQ(last->peer().subject, "CN=panel PC");
-    EXPECT_EQ(last->peer().role, "operator");
-    EXPECT_TRUE(last->peer().role_fault.empty());
+    EXPECT_EQ(streams.back().peer().subject, "CN=panel PC");
+    EXPECT_EQ(streams.back().peer().role, "operator");
+    EXPECT_TRUE(streams.back().peer().role_fault.empty());
 }
 
 TEST_F(HandshakesTest, NeedsNoCertificateWhereNoneIsAskedFor) {
     serve(plant.settings());
     EXPECT_EQ(outcome_for({}), Outcome::done);
-    EXPECT_EQ(last->peer().subject, "");
-    EXPECT_EQ(last->peer().role, std::nullopt);
+    EXPECT_EQ(streams.back().peer().subject, "");
+    EXPECT_EQ(streams.back().peer().role, std::nullopt);
 }
 
 TEST_F(HandshakesTest, RefusesWhoHasNone) {
@@ -113,9 +118,7 @@ TEST_F(HandshakesTest, RefusesARevokedOneAlsoByAnOverdueList) {
     settings.material.crl = revoke(plant.ca, "", lost.certificate, past);
     serve(settings);
     EXPECT_EQ(outcome_for(lost), Outcome::revoked);
-    results.clear();
-    outcome_for(issue_client(plant.ca, "other", "operator", valid()));
-    EXPECT_EQ(count(*handshakes, Outcome::done), 1u);
+    EXPECT_EQ(outcome_for(issue_client(plant.ca, "other", "operator", valid())), Outcome::done);
 }
 
 TEST_F(HandshakesTest, NamesBytesThatAreNoTls) {
@@ -124,7 +127,6 @@ TEST_F(HandshakesTest, NamesBytesThatAreNoTls) {
     begin(std::move(sockets.server));
     asio::write(sockets.client, asio::buffer(std::string("GET / HTTP/1.1\r\n\r\n")));
     run_until(1);
-    EXPECT_EQ(results, std::vector{false});
     EXPECT_EQ(count(*handshakes, Outcome::plain), 1u);
 }
 
@@ -139,39 +141,19 @@ TEST_F(HandshakesTest, EndsAHandshakeThatDoesNotGoOn) {
     EXPECT_EQ(count(*handshakes, Outcome::timeout), 1u);
 }
 
-TEST_F(HandshakesTest, OfAddressesWithEquallyManyTheOldestGivesWay) {
-    Settings settings = plant.settings();
-    settings.max_handshakes = 3;
-    serve(settings);
-    std::vector<std::shared_ptr<Stream>> streams;
-    std::vector<std::unique_ptr<Sockets>> sockets;
-    std::vector<std::string> gone;
-    for (const char* address : {"c", "a", "b", "d"}) {
-        sockets.push_back(std::make_unique<Sockets>(io));
-        streams.push_back(std::make_shared<Stream>(std::move(sockets.back()->server)));
-        handshakes->begin(streams.back(), *streams.back(), "127.0.0.1:1", address,
-                          [&gone, address](bool) { gone.emplace_back(address); });
-    }
-    EXPECT_EQ(gone, std::vector<std::string>{"c"});
-    for (const auto& stream : streams) stream->close();
-    while (gone.size() < 4) io.run_one();
-}
-
-TEST_F(HandshakesTest, TheOldestOfAnAddressGivesWayBeyondItsLimit) {
+TEST_F(HandshakesTest, TheOldestOfAnAddressGivesWayBeyondItsLimitAndStopEndsAll) {
     Settings settings = plant.settings();
     settings.max_handshakes_per_address = 2;
-    settings.max_handshakes = 4;
     serve(settings);
-    std::vector<std::shared_ptr<Stream>> streams;
-    std::vector<std::unique_ptr<Sockets>> sockets;
-    for (const char* address : {"a", "a", "a", "b", "b", "c"}) {
-        sockets.push_back(std::make_unique<Sockets>(io));
-        streams.push_back(begin(std::move(sockets.back()->server), address));
-    }
+    std::list<Sockets> sockets;
+    for (int i = 0; i < 4; ++i) begin(std::move(sockets.emplace_back(io).server));
     EXPECT_EQ(count(*handshakes, Outcome::displaced), 2u);
-    EXPECT_EQ(results.size(), 2u);
-    for (const auto& stream : streams) stream->close();
-    run_until(6);
+    char byte = 0;
+    boost::system::error_code end;
+    sockets.front().client.read_some(asio::buffer(&byte, 1), end);
+    EXPECT_EQ(end, asio::error::eof) << "the oldest";
+    handshakes->stop();
+    EXPECT_EQ(count(*handshakes, Outcome::displaced), 4u);
 }
 
 TEST_F(HandshakesTest, CarriesWhatComesTogetherWithTheHandshakesEnd) {
@@ -184,21 +166,26 @@ TEST_F(HandshakesTest, CarriesWhatComesTogetherWithTheHandshakesEnd) {
         if (!client.connect(sockets.client.native_handle()) || !client.write("ping")) return;
         reply = client.read();
     });
-    const auto stream = begin(std::move(sockets.server));
+    begin(std::move(sockets.server));
     run_until(1);
+    Stream& stream = streams.back();
     std::string text(16, ' ');
-    stream->async_read_some(asio::buffer(text),
-                            [&](const boost::system::error_code& error, std::size_t size) {
-                                EXPECT_FALSE(error);
-                                text.resize(size);
-                                results.push_back(true);
-                            });
-    run_until(2);
+    bool answered = false;
+    stream.async_read_some(
+        asio::buffer(text), [&](const boost::system::error_code& error, std::size_t size) {
+            EXPECT_FALSE(error);
+            text.resize(size);
+            const std::array parts{asio::buffer("po", 2), asio::buffer("ng", 2)};
+            asio::async_write(stream, parts,
+                              [&](const boost::system::error_code& failed, std::size_t) {
+                                  EXPECT_FALSE(failed);
+                                  answered = true;
+                              });
+        });
+    while (!answered) io.run_one();
     EXPECT_EQ(text, "ping");
-    boost::system::error_code error;
-    EXPECT_EQ(stream->write_some(asio::buffer(std::string("pong")), error), 4u);
     thread.join();
-    EXPECT_EQ(reply, "pong");
+    EXPECT_EQ(reply, "pong") << "one record";
 }
 
 TEST_F(HandshakesTest, NewFilesAreForConnectionsToCome) {
@@ -215,92 +202,26 @@ TEST_F(HandshakesTest, NewFilesAreForConnectionsToCome) {
     EXPECT_EQ(outcome_for({}), Outcome::done);
 }
 
-class ReviewTest : public HandshakesTest {
-  protected:
-    /// A client that was let in.
-    struct Guest {
-        std::shared_ptr<Stream> stream;
-        std::vector<std::string> told{};
-    };
-    void let_in(Guest& guest, const Issued& identity) {
-        Sockets sockets(io);
-        TestClient client(identity);
-        sockets.client.native_non_blocking(false);
-        std::thread thread([&] { client.connect(sockets.client.native_handle()); });
-        results.clear();
-        guest.stream = begin(std::move(sockets.server));
-        run_until(1);
-        thread.join();
-    }
-    /// What the clients are told once `settings` apply.
-    bool apply(const Settings& settings, std::initializer_list<Guest*> guests) {
-        if (!handshakes->apply(settings)) return false;
-        std::vector<Handshakes::Guest> all;
-        for (Guest* guest : guests)
-            all.push_back({guest->stream, guest->stream.get(),
-                           [guest](const std::string& why) { guest->told.push_back(why); }});
-        handshakes->review(std::move(all));
-        io.restart();
-        io.run();
-        return true;
-    }
-};
-
-TEST_F(ReviewTest, WhoWouldNotBeLetInNowIsToldWhyAndNobodyElse) {
-    const Issued scada = issue_client(plant.ca, "scada", {}, valid());
+TEST_F(HandshakesTest, WhoIsRevokedOrNowNeedsACertificateMustLeave) {
     const Issued lost = issue_client(plant.ca, "lost", {}, valid());
     Settings settings = plant.settings(ClientCertificate::optional);
     serve(settings);
-    Guest good;
-    Guest bad;
-    Guest nobody;
-    let_in(good, scada);
-    let_in(bad, lost);
-    let_in(nobody, {});
+    outcome_for(issue_client(plant.ca, "scada", {}, valid()));
+    outcome_for(lost);
+    outcome_for({});
+    const auto leaving = [&] {
+        std::vector<std::string> all;
+        for (const Stream& stream : streams) all.push_back(handshakes->why_leave(stream));
+        return all;
+    };
+    EXPECT_EQ(leaving(), (std::vector<std::string>{"", "", ""}));
     settings.crl = "crl.pem";
     settings.material.crl = revoke(plant.ca, "", lost.certificate, valid());
-    ASSERT_TRUE(apply(settings, {&good, &bad, &nobody}));
-    EXPECT_EQ(bad.told, std::vector<std::string>{"the client's certificate CN=lost is revoked"});
     settings.client = ClientCertificate::required;
-    ASSERT_TRUE(apply(settings, {&good, &nobody}));
-    EXPECT_EQ(nobody.told,
-              std::vector<std::string>{"the client has shown no certificate, and now must"});
-    EXPECT_TRUE(good.told.empty());
-    settings.material.ca = issue_ca("Another", valid()).certificate;
-    settings.crl = settings.material.crl = "";
-    ASSERT_TRUE(apply(settings, {&good}));
-    EXPECT_EQ(good.told, std::vector<std::string>{
-                             "the client's certificate CN=scada is not signed by the CA of `ca`"});
-}
-
-TEST_F(ReviewTest, AnotherPairOfTheGatewayIsNoReasonToReview) {
-    Settings settings = plant.settings(ClientCertificate::required);
-    serve(settings);
-    const Issued another = issue_server(plant.ca, {"gateway.plant"}, valid());
-    settings.material.certificate = another.certificate;
-    settings.material.key = another.key;
-    EXPECT_FALSE(handshakes->apply(settings));
-}
-
-TEST_F(ReviewTest, AHandshakeThatBeganByFormerRulesIsJudgedByTheNewOnes) {
-    const Issued lost = issue_client(plant.ca, "lost", {}, valid());
-    Settings settings = plant.settings(ClientCertificate::required);
-    serve(settings);
-    Sockets sockets(io);
-    TestClient client(lost);
-    sockets.client.native_non_blocking(false);
-    last = begin(std::move(sockets.server));
-    settings.crl = "crl.pem";
-    settings.material.crl = revoke(plant.ca, "", lost.certificate, valid());
-    EXPECT_TRUE(handshakes->apply(settings));
-    std::thread thread([&] {
-        if (client.connect(sockets.client.native_handle())) client.read();
-    });
-    run_until(1);
-    last->close();
-    thread.join();
-    EXPECT_EQ(results, std::vector<bool>{false});
-    EXPECT_EQ(count(*handshakes, Outcome::revoked), 1U);
+    handshakes->apply(settings);
+    EXPECT_EQ(leaving(), (std::vector<std::string>{
+                             "", "the client's certificate CN=lost is revoked",
+                             "the client has shown no certificate, and now must"}));
 }
 
 }  // namespace

@@ -21,7 +21,6 @@
 #include "panelgate/web/http/settings.hpp"
 
 namespace panelgate::tls {
-class Context;
 struct Settings;
 }  // namespace panelgate::tls
 namespace panelgate::web {
@@ -100,7 +99,7 @@ class Server {
     /// Number of open connections; falls to 0 after stop().
     std::size_t connections() const;
     /// As HttpListener::renew().
-    void renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context);
+    void renew(const tls::Settings& settings);
     /// The counters as they were when /metrics was asked for last.
     Counters counters() const;
 

@@ -15,8 +15,8 @@
 #include "panelgate/web/http/message.hpp"
 
 namespace panelgate::tls {
-class Context;
 class Handshakes;
+class Stream;
 }  // namespace panelgate::tls
 namespace panelgate::web {
 
@@ -45,16 +45,18 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
     /// Closes everything; outstanding replies are not sent.
     void abandon();
     std::size_t connections() const { return open_; }
-    /// For connections to come: the same `tls`, whose files have changed. Ignored without TLS.
-    void renew(const tls::Settings& settings, std::shared_ptr<const tls::Context> context);
+    /// Takes the same `tls` with changed files, for connections to come; those whose certificate is
+    /// revoked now are closed behind the running request. Ignored without TLS.
+    void renew(const tls::Settings& settings);
     Counters counters() const;
 
   private:
     void take(boost::asio::ip::tcp::socket socket);
+    void serve(tls::Stream stream);
     /// True if it gets one of the places for probes only.
     bool make_room(const Caller& caller);
-    /// Lets those go whose certificate does not count any more.
-    void review();
+    /// Lets clients go whose certificate does not count any more.
+    void dismiss_revoked();
     void apply_roles(const Settings& before);
 
     std::shared_ptr<Shared> shared_;
