@@ -51,6 +51,7 @@ Trail::End Trail::close() {
 
 void Trail::add(const Members& record) {
     const std::string body = body_of(record) + '\n';
+    bool wakes = false;
     {
         const std::scoped_lock lock(mutex_);
         if (pending_.size() + body.size() > settings_.buffer) {
@@ -58,9 +59,10 @@ void Trail::add(const Members& record) {
             ++counters_.lost;
             return;
         }
+        wakes = pending_.empty() || pending_.size() > settings_.buffer / 2;
         pending_ += body;
     }
-    wake_.notify_one();
+    if (wakes) wake_.notify_one();
 }
 
 void Trail::apply(const Settings& settings) {
@@ -83,6 +85,12 @@ void Trail::run() {
         work();
         if (!failing_) anchor();
     }
+    if (failing_) return;
+    {  // what came while the disk took nothing, and the count of what was lost
+        const std::scoped_lock lock(mutex_);
+        take_over();
+    }
+    work();
 }
 
 /// Waits until there is something to do, and then a little for more. True: that was the last time.
