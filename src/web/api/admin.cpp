@@ -193,14 +193,12 @@ Handling get_configuration(HttpRequest request, const Api* api) {
             configuration_text(*api, who, all ? text : seen_configuration(text, sight)),
             "application/json");
     }
-    Handling giving = KeptAnswer::give(kept, std::move(request));
-    HttpResponse response = co_await std::move(giving);
-    co_return response;
+    co_return KeptAnswer::give(kept, request);
 }
 
 Handling get_openapi(HttpRequest request, const Api*) {
     static const auto kept = std::make_shared<KeptAnswer>(openapi_text(), "application/json");
-    return KeptAnswer::give(kept, std::move(request));
+    co_return KeptAnswer::give(kept, request);
 }
 
 Handling get_version(HttpRequest, const Api* api) {

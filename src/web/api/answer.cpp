@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <boost/asio/this_coro.hpp>
 #include <cstdio>
 
 #include "panelgate/profile/notation.hpp"
@@ -105,22 +104,10 @@ std::string csv_line(const json::object& object, std::span<const std::string_vie
     return csv_line(fields);
 }
 
-boost::asio::awaitable<void> yield_turn() {
-    const auto executor = co_await boost::asio::this_coro::executor;
-    co_await boost::asio::post(executor, boost::asio::use_awaitable);
-}
-
-boost::asio::awaitable<std::string> packed(std::string body) {
-    constexpr std::size_t kOfATurn = 16 * 1024;  // bytes: about 0.3 ms of work
+std::string packed(std::string_view body) {
     Gzip gzip;
-    for (std::string_view left = body; !left.empty();) {
-        const std::string_view piece = left.substr(0, kOfATurn);
-        gzip.add(piece);
-        left.remove_prefix(piece.size());
-        boost::asio::awaitable<void> turn = yield_turn();
-        if (!left.empty()) co_await std::move(turn);
-    }
-    co_return gzip.finish();
+    gzip.add(body);
+    return gzip.finish();
 }
 
 void LongAnswer::begin_member(std::string_view name) {
@@ -138,7 +125,6 @@ LongAnswer& LongAnswer::begin_list(std::string_view name) {
 void LongAnswer::add(const json::value& entry) {
     if (!std::exchange(is_first_, false)) text_ += ',';
     text_ += json_text(entry);
-    ++entries_;
 }
 
 LongAnswer& LongAnswer::end_list() {
@@ -153,43 +139,39 @@ LongAnswer& LongAnswer::member(std::string_view name, const json::value& value) 
     return *this;
 }
 
-bool LongAnswer::is_turn_over() {
-    constexpr std::size_t kOfATurn = 16;  // entries: about 0.1 ms of work
-    if (entries_ < kOfATurn) return false;
-    entries_ = 0;
-    return true;
+std::string LongAnswer::text() { return std::move(text_) + "}\n"; }
+
+namespace {
+
+std::string csv_of(const Table& table) {
+    std::string lines = csv_line(table.columns);
+    for (std::size_t i = 0; i < table.count; ++i) lines += csv_line(table.entry(i), table.columns);
+    return lines;
 }
 
-HttpResponse LongAnswer::response() {
-    return text_response(200, std::move(text_) + "}\n", "application/json");
-}
-
-Handling table_answer(HttpRequest request, Table table) {
-    const bool as_csv = !table.columns.empty() && wants_csv(request.headers["accept"]);
+std::string json_of(const Table& table) {
     LongAnswer body;
     for (const auto& [name, value] : table.members) body.member(name, value);
-    std::string lines = csv_line(table.columns);
     body.begin_list(table.name);
-    for (std::size_t i = 0; i < table.count; ++i) {
-        const json::object one = table.entry(i);
-        if (as_csv) {
-            lines += csv_line(one, table.columns);
-            body.add(nullptr);  // only to count entries for is_turn_over()
-        } else {
-            body.add(one);
-        }
-        if (!body.is_turn_over()) continue;
-        boost::asio::awaitable<void> turn = yield_turn();
-        co_await std::move(turn);
-        if (request.caller->has_left()) co_return HttpResponse{};
-    }
+    for (std::size_t i = 0; i < table.count; ++i) body.add(table.entry(i));
     body.end_list();
     for (const auto& [name, value] : table.behind) body.member(name, value);
-    HttpResponse response = body.response();
-    if (as_csv)
-        response = text_response(200, std::move(lines), "text/csv; charset=utf-8; header=present");
+    return body.text();
+}
+
+}  // namespace
+
+HttpResponse table_answer(const HttpRequest& request, Table table) {
+    const auto accept = request.headers.find("accept");
+    const bool as_csv =
+        !table.columns.empty() && accept != request.headers.end() && wants_csv(accept->second);
+    HttpResponse response;
+    if (as_csv) response.content_type = "text/csv; charset=utf-8; header=present";
     if (!table.columns.empty()) response.headers.emplace_back("Vary", "Accept");
-    co_return response;
+    response.finish = [as_csv, table = std::move(table)](HttpResponse& made) {
+        made.body = as_csv ? csv_of(table) : json_of(table);
+    };
+    return response;
 }
 
 KeptAnswer::KeptAnswer(std::string text, std::string_view content_type)
@@ -197,22 +179,25 @@ KeptAnswer::KeptAnswer(std::string text, std::string_view content_type)
       tag_(tag_of(*text_)),
       content_type_(content_type) {}
 
-boost::asio::awaitable<HttpResponse> KeptAnswer::give(std::shared_ptr<KeptAnswer> self,
-                                                      HttpRequest request) {
+HttpResponse KeptAnswer::give(const std::shared_ptr<KeptAnswer>& self, const HttpRequest& request) {
+    const auto header = [&](const char* name) {
+        const auto found = request.headers.find(name);
+        return found == request.headers.end() ? std::string() : found->second;
+    };
     HttpResponse response;
     response.content_type = self->content_type_;
-    const bool known = add_etag(response, request.headers["if-none-match"], self->tag_);
+    const bool known = add_etag(response, header("if-none-match"), self->tag_);
     response.headers.emplace_back("Vary", "Accept-Encoding");
-    if (known) co_return response;
+    if (known) return response;
     response.shared_body = self->text_;
-    if (!accepts_gzip(request.headers["accept-encoding"])) co_return response;
-    if (!self->packed_) {
-        boost::asio::awaitable<std::string> packing = packed(*self->text_);
-        self->packed_ = std::make_shared<const std::string>(co_await std::move(packing));
-    }
-    response.shared_body = self->packed_;
+    if (!accepts_gzip(header("accept-encoding"))) return response;
     response.headers.emplace_back("Content-Encoding", "gzip");
-    co_return response;
+    response.finish = [self](HttpResponse& made) {
+        if (!self->packed_)
+            self->packed_ = std::make_shared<const std::string>(packed(*self->text_));
+        made.shared_body = self->packed_;
+    };
+    return response;
 }
 
 namespace {

@@ -36,13 +36,10 @@ std::string csv_line(std::span<const std::string_view> fields);
 /// The same from an object's members: null and missing ones become empty fields.
 std::string csv_line(const boost::json::object& object, std::span<const std::string_view> columns);
 
-/// Packs a body with gzip, in pieces that yield to the loop.
-boost::asio::awaitable<std::string> packed(std::string body);
-/// Yields to the loop. If the caller leaves meanwhile, what its request refers to may be gone.
-boost::asio::awaitable<void> yield_turn();
+/// The body packed with gzip.
+std::string packed(std::string_view body);
 
-/// Builds the text of a large JSON object of lists and members in pieces: its caller yields to the
-/// loop whenever is_turn_over().
+/// Builds the text of a large JSON object of lists and members without a tree of all of them.
 class LongAnswer {
   public:
     LongAnswer& begin_list(std::string_view name);
@@ -50,20 +47,20 @@ class LongAnswer {
     LongAnswer& end_list();
     LongAnswer& member(std::string_view name, const boost::json::value& value);
 
-    /// True after every few entries.
-    bool is_turn_over();
-    HttpResponse response();
+    /// The complete text; no calls may follow.
+    std::string text();
 
   private:
     void begin_member(std::string_view name);
 
     std::string text_ = "{";
     bool is_first_ = true;  ///< of the object's members, or of the list's entries
-    std::size_t entries_ = 0;
 };
 
-/// A list of objects. What `entry` refers to outlives the request, or `entry` owns it.
+/// A list of objects. The plant's loop copies what changes; the faces' loop calls `entry`.
 struct Table {
+    /// Keeps what never changes (names, points) for `entry`; null: `entry` needs none.
+    std::shared_ptr<const Directory> directory{};
     boost::json::object members{};                ///< JSON members before the list
     std::string_view name;                        ///< of the list
     std::span<const std::string_view> columns{};  ///< of text/csv; none: only JSON
@@ -71,9 +68,9 @@ struct Table {
     std::function<boost::json::object(std::size_t)> entry{};  ///< 0 to count - 1
     boost::json::object behind{};                             ///< JSON members behind the list
 };
-/// Renders the table as JSON, or as text/csv if it has columns and the client wants that, in pieces
-/// that yield to the loop.
-Handling table_answer(HttpRequest request, Table table);
+/// Renders the table, in the loop of the faces, as JSON, or as text/csv if the table has columns
+/// and the client wants that.
+HttpResponse table_answer(const HttpRequest& request, Table table);
 
 /// A long answer that is the same for all clients: text, tag and gzip are made once and then
 /// reused.
@@ -83,12 +80,11 @@ class KeptAnswer {
     KeptAnswer(std::string text, std::string_view content_type);
 
     /// The answer with its ETag: 304 if the client has it already, gzip if the client accepts it.
-    static boost::asio::awaitable<HttpResponse> give(std::shared_ptr<KeptAnswer> self,
-                                                     HttpRequest request);
+    static HttpResponse give(const std::shared_ptr<KeptAnswer>& self, const HttpRequest& request);
 
   private:
     SharedText text_;
-    SharedText packed_;  ///< null: not requested yet
+    SharedText packed_;  ///< of the faces' loop; null: not requested yet
     std::string tag_;
     std::string_view content_type_;
 };

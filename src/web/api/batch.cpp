@@ -282,11 +282,11 @@ Handling post_read(HttpRequest request, const Api* api) {
     asio::awaitable<void> all = gather(std::move(lines));
     co_await std::move(all);
     if (request.caller->has_left()) co_return HttpResponse{};
-    Table table{.name = "results", .count = reads->size()};
-    table.entry = [&reads](std::size_t i) { return result_of_entry((*reads)[i]); };
+    const auto read = std::make_shared<const std::vector<BatchRead>>(std::move(*reads));
+    Table table{.directory = api->lent, .name = "results", .count = read->size()};
+    table.entry = [read](std::size_t i) { return result_of_entry((*read)[i]); };
     table.behind["transactions"] = transactions;
-    Handling answering = table_answer(std::move(request), std::move(table));
-    co_return co_await std::move(answering);
+    co_return table_answer(request, std::move(table));
 }
 
 namespace {

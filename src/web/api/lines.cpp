@@ -91,14 +91,14 @@ bus::LineStatus status_of(const LineEntry& line, const Sight& sight) {
 
 Handling get_lines(HttpRequest request, const Api* api) {
     const Sight sight(*api->directory, request.caller->who());
-    std::vector<const LineEntry*> seen;
+    std::vector<std::pair<const LineEntry*, bus::LineStatus>> seen;
     for (const LineEntry& line : api->directory->lines)
-        if (sight.line(line)) seen.push_back(&line);
-    Table table{.name = "lines", .count = seen.size()};
-    table.entry = [seen = std::move(seen), sight](std::size_t i) {
-        return describe(*seen[i], status_of(*seen[i], sight));
+        if (sight.line(line)) seen.emplace_back(&line, status_of(line, sight));
+    Table table{.directory = api->lent, .name = "lines", .count = seen.size()};
+    table.entry = [seen = std::move(seen)](std::size_t i) {
+        return describe(*seen[i].first, seen[i].second);
     };
-    return table_answer(std::move(request), std::move(table));
+    co_return table_answer(request, std::move(table));
 }
 
 Handling get_line(HttpRequest request, const Api* api) {

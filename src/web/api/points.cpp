@@ -34,14 +34,18 @@ void describe_settings(json::object& object, const Point& point) {
     object["every_ms"] = whole_ms(point.every);
 }
 
+struct Instant {
+    TimePoint steady;
+    WallTime wall;
+};
+
 /// `items`: shown as "raw"; null: not wanted.
-json::object describe(const Api& api, TimePoint now, const Point& point,
-                      const points::PointReading& reading,
+json::object describe(const Instant& now, const Point& point, const points::PointReading& reading,
                       const std::vector<std::uint16_t>* items) {
     json::object object = point_json(point, reading);
     object["time"] = nullptr;
     if (reading.age)
-        object["time"] = rfc3339(wall_time_of(now - *reading.age, now, api.providers.wall()));
+        object["time"] = rfc3339(wall_time_of(now.steady - *reading.age, now.steady, now.wall));
     if (items != nullptr) {
         object["raw"] = nullptr;
         if (reading.quality != points::Quality::bad)
@@ -56,29 +60,27 @@ json::object describe(const Api& api, TimePoint now, const Point& point,
 
 json::object describe(const Api& api, const points::StationPoints& station, const Point& point,
                       bool raw) {
-    const TimePoint now = api.providers.now();
-    return describe(api, now, point, station.read(point, now),
+    const Instant now{api.providers.now(), api.providers.wall()};
+    return describe(now, point, station.read(point, now.steady),
                     raw ? &station.items(point) : nullptr);
 }
 
-/// A point and its station.
-using Owned = std::pair<const StationEntry*, const Point*>;
+/// A point of a station with a copy of what was read.
+struct Seen {
+    const StationEntry* station;
+    const Point* point;
+    points::PointReading reading;
+    std::vector<std::uint16_t> items{};
+};
 
-std::vector<Owned> points_of(const StationEntry& station, const Sight& sight) {
-    std::vector<Owned> seen;
-    if (station.points == nullptr) return seen;
-    for (const Point& point : station.points->points())
-        if (sight.point(station, point)) seen.emplace_back(&station, &point);
-    return seen;
-}
-
-std::vector<Owned> points_of_all(const Directory& directory, const Sight& sight) {
-    std::vector<Owned> all;
-    for (const StationEntry& station : directory.stations) {
-        const std::vector<Owned> own = points_of(station, sight);
-        all.insert(all.end(), own.begin(), own.end());
+void add_points(std::vector<Seen>& seen, const StationEntry& station, const Sight& sight,
+                TimePoint now, bool raw) {
+    if (station.points == nullptr) return;
+    for (const Point& point : station.points->points()) {
+        if (!sight.point(station, point)) continue;
+        seen.push_back({&station, &point, station.points->read(point, now)});
+        if (raw) seen.back().items = station.points->items(point);
     }
-    return all;
 }
 
 }  // namespace
@@ -90,38 +92,35 @@ Handling get_points(HttpRequest request, const Api* api) {
     if (!raw) co_return to_response(raw.error());
     if (*raw && wants_csv(request.headers["accept"]))
         co_return to_response(problem(400, "raw is for JSON, not for text/csv"));
-    const points::StationPoints* const all = station->points;
-    const Sight sight(*api->directory, request.caller->who());
-    std::vector<const Point*> seen;
-    for (const Owned& owned : points_of(*station, sight)) seen.push_back(owned.second);
-    Table table;
-    table.name = "points";
-    table.columns = kColumns;
+    const Instant now{api->providers.now(), api->providers.wall()};
+    std::vector<Seen> seen;
+    add_points(seen, *station, Sight(*api->directory, request.caller->who()), now.steady, *raw);
+    Table table{.directory = api->lent, .name = "points", .columns = kColumns};
     table.count = seen.size();
-    table.entry = [api, all, seen = std::move(seen), with_raw = *raw](std::size_t i) {
-        return describe(*api, *all, *seen[i], with_raw);
+    table.entry = [now, seen = std::move(seen), with_raw = *raw](std::size_t i) {
+        return describe(now, *seen[i].point, seen[i].reading, with_raw ? &seen[i].items : nullptr);
     };
-    Handling answering = table_answer(std::move(request), std::move(table));
-    co_return co_await std::move(answering);
+    co_return table_answer(request, std::move(table));
 }
 
 Handling get_all_points(HttpRequest request, const Api* api) {
-    Table table;
-    table.name = "points";
-    table.columns = kColumnsOfAll;
-    auto all = points_of_all(*api->directory, Sight(*api->directory, request.caller->who()));
-    table.count = all.size();
-    table.entry = [api, all = std::move(all)](std::size_t i) {
-        const auto& [station, point] = all[i];
+    const Instant now{api->providers.now(), api->providers.wall()};
+    const Sight sight(*api->directory, request.caller->who());
+    std::vector<Seen> seen;
+    for (const StationEntry& station : api->directory->stations)
+        add_points(seen, station, sight, now.steady, false);
+    Table table{.directory = api->lent, .name = "points", .columns = kColumnsOfAll};
+    table.count = seen.size();
+    table.entry = [now, seen = std::move(seen)](std::size_t i) {
+        const Seen& one = seen[i];
         json::object object;
-        object["line"] = station->line;
-        object["station"] = station->name;
-        for (const auto& [name, value] : describe(*api, *station->points, *point, false))
+        object["line"] = one.station->line;
+        object["station"] = one.station->name;
+        for (const auto& [name, value] : describe(now, *one.point, one.reading, nullptr))
             object[name] = value;
         return object;
     };
-    Handling answering = table_answer(std::move(request), std::move(table));
-    co_return co_await std::move(answering);
+    co_return table_answer(request, std::move(table));
 }
 
 Handling get_point(HttpRequest request, const Api* api) {
@@ -139,8 +138,8 @@ Handling get_point(HttpRequest request, const Api* api) {
         const Parsed<Reading> reading = co_await std::move(reads);
         if (reading)
             co_return json_response(
-                200, describe(*api, api->providers.now(), point, point_reading(point, *reading),
-                              *raw ? &reading->items : nullptr));
+                200, describe({api->providers.now(), api->providers.wall()}, point,
+                              point_reading(point, *reading), *raw ? &reading->items : nullptr));
     }
     co_return json_response(200, describe(*api, *station.points, point, *raw));
 }

@@ -193,8 +193,17 @@ bool is_found_wrong_here(const HttpResponse& response) {
            response.body.find("\"modbus_exception\":") == std::string::npos;
 }
 
-/// Runs the handler and applies the route's policy; packs the answer with gzip where that pays and
-/// the client accepts it.
+/// Packs the body with gzip if the client accepts gzip.
+void pack(HttpResponse& response, bool takes_gzip) {
+    if (response.events || response.shared_body || has_header(response, "Content-Encoding")) return;
+    add_vary(response, "Accept-Encoding");
+    if (!takes_gzip) return;
+    response.body = packed(response.body);
+    response.headers.emplace_back("Content-Encoding", "gzip");
+}
+
+/// Runs the handler and applies the route's policy. The loop of the faces makes the tag and the
+/// packed body.
 Handling conduct(HttpRequest request, const Api* api, const Row* row) {
     const std::shared_ptr<Caller> caller = request.caller;
     const Directory* const directory = api->directory;
@@ -213,18 +222,13 @@ Handling conduct(HttpRequest request, const Api* api, const Row* row) {
         if (const auto hidden = instead_of_telling(path, caller->who(), *directory))
             co_return to_response(*hidden);
     }
-    if (row->policy.tagged && response.status == 200 &&
-        add_etag(response, if_none_match, tag_of(response.body)))
-        response.body.clear();
-    if (response.events || response.shared_body || response.body.size() < gzip_from ||
-        has_header(response, "Content-Encoding"))
-        co_return response;
-    add_vary(response, "Accept-Encoding");
-    if (!takes_gzip) co_return response;
-    response.made = response.body.size();
-    boost::asio::awaitable<std::string> packing = packed(std::move(response.body));
-    response.body = co_await std::move(packing);
-    response.headers.emplace_back("Content-Encoding", "gzip");
+    response.finish = [make = std::move(response.finish), tagged = row->policy.tagged,
+                       if_none_match, takes_gzip, gzip_from](HttpResponse& made) {
+        if (make) make(made);
+        if (tagged && made.status == 200 && add_etag(made, if_none_match, tag_of(made.body)))
+            made.body.clear();
+        if (made.body.size() >= gzip_from) pack(made, takes_gzip);
+    };
     co_return response;
 }
 

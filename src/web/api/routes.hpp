@@ -17,6 +17,7 @@ class KeptAnswer;
 /// The handlers' data. The directory outlives every caller that has not left.
 struct Api {
     const Directory* directory = nullptr;
+    std::shared_ptr<const Directory> lent;   ///< the same, for the loop of the faces
     std::shared_ptr<const Directory> keeps;  ///< keeps the directory alive when it is replaced
     Providers providers;
     std::shared_ptr<KeyBook> keys;  ///< never null

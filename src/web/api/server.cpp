@@ -26,6 +26,7 @@ std::shared_ptr<const Site> Server::site_of(Settings settings,
     auto api = std::make_shared<Api>();
     api->current = current_;
     api->directory = directory.get();
+    api->lent = crossing_->lend(directory);
     api->keeps = std::move(directory);
     api->providers = providers_;
     api->keys = keys_;

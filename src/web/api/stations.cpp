@@ -27,8 +27,11 @@ json::object describe(const bus::HeardCounts& heard) {
     return object;
 }
 
-json::object describe(const StationEntry& station) {
-    const bus::StationStatus status = station.bus->station_status(station.id);
+bus::StationStatus status_of(const StationEntry& station) {
+    return station.bus->station_status(station.id);
+}
+
+json::object describe(const StationEntry& station, const bus::StationStatus& status) {
     json::object object;
     object["name"] = station.name;
     object["line"] = station.line;
@@ -76,18 +79,20 @@ json::array describe_polls(const points::StationPoints* points, TimePoint now) {
 
 Handling get_stations(HttpRequest request, const Api* api) {
     const Sight sight(*api->directory, request.caller->who());
-    std::vector<const StationEntry*> seen;
+    std::vector<std::pair<const StationEntry*, bus::StationStatus>> seen;
     for (const StationEntry& station : api->directory->stations)
-        if (sight.station(station)) seen.push_back(&station);
-    Table table{.name = "stations", .count = seen.size()};
-    table.entry = [seen = std::move(seen)](std::size_t i) { return describe(*seen[i]); };
-    return table_answer(std::move(request), std::move(table));
+        if (sight.station(station)) seen.emplace_back(&station, status_of(station));
+    Table table{.directory = api->lent, .name = "stations", .count = seen.size()};
+    table.entry = [seen = std::move(seen)](std::size_t i) {
+        return describe(*seen[i].first, seen[i].second);
+    };
+    co_return table_answer(request, std::move(table));
 }
 
 Handling get_station(HttpRequest request, const Api* api) {
     const auto station = find_station(*api->directory, request.arguments[0]);
     if (!station) co_return to_response(station.error());
-    json::object body = describe(*station);
+    json::object body = describe(*station, status_of(*station));
     body["polls"] = describe_polls(station->points, api->providers.now());
     co_return json_response(200, body);
 }
@@ -172,8 +177,8 @@ Handling get_point_history(HttpRequest request, const Api* api) {
     table.members["point"] = point.name;
     table.members["unit"] = point.unit;
     table.members["every_ms"] = whole_ms(history->width());
-    Handling answering = table_answer(std::move(request), std::move(table));
-    co_return co_await std::move(answering);
+    table.directory = api->lent;
+    co_return table_answer(request, std::move(table));
 }
 
 Handling get_line_history(HttpRequest request, const Api* api) {
@@ -188,8 +193,8 @@ Handling get_line_history(HttpRequest request, const Api* api) {
                  [wall](const bus::LineSample& sample) { return describe(sample, wall); });
     table.members["line"] = (*line)->name;
     table.members["every_ms"] = whole_ms(history->width());
-    Handling answering = table_answer(std::move(request), std::move(table));
-    co_return co_await std::move(answering);
+    table.directory = api->lent;
+    co_return table_answer(request, std::move(table));
 }
 
 namespace {

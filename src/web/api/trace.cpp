@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 
 #include "answer.hpp"
 #include "panelgate/base/text.hpp"
@@ -10,7 +11,6 @@
 
 namespace panelgate::web {
 
-namespace asio = boost::asio;
 namespace json = boost::json;
 namespace {
 
@@ -131,37 +131,40 @@ json::object json_of(const bus::IncidentHead& incident) {
 }
 
 template <class Entry>
-asio::awaitable<void> add_list(LongAnswer* body, std::string_view name,
-                               const std::vector<Entry>* entries) {
-    body->begin_list(name);
-    for (const Entry& entry : *entries) {
-        body->add(json_of(entry));
-        if (!body->is_turn_over()) continue;
-        asio::awaitable<void> turn = yield_turn();
-        co_await std::move(turn);
-    }
-    body->end_list();
+void add_list(LongAnswer& body, std::string_view name, const std::vector<Entry>& entries) {
+    body.begin_list(name);
+    for (const Entry& entry : entries) body.add(json_of(entry));
+    body.end_list();
 }
 
-/// Answers these members, the three lists of the part, and `behind`, yielding to the loop.
-Handling answer_part(json::object members, bus::TracePart part, json::object behind) {
-    LongAnswer body;
-    for (const auto& [name, value] : members) body.member(name, value);
-    asio::awaitable<void> frames = add_list(&body, "frames", &part.frames);
-    co_await std::move(frames);
-    asio::awaitable<void> decisions = add_list(&body, "decisions", &part.decisions);
-    co_await std::move(decisions);
-    asio::awaitable<void> transactions = add_list(&body, "transactions", &part.transactions);
-    co_await std::move(transactions);
-    for (const auto& [name, value] : behind) body.member(name, value);
-    co_return body.response();
+/// Answers these members, the three lists of the part, and `behind`.
+HttpResponse answer_part(json::object members, bus::TracePart part, json::object behind) {
+    HttpResponse response;
+    response.finish = [members = std::move(members), part = std::move(part),
+                       behind = std::move(behind)](HttpResponse& made) {
+        LongAnswer body;
+        for (const auto& [name, value] : members) body.member(name, value);
+        add_list(body, "frames", part.frames);
+        add_list(body, "decisions", part.decisions);
+        add_list(body, "transactions", part.transactions);
+        for (const auto& [name, value] : behind) body.member(name, value);
+        made.body = body.text();
+    };
+    return response;
 }
 
-/// A capture as a download with this file name.
-HttpResponse pcapng_response(std::string body, const std::string& file_name) {
-    HttpResponse response = text_response(200, std::move(body), "application/x-pcapng");
+/// A capture of the part as a download with this file name.
+HttpResponse pcapng_response(const std::string& version, const std::string& line,
+                             bus::TracePart part, const std::string& file_name) {
+    HttpResponse response = text_response(200, {}, "application/x-pcapng");
     response.headers.emplace_back("Content-Disposition",
                                   "attachment; filename=\"" + file_name + '"');
+    response.finish = [version, line, part = std::move(part)](HttpResponse& made) {
+        TracePcapng file(version, line);
+        file.add(part);
+        made.body = file.take();
+        made.body += file.finish();
+    };
     return response;
 }
 
@@ -181,28 +184,13 @@ Parsed<TracePage> page_of(const HttpRequest& request, const bus::LineView& bus) 
 
 }  // namespace
 
-/// The whole trace at the time of the request, without entries that come later.
 Handling get_trace_pcapng(HttpRequest request, const Api* api) {
-    constexpr std::size_t kOfATurn = 64;  // entries: about 0.1 ms of work
+    constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
-    const std::string name = (*line)->name;
-    const bus::LineView* const bus = (*line)->bus;
-    TracePcapng file(api->providers.version, name);
-    std::string body;
-    const std::uint64_t newest = last_of_trace(*bus, 1).next;
-    for (std::uint64_t since = 0; since < newest;) {
-        TracePage page = trace_since(*bus, since, kOfATurn);
-        if (page.next <= since) break;
-        since = page.next;
-        file.add(page.part);
-        body += file.take();
-        asio::awaitable<void> turn = yield_turn();
-        co_await std::move(turn);
-        if (request.caller->has_left()) co_return HttpResponse{};
-    }
-    body += file.finish();
-    co_return pcapng_response(std::move(body), name + ".pcapng");
+    const std::string& name = (*line)->name;
+    co_return pcapng_response(api->providers.version, name, (*line)->bus->trace(kAll),
+                              name + ".pcapng");
 }
 
 Handling get_trace(HttpRequest request, const Api* api) {
@@ -211,8 +199,7 @@ Handling get_trace(HttpRequest request, const Api* api) {
     auto page = page_of(request, *(*line)->bus);
     if (!page) co_return to_response(page.error());
     json::object behind{{"next", page->next}};
-    Handling answering = answer_part({}, std::move(page->part), std::move(behind));
-    co_return co_await std::move(answering);
+    co_return answer_part({}, std::move(page->part), std::move(behind));
 }
 
 Handling get_incidents(HttpRequest request, const Api* api) {
@@ -237,15 +224,10 @@ Handling get_incident(HttpRequest request, const Api* api) {
     if (!found)
         co_return to_response(
             problem(404, "line '" + name + "' keeps no incident '" + request.arguments[1] + "'"));
-    if (is_capture) {
-        TracePcapng file(api->providers.version, name);
-        file.add(found->part);
-        std::string body = file.take();
-        body += file.finish();
-        co_return pcapng_response(std::move(body), name + '-' + request.arguments[1]);
-    }
-    Handling answering = answer_part(json_of(found->head), std::move(found->part), {});
-    co_return co_await std::move(answering);
+    if (is_capture)
+        co_return pcapng_response(api->providers.version, name, std::move(found->part),
+                                  name + '-' + request.arguments[1]);
+    co_return answer_part(json_of(found->head), std::move(found->part), {});
 }
 
 }  // namespace panelgate::web

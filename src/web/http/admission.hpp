@@ -83,20 +83,4 @@ class Places {
     std::uint64_t turn_ = 0;
 };
 
-/// Limits an address's share of the loop's time, so that a client requesting without pause slows
-/// neither the lines nor other addresses: each request costs time, and so does each byte produced
-/// or sent. An address over its share and burst waits for its replies. Pure.
-class RateLimiter {
-  public:
-    explicit RateLimiter(const RateLimitSettings& settings) : settings_(settings) {}
-    void apply(const RateLimitSettings& settings) { settings_ = settings; }
-
-    /// Charges a reply of `bytes`; returns how long it must wait.
-    Duration take(TimePoint now, const std::string& address, std::size_t bytes);
-
-  private:
-    RateLimitSettings settings_;
-    std::map<std::string, TimePoint> used_until_;  ///< by address; only future times matter
-};
-
 }  // namespace panelgate::web

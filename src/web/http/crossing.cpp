@@ -36,11 +36,11 @@ Handling Crossing::ask(HttpRequest request, Handler handler) {
         question->bell.cancel();
     });
     request.caller = caller;
-    tell([self = shared_from_this(), request = std::move(request),
-          handler = std::make_shared<const Handler>(std::move(handler)),
-          waiting = std::weak_ptr(question)]() mutable {
-        self->begin(std::move(request), handler, std::move(waiting));
-    });
+    const auto asked = std::make_shared<HttpRequest>(std::move(request));
+    waiting_.push_back(
+        [this, asked, handler = std::make_shared<const Handler>(std::move(handler)),
+         waiting = std::weak_ptr(question)] { begin(std::move(*asked), handler, waiting); });
+    pass_next();
     while (!question->response && !client->has_left()) {
         boost::system::error_code rung;
         co_await question->bell.async_wait(asio::redirect_error(asio::use_awaitable, rung));
@@ -48,6 +48,20 @@ Handling Crossing::ask(HttpRequest request, Handler handler) {
     client->forget(question.get());
     if (!question->response) co_return HttpResponse();
     co_return std::move(*question->response);
+}
+
+/// Gives the plant the next request, unless the plant has not begun the last one yet.
+void Crossing::pass_next() {
+    if (passing_ || waiting_.empty()) return;
+    passing_ = true;
+    tell([self = shared_from_this(), begin_next = std::move(waiting_.front())] {
+        begin_next();
+        asio::post(self->loops_.faces, [self] {
+            self->passing_ = false;
+            self->pass_next();
+        });
+    });
+    waiting_.pop_front();
 }
 
 void Crossing::tell(std::function<void()> work) { asio::post(loops_.plant, std::move(work)); }
@@ -70,7 +84,7 @@ HttpResponse failure(const std::string& path, const std::exception_ptr& failed) 
 
 void Crossing::begin(HttpRequest request, std::shared_ptr<const Handler> handler,
                      std::weak_ptr<Question> waiting) {
-    if (closed_) return;
+    if (closed_ || request.caller->has_left()) return;
     const std::string path = request.path.empty() ? "/" : request.path.front();
     const std::shared_ptr<Caller> caller = request.caller;
     callers_.insert(caller);

@@ -458,7 +458,7 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     request.arguments = std::move(found.arguments);
     Handling handling = carry_out(std::move(request), found.route, shared);
     HttpResponse response = co_await std::move(handling);
-    response.probe = probe;
+    if (const auto finish = std::exchange(response.finish, nullptr)) finish(response);
     co_return response;
 }
 

@@ -137,7 +137,6 @@ HttpSession::HttpSession(tls::Stream stream, std::shared_ptr<Shared> shared,
       probes_only_(probes_only),
       buffer_(kHeaderLimit + kReadSize + shared_->site->settings.max_body),
       departure_(stream_, shared_->site->settings.half_close_grace),
-      turn_(stream_.get_executor()),
       final_send_timer_(stream_.get_executor()),
       time_to_read_(shared_->site->settings.request_timeout) {
     ErrorCode ignored;
@@ -182,8 +181,6 @@ asio::awaitable<bool> HttpSession::serve_one() {
     const bool head = message.method() == http::verb::head;
     asio::awaitable<HttpResponse> answering = answer(std::move(message));
     HttpResponse response = co_await std::move(answering);
-    asio::awaitable<void> waiting = wait_for_rate_limit(&response);
-    co_await std::move(waiting);
     bool more = false;
     if (response.events && !head && !shared_->places.stream(caller_->id()))
         response = too_many_streams(std::move(response.headers));
@@ -231,18 +228,6 @@ void HttpSession::set_busy(bool busy) {
         shared_->places.idle(caller_->id());
         departure_.request_ends();
     }
-}
-
-asio::awaitable<void> HttpSession::wait_for_rate_limit(const HttpResponse* response) {
-    if (response->probe || stopping_ || !shared_->site->now) co_return;
-    const std::size_t body =
-        response->shared_body ? response->shared_body->size() : response->body.size();
-    const std::size_t bytes = std::max(body, response->made);
-    const Duration wait = shared_->rate_limit.take(shared_->site->now(), caller_->address(), bytes);
-    if (wait == Duration::zero()) co_return;
-    ErrorCode ignored;
-    turn_.expires_after(wait);
-    co_await turn_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 }
 
 /// Sent before the reply: the socket buffer is empty, so it is written whole. Clients skip it (RFC
@@ -372,8 +357,9 @@ std::string HttpSession::head_of_events(const HttpResponse& response) const {
     return "HTTP/1.1 200 OK\r\nServer: " + shared_->site->product +
            "\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n"
            "X-Content-Type-Options: nosniff\r\n" +
-           (stream_.is_secure() ? "Strict-Transport-Security: " + std::string(kStrictTransport) + "\r\n"
-                        : "") +
+           (stream_.is_secure()
+                ? "Strict-Transport-Security: " + std::string(kStrictTransport) + "\r\n"
+                : "") +
            more + "Connection: close\r\n\r\n: panelgate\n\n";
 }
 
@@ -441,7 +427,6 @@ asio::ip::address HttpSession::peer() const {
 
 void HttpSession::stop(Duration reading) {
     stopping_ = true;
-    turn_.cancel();
     time_to_read_ = std::min(time_to_read_, reading);
     if (listener_ && listener_->wake) listener_->wake();
     if (!busy_) close();
@@ -455,7 +440,6 @@ void HttpSession::stop(Duration reading) {
 
 void HttpSession::abandon() {
     stopping_ = true;
-    turn_.cancel();
     if (listener_ && listener_->wake) listener_->wake();
     caller_->leave();
     departure_.request_ends();

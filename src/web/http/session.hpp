@@ -103,7 +103,6 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
         return time_of_token(caller_->token(), *shared_->site, kHeartbeat);
     }
     boost::asio::awaitable<void> send_events(HttpResponse response);
-    boost::asio::awaitable<void> wait_for_rate_limit(const HttpResponse* response);
     boost::asio::awaitable<void> drain();
     void set_busy(bool busy);
     void send_interim();
@@ -121,7 +120,6 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     std::shared_ptr<EventHub::Listener> listener_;  ///< while events are sent
     bool asked_before_ = false;                     ///< not the first request
     bool sending_ = false;                          ///< a reply or events
-    boost::asio::steady_timer turn_;                ///< waits for its address's share
     boost::asio::steady_timer
         final_send_timer_;  ///< after stop(): the client's time to take the reply
     bool busy_ = false;     ///< a complete request is not answered yet

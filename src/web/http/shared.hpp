@@ -17,8 +17,7 @@ struct Shared {
         : site(std::move(with_site)),
           hosts(site->settings, machine_names()),
           wrong_tokens(site->settings.wrong_tokens),
-          places(site->settings),
-          rate_limit(site->settings.rate_limit) {}
+          places(site->settings) {}
 
     /// Replaces the site; running requests keep the previous one alive.
     void serve(std::shared_ptr<const Site> other) {
@@ -26,14 +25,12 @@ struct Shared {
         hosts = HostNames(site->settings, machine_names());
         wrong_tokens.apply(site->settings.wrong_tokens);
         places.apply(site->settings);
-        rate_limit.apply(site->settings.rate_limit);
     }
 
     std::shared_ptr<const Site> site;
     HostNames hosts;
     WrongTokens wrong_tokens;
     Places places;
-    RateLimiter rate_limit;
     Counters counters;
     std::function<Counters()> figures;  ///< the listener's, set by it
 };

@@ -59,8 +59,8 @@ struct Providers {
     std::function<TimePoint()> now;                ///< the machine's monotonic clock, any thread
     std::function<WallTime()> wall;                ///< the current wall-clock time, any thread
     std::function<std::vector<points::RelayStatus>()> relays;
-    /// Of the faces' loop, before a scrape: takes counters of other faces along to the plant's loop,
-    /// where the function returned is called. Both may be empty.
+    /// Of the faces' loop, before a scrape: takes counters of other faces along to the plant's
+    /// loop, where the function returned is called. Both may be empty.
     std::function<std::function<void()>()> collect{};
     EventHub* events = nullptr;            ///< of the faces' loop; never null; outlives the server
     DiscoverySource* discovery = nullptr;  ///< null only without lines; outlives the server

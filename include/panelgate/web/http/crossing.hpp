@@ -2,6 +2,7 @@
 
 #include <boost/asio/any_io_executor.hpp>
 #include <concepts>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <set>
@@ -40,7 +41,8 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
 
     /// Faces: carries out the request on the plant's loop. The handler gets a caller of its own,
     /// which leaves when the session's leaves; then the response is empty. An exception of the
-    /// handler is logged, and answered with 500.
+    /// handler is logged, and answered with 500. The plant begins one request at a time, and is
+    /// given the next request when it has begun: between two of them it serves its lines.
     Handling ask(HttpRequest request, Handler handler);
     /// Faces: runs `work` on the plant's loop, after what was asked before.
     void tell(std::function<void()> work);
@@ -69,8 +71,12 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
                           std::shared_ptr<const void> object);
     void begin(HttpRequest request, std::shared_ptr<const Handler> handler,
                std::weak_ptr<Question> waiting);
+    void pass_next();
 
     Loops loops_;
+    // Of the faces' loop:
+    std::deque<std::function<void()>> waiting_;  ///< requests that the plant has not begun
+    bool passing_ = false;                       ///< the plant is about to begin one
     // Of the plant's loop:
     std::set<std::shared_ptr<Caller>> callers_;  ///< of the requests under way
     bool closed_ = false;

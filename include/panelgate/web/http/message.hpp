@@ -129,9 +129,11 @@ struct HttpResponse {
     std::string content_type = "application/json";
     std::string body;
     SharedText shared_body;                                    ///< if set, sent instead of `body`
-    std::size_t made = 0;                                      ///< bytes compressed to make it
     bool probe = false;                                        ///< a health check: not rate limited
     std::vector<std::pair<std::string, std::string>> headers;  ///< additional headers
+    /// If set, the loop of the faces calls this to make the body, so that the plant's loop only
+    /// copies. Owns or shares what it needs.
+    std::function<void(HttpResponse&)> finish;
     /// If set, there is no body: events are streamed while the client listens.
     std::shared_ptr<EventHub::Listener> events;
 };

@@ -29,8 +29,8 @@ struct Problem {
 template <class T>
 using Parsed = boost::system::result<T, Problem>;
 
-/// Makes a problem. `status`: 400-405, 409, 413, 415, 421, 422, 429, 431, 500 or 502-504. `kind`: "": by
-/// status.
+/// Makes a problem. `status`: 400-405, 409, 413, 415, 421, 422, 429, 431, 500 or 502-504. `kind`:
+/// "": by status.
 Problem problem(unsigned status, std::string detail, std::string_view kind = {});
 /// ... that is temporary: with Retry-After in seconds.
 Problem passing_problem(unsigned status, std::string detail, std::int64_t seconds);

@@ -42,16 +42,6 @@ struct WrongTokenSettings {
     friend bool operator==(const WrongTokenSettings&, const WrongTokenSettings&) = default;
 };
 
-/// Limits of the replies to one address.
-struct RateLimitSettings {
-    Duration request = 1ms;  ///< cost of each request
-    std::size_t bytes_per_second = 8 * 1024 * 1024;
-    Duration burst = 250ms;       ///< allowance ahead of time
-    Duration longest_wait = 2s;   ///< longest delay of a reply
-    std::size_t addresses = 256;  ///< tracked; beyond it, expired ones are dropped
-    friend bool operator==(const RateLimitSettings&, const RateLimitSettings&) = default;
-};
-
 struct Settings {
     std::string address = "127.0.0.1";
     std::uint16_t port = 8080;          ///< 0: any free port
@@ -59,7 +49,6 @@ struct Settings {
     Standing anonymous = Role::viewer;  ///< of clients that show nothing
     std::vector<Token> tokens;
     WrongTokenSettings wrong_tokens;
-    RateLimitSettings rate_limit;
     std::vector<std::string> hosts;  ///< its host names; empty: the machine's
     std::vector<Network> allow;      ///< empty: all
     std::vector<std::string> cors;   ///< origins of other sites whose pages may read, lower case
