@@ -84,21 +84,19 @@ std::vector<Owned> points_of_all(const Directory& directory, const Sight& sight)
 }  // namespace
 
 Handling get_points(HttpRequest request, const Api* api) {
-    const auto station = find_station(*api->directory, request.arguments[0]);
-    if (!station) co_return to_response(station.error());
-    const auto raw = query_flag(request, "raw");
-    if (!raw) co_return to_response(raw.error());
-    if (*raw && wants_csv(request.headers["accept"]))
+    const auto station = find_station(*api->directory, request.arguments[0]).value();
+    const auto raw = query_flag(request, "raw").value();
+    if (raw && wants_csv(request.headers["accept"]))
         co_return to_response(problem(400, "raw is for JSON, not for text/csv"));
-    const points::StationPoints* const all = station->points;
+    const points::StationPoints* const all = station.points;
     const Sight sight(*api->directory, request.caller->who());
     std::vector<const Point*> seen;
-    for (const Owned& owned : points_of(*station, sight)) seen.push_back(owned.second);
+    for (const Owned& owned : points_of(station, sight)) seen.push_back(owned.second);
     Table table;
     table.name = "points";
     table.columns = kColumns;
     table.count = seen.size();
-    table.entry = [api, all, seen = std::move(seen), with_raw = *raw](std::size_t i) {
+    table.entry = [api, all, seen = std::move(seen), with_raw = raw](std::size_t i) {
         return describe(*api, *all, *seen[i], with_raw);
     };
     Handling answering = table_answer(std::move(request), std::move(table));
@@ -125,24 +123,23 @@ Handling get_all_points(HttpRequest request, const Api* api) {
 }
 
 Handling get_point(HttpRequest request, const Api* api) {
-    const auto found = find_point(*api->directory, request.arguments[0], request.arguments[1]);
-    if (!found) co_return to_response(found.error());
-    const auto raw = query_flag(request, "raw");
-    if (!raw) co_return to_response(raw.error());
-    const Point& point = *found->point;
-    const StationEntry& station = found->station;
+    const auto found =
+        find_point(*api->directory, request.arguments[0], request.arguments[1]).value();
+    const auto raw = query_flag(request, "raw").value();
+    const Point& point = *found.point;
+    const StationEntry& station = found.station;
     // Behind a write the panel's own value is asked for, where the line has no other master.
     if (station.points->is_outdated(point) && !station.bus->status().listens) {
         const Patience patience(api->directory->line_of(station).deadline, api->providers.now);
         boost::asio::awaitable<Parsed<Reading>> reads =
-            read_all(request.caller, &station, found->span, patience);
+            read_all(request.caller, &station, found.span, patience);
         const Parsed<Reading> reading = co_await std::move(reads);
         if (reading)
             co_return json_response(
                 200, describe(*api, api->providers.now(), point, point_reading(point, *reading),
-                              *raw ? &reading->items : nullptr));
+                              raw ? &reading->items : nullptr));
     }
-    co_return json_response(200, describe(*api, *station.points, point, *raw));
+    co_return json_response(200, describe(*api, *station.points, point, raw));
 }
 
 Handling get_relays(HttpRequest request, const Api* api) {
