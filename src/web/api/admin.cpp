@@ -47,31 +47,21 @@ json::object describe(const ReloadVerdict& verdict) {
 }
 
 /// The flag from the query or from the body.
-Parsed<bool> flag_of(const HttpRequest& request, const json::object& body, const char* name) {
-    const auto query = query_flag(request, name);
-    if (!query) return query;
-    const auto member = flag_member(body, name);
-    if (!member) return member;
-    return *query || *member;
+bool flag_of(const HttpRequest& request, const json::object& body, const char* name) {
+    const bool query = query_flag(request, name).value();
+    return flag_member(body, name).value() || query;
 }
 
-Parsed<ReloadWish> wish_of(const HttpRequest& request) {
+ReloadWish wish_of(const HttpRequest& request) {
     json::object body;
-    if (!request.body.empty()) {
-        auto given = parse_object(request.body, {"rollback", "weaker"});
-        if (!given) return given.error();
-        body = std::move(*given);
-    }
-    const auto rollback = flag_of(request, body, "rollback");
-    if (!rollback) return rollback.error();
-    const auto weaker = flag_of(request, body, "weaker");
-    if (!weaker) return weaker.error();
-    if (*weaker && !*rollback)
-        return problem(400, "weaker goes with rollback: a file is served as it is");
-    return ReloadWish{*rollback, *weaker};
+    if (!request.body.empty()) body = parse_object(request.body, {"rollback", "weaker"}).value();
+    const ReloadWish wish{flag_of(request, body, "rollback"), flag_of(request, body, "weaker")};
+    if (wish.weaker && !wish.rollback)
+        refuse(400, "weaker goes with rollback: a file is served as it is");
+    return wish;
 }
 
-/// What it says may be about any station.
+/// Texts of a verdict may be about any station.
 json::object describe_to(const ReloadVerdict& verdict, bool sees_everything) {
     json::object object = describe(verdict);
     if (sees_everything) return object;
@@ -107,17 +97,16 @@ Handling get_reload(HttpRequest request, const Api* api) {
 
 Handling post_reload(HttpRequest request, const Api* api) {
     const auto wish = wish_of(request);
-    if (!wish) co_return to_response(wish.error());
     ReloadSource* source = api->providers.reload;
     const std::string why =
-        source ? source->barred(wish->rollback) : "this program serves a built-in configuration";
+        source ? source->barred(wish.rollback) : "this program serves a built-in configuration";
     if (!why.empty()) co_return to_response(problem(409, why));
     request.caller->take_effect();
     // By the rules before the reload: a client that sees nothing now is not told the new state.
     const bool sees_everything = Sight(*api->directory, request.caller->who()).everything();
     std::function<void(std::function<void(Verdict)>)> start =
         [&](std::function<void(Verdict)> done) {
-            source->reload(*wish, request.caller->name(), std::move(done));
+            source->reload(wish, request.caller->name(), std::move(done));
         };
     asio::awaitable<Verdict> reloading = result_of<Verdict>(std::move(start));
     const Verdict verdict = co_await std::move(reloading);

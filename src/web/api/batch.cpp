@@ -269,11 +269,10 @@ json::object result_of_entry(const BatchRead& read) {
 }  // namespace
 
 Handling post_read(HttpRequest request, const Api* api) {
-    auto reads = reads_of(request, *api);
-    if (!reads) co_return to_response(reads.error());
+    auto reads = reads_of(request, *api).value();
     unsigned transactions = 0;
     std::vector<asio::awaitable<void>> lines;
-    for (auto& [name, entries] : by_line(*reads)) {
+    for (auto& [name, entries] : by_line(reads)) {
         const LineEntry* line = api->directory->find_line(name);
         const Patience patience(line->deadline, api->providers.now);
         lines.push_back(
@@ -282,7 +281,7 @@ Handling post_read(HttpRequest request, const Api* api) {
     asio::awaitable<void> all = gather(std::move(lines));
     co_await std::move(all);
     if (request.caller->has_left()) co_return HttpResponse{};
-    const auto read = std::make_shared<const std::vector<BatchRead>>(std::move(*reads));
+    const auto read = std::make_shared<const std::vector<BatchRead>>(std::move(reads));
     Table table{.directory = api->lent, .name = "results", .count = read->size()};
     table.entry = [read](std::size_t i) { return result_of_entry((*read)[i]); };
     table.behind["transactions"] = transactions;
@@ -349,17 +348,16 @@ asio::awaitable<void> write_line(std::shared_ptr<Caller> caller, std::vector<Bat
 }  // namespace
 
 Handling post_write(HttpRequest request, const Api* api) {
-    auto writes = writes_of(request, *api);
-    if (!writes) co_return to_response(writes.error());
+    auto writes = writes_of(request, *api).value();
     std::vector<asio::awaitable<void>> lines;
-    for (auto& [name, entries] : by_line(*writes)) {
+    for (auto& [name, entries] : by_line(writes)) {
         const Patience patience(api->directory->find_line(name)->deadline, api->providers.now);
         lines.push_back(write_line(request.caller, std::move(entries), patience));
     }
     asio::awaitable<void> all = gather(std::move(lines));
     co_await std::move(all);
     json::array results;
-    for (BatchWrite& write : *writes) {
+    for (BatchWrite& write : writes) {
         write.result["item"] = std::move(write.item);
         results.push_back(std::move(write.result));
     }

@@ -42,13 +42,12 @@ std::vector<std::string> list_of(const HttpRequest& request, const std::string& 
     return parts;
 }
 
-Parsed<void> add_types(EventFilter& filter, const HttpRequest& request) {
+void add_types(EventFilter& filter, const HttpRequest& request) {
     for (const std::string& type : list_of(request, "types")) {
         if (std::ranges::find(kKinds, type, &Kind::type) == std::end(kKinds))
-            return problem(400, "there is no event '" + type + "'; types are " + known_types());
+            refuse(400, "there is no event '" + type + "'; types are " + known_types());
         filter.types.insert(type);
     }
-    return {};
 }
 
 /// The station's name in events; an unlisted one is named by its id alone.
@@ -58,58 +57,43 @@ std::string name_in_events(const Directory& directory, const StationEntry& stati
     return listed ? station.name : std::to_string(station.id);
 }
 
-Parsed<void> add_places(EventFilter& filter, const HttpRequest& request,
-                        const Directory& directory) {
-    for (const std::string& name : list_of(request, "line")) {
-        const auto line = find_line(directory, name);
-        if (!line) return line.error();
-        filter.lines.insert(name);
-    }
+void add_places(EventFilter& filter, const HttpRequest& request, const Directory& directory) {
+    for (const std::string& name : list_of(request, "line"))
+        filter.lines.insert(find_line(directory, name).value()->name);
     for (const std::string& name : list_of(request, "station")) {
-        const auto station = find_station(directory, name);
-        if (!station) return station.error();
-        filter.stations.emplace(station->line, name_in_events(directory, *station));
+        const StationEntry station = find_station(directory, name).value();
+        filter.stations.emplace(station.line, name_in_events(directory, station));
     }
     for (const std::string& name : list_of(request, "point")) {
-        const auto found = find_point(directory, name);
-        if (!found) return found.error();
-        filter.points.emplace(found->station.name, found->point->name);
+        const Target found = find_point(directory, name).value();
+        filter.points.emplace(found.station.name, found.point->name);
     }
-    return {};
 }
 
-/// Rejects a filter that no event can match: it is the client's mistake.
-Parsed<void> check(const EventFilter& filter) {
+/// Refuses a filter that no event can match: a mistake of the client.
+void check(const EventFilter& filter) {
     const auto fits = [&](const Kind& kind) {
         const bool wanted = filter.types.empty() || filter.types.contains(std::string(kind.type));
         return wanted && (filter.stations.empty() || kind.names_station) &&
                (filter.points.empty() || kind.names_point);
     };
-    if (std::ranges::any_of(kKinds, fits)) return {};
-    return problem(400, filter.points.empty() ? "no event of these types names a station"
-                                              : "only events of the type point name a point");
-}
-
-/// The events that a request asks for, from the queries types, line, station and point, each a
-/// comma-separated list. 400 for an unknown type, and if no event of these types could match; 404
-/// for an unknown line, station or point.
-Parsed<EventFilter> event_filter_of(const HttpRequest& request, const Directory& directory) {
-    EventFilter filter;
-    if (const auto types = add_types(filter, request); !types) return types.error();
-    if (const auto places = add_places(filter, request, directory); !places) return places.error();
-    if (const auto checked = check(filter); !checked) return checked.error();
-    return filter;
+    if (std::ranges::any_of(kKinds, fits)) return;
+    refuse(400, filter.points.empty() ? "no event of these types names a station"
+                                      : "only events of the type point name a point");
 }
 
 }  // namespace
 
 Handling get_events(HttpRequest request, const Api* api) {
-    auto filter = event_filter_of(request, *api->directory);
-    if (!filter) co_return to_response(filter.error());
-    filter->may_see = [current = api->current, who = request.caller->who()](
-                          const EventTopic& topic) { return Sight(**current, who).event(topic); };
+    // The queries types, line, station and point are comma-separated lists.
+    EventFilter filter;
+    add_types(filter, request);
+    add_places(filter, request, *api->directory);
+    check(filter);
+    filter.may_see = [current = api->current, who = request.caller->who()](
+                         const EventTopic& topic) { return Sight(**current, who).event(topic); };
     auto listener =
-        api->providers.events->listen(std::move(*filter), request.headers["last-event-id"]);
+        api->providers.events->listen(std::move(filter), request.headers["last-event-id"]);
     if (!listener)
         co_return to_response(passing_problem(503, "too many listen to events already", 5));
     HttpResponse response;

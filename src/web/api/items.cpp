@@ -14,22 +14,17 @@ namespace panelgate::web {
 namespace json = boost::json;
 namespace {
 
-Handling read_items(HttpRequest request, Parsed<Target> target, const Api* api) {
-    if (!target) co_return to_response(target.error());
-    auto format = format_of(request);
-    if (!format) co_return to_response(format.error());
-    format->count = target->span.count;
-    const auto view = view_of(*format, target->span.table);
-    if (!view) co_return to_response(view.error());
-    const auto readable =
-        make_readable(*target, view->items, api->providers.settings.max_transactions);
-    if (!readable) co_return to_response(readable.error());
-    const Patience patience(api->directory->line_of(target->station).deadline, api->providers.now);
+Handling read_items(HttpRequest request, Target target, const Api* api) {
+    auto format = format_of(request).value();
+    format.count = target.span.count;
+    const auto view = view_of(format, target.span.table).value();
+    make_readable(target, view.items, api->providers.settings.max_transactions).value();
+    const Patience patience(api->directory->line_of(target.station).deadline, api->providers.now);
     boost::asio::awaitable<Parsed<Reading>> reads =
-        read_all(request.caller, &target->station, target->span, patience);
+        read_all(request.caller, &target.station, target.span, patience);
     const Parsed<Reading> reading = co_await std::move(reads);
     if (!reading) co_return to_response(reading.error());
-    co_return json_response(200, describe(*target, *view, *reading));
+    co_return json_response(200, describe(target, view, *reading));
 }
 
 /// Logs and answers a refusal; the log names the target as the path does: "press/points/setpoint".
@@ -63,12 +58,12 @@ Handling write_items(HttpRequest request, Parsed<Target> target, const Api* api)
 }  // namespace
 
 Handling get_table(HttpRequest request, const Api* api) {
-    auto target = table_target(request, *api->directory);
+    auto target = table_target(request, *api->directory).value();
     return read_items(std::move(request), std::move(target), api);
 }
 
 Handling get_device(HttpRequest request, const Api* api) {
-    auto target = device_target(request, *api->directory);
+    auto target = device_target(request, *api->directory).value();
     return read_items(std::move(request), std::move(target), api);
 }
 
@@ -83,30 +78,27 @@ Handling put_device(HttpRequest request, const Api* api) {
 }
 
 Handling put_point(HttpRequest request, const Api* api) {
-    const auto to = find_point(*api->directory, request.arguments[0], request.arguments[1]);
-    if (!to) co_return to_response(to.error());
+    const auto to = find_point(*api->directory, request.arguments[0], request.arguments[1]).value();
     const auto round = query_flag(request, "round");
     Parsed<points::Rounding> rounding = points::Rounding::exact;
     if (!round) rounding = round.error();
     if (round && *round) rounding = points::Rounding::nearest;
-    auto writing = write_of(*to, parse_object(request.body, {"value", "verify"}), rounding);
+    auto writing = write_of(to, parse_object(request.body, {"value", "verify"}), rounding);
     boost::asio::awaitable<HttpResponse> done =
         carry_out(std::move(request), std::move(writing), api);
     co_return co_await std::move(done);
 }
 
 Handling get_interpretations(HttpRequest request, const Api* api) {
-    const auto target = table_target(request, *api->directory);
-    if (!target) co_return to_response(target.error());
+    const auto target = table_target(request, *api->directory).value();
     constexpr unsigned kMost = 16;  // registers: for one value, not for a memory dump
-    if (modbus::is_bit_table(target->span.table) || target->span.count > kMost)
+    if (modbus::is_bit_table(target.span.table) || target.span.count > kMost)
         co_return to_response(problem(422, "interpretations are of 1 to 16 registers"));
-    const Patience patience(api->directory->line_of(target->station).deadline, api->providers.now);
-    bus::Request made{.station = target->station.id,
-                      .request = modbus::Request::read(target->span)};
+    const Patience patience(api->directory->line_of(target.station).deadline, api->providers.now);
+    bus::Request made{.station = target.station.id, .request = modbus::Request::read(target.span)};
     bus::Answer answer =
-        co_await ask(request.caller, target->station.bus, std::move(made), patience);
-    const auto failed = problem_of(answer, *target->station.profile);
+        co_await ask(request.caller, target.station.bus, std::move(made), patience);
+    const auto failed = problem_of(answer, *target.station.profile);
     if (failed) co_return to_response(*failed);
     const auto registers = modbus::registers_of(*answer.pdu);
     json::array list;
@@ -118,7 +110,7 @@ Handling get_interpretations(HttpRequest request, const Api* api) {
                                     {"word_order", label(one.order)},
                                     {"values", std::move(values)}});
     }
-    json::object body{{"station", target->station.name}, {"address", target->span.first}};
+    json::object body{{"station", target.station.name}, {"address", target.span.first}};
     body["raw"] = json::array(registers.begin(), registers.end());
     body["interpretations"] = std::move(list);
     co_return json_response(200, body);
@@ -165,8 +157,7 @@ HttpResponse plan_of(const Target& target, Bytes pdu, unsigned requests) {
 
 /// The plan of a read; if it takes several requests, the first of them.
 HttpResponse plan_of_read(Target target) {
-    const auto readable = make_readable(target, target.span.count, modbus::kTableItems);
-    if (!readable) return to_response(readable.error());
+    make_readable(target, target.span.count, modbus::kTableItems).value();
     const unsigned limit = target.station.profile->max_count(read_function(target.span.table));
     const unsigned requests = (target.span.count + limit - 1) / limit;
     target.span.count = std::min(target.span.count, limit);
@@ -174,32 +165,29 @@ HttpResponse plan_of_read(Target target) {
 }
 
 HttpResponse plan_of_write(Target target, const std::string& values) {
-    auto writable = made_writable(std::move(target));
-    if (!writable) return to_response(writable.error());
-    const auto writing =
-        write_of(*writable, parse_object("{\"values\":[" + values + "]}", {"values"}));
-    if (!writing) return to_response(writing.error());
-    const modbus::Request& made = writing->request.request;
-    writable->span.count = made.access().write->count;
-    return plan_of(*writable, made.pdu(), 1);
+    target = made_writable(std::move(target)).value();
+    const auto body = parse_object("{\"values\":[" + values + "]}", {"values"});
+    const Writing writing = write_of(target, body).value();
+    const modbus::Request& made = writing.request.request;
+    target.span.count = made.access().write->count;
+    return plan_of(target, made.pdu(), 1);
 }
 
 /// The request that would be sent; nothing is sent.
-HttpResponse plan(const HttpRequest& request, Parsed<Target> target) {
-    if (!target) return to_response(target.error());
+HttpResponse plan(const HttpRequest& request, Target target) {
     const auto values = request.query.find("values");
-    if (values == request.query.end()) return plan_of_read(std::move(*target));
-    return plan_of_write(std::move(*target), values->second);
+    if (values == request.query.end()) return plan_of_read(std::move(target));
+    return plan_of_write(std::move(target), values->second);
 }
 
 }  // namespace
 
 Handling get_table_plan(HttpRequest request, const Api* api) {
-    co_return plan(request, table_target(request, *api->directory));
+    co_return plan(request, table_target(request, *api->directory).value());
 }
 
 Handling get_device_plan(HttpRequest request, const Api* api) {
-    co_return plan(request, device_target(request, *api->directory));
+    co_return plan(request, device_target(request, *api->directory).value());
 }
 
 }  // namespace panelgate::web

@@ -102,15 +102,14 @@ Handling get_lines(HttpRequest request, const Api* api) {
 }
 
 Handling get_line(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api->directory, request.arguments[0]);
-    if (!line) co_return to_response(line.error());
+    const LineEntry* const line = find_line(*api->directory, request.arguments[0]).value();
     const Sight sight(*api->directory, request.caller->who());
-    const bus::LineStatus status = status_of(**line, sight);
-    json::object body = describe(**line, status);
+    const bus::LineStatus status = status_of(*line, sight);
+    json::object body = describe(*line, status);
     body["findings"] = describe(status.findings);
-    std::vector<bus::ClientShare> clients = (*line)->bus->clients();
+    std::vector<bus::ClientShare> clients = line->bus->clients();
     // Whom they ask, and what they get, is about all stations.
-    if (!sight.whole(**line)) clients.clear();
+    if (!sight.whole(*line)) clients.clear();
     body["clients"] = describe(clients);
     co_return json_response(200, body);
 }
@@ -167,21 +166,14 @@ struct Wanted {
     unsigned share = kDefaultShare;
 };
 
-Parsed<Wanted> wanted_of(std::string_view text) {
+Wanted wanted_of(std::string_view text) {
     Wanted wanted;
     if (text.empty()) return wanted;
-    const auto body = parse_object(text, {"stations", "share_percent"});
-    if (!body) return body.error();
-    if (body->contains("stations")) {
-        const auto stations = string_member(*body, "stations");
-        if (!stations) return stations.error();
-        wanted.stations = *stations;
-    }
-    if (body->contains("share_percent")) {
-        const auto share = number_member(*body, "share_percent", 1, kMostShare);
-        if (!share) return share.error();
-        wanted.share = static_cast<unsigned>(*share);
-    }
+    const json::object body = parse_object(text, {"stations", "share_percent"}).value();
+    if (body.contains("stations")) wanted.stations = string_member(body, "stations").value();
+    if (body.contains("share_percent"))
+        wanted.share =
+            static_cast<unsigned>(number_member(body, "share_percent", 1, kMostShare).value());
     return wanted;
 }
 
@@ -202,32 +194,28 @@ std::optional<Problem> barred(const LineEntry& line, const DiscoverySource& sour
 }  // namespace
 
 Handling get_discovery(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api->directory, request.arguments[0]);
-    if (!line) co_return to_response(line.error());
-    const std::string& name = (*line)->name;
+    const LineEntry* const line = find_line(*api->directory, request.arguments[0]).value();
+    const std::string& name = line->name;
     co_return json_response(200, describe(name, api->providers.discovery->report(name)));
 }
 
 Handling post_discover(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api->directory, request.arguments[0]);
-    if (!line) co_return to_response(line.error());
+    const LineEntry* const line = find_line(*api->directory, request.arguments[0]).value();
     const auto wanted = wanted_of(request.body);
-    if (!wanted) co_return to_response(wanted.error());
     DiscoverySource& source = *api->providers.discovery;
-    if (const auto problem = barred(**line, source)) co_return to_response(*problem);
-    const std::string& name = (*line)->name;
-    if (const auto wrong = source.start(name, wanted->stations, wanted->share))
+    if (const auto problem = barred(*line, source)) co_return to_response(*problem);
+    const std::string& name = line->name;
+    if (const auto wrong = source.start(name, wanted.stations, wanted.share))
         co_return to_response(problem(400, "stations " + *wrong));
     log_client(*request.caller, "discovery started",
-               {{"line", name}, {"stations", wanted->stations}});
+               {{"line", name}, {"stations", wanted.stations}});
     request.caller->take_effect();
     co_return json_response(202, describe(name, source.report(name)));
 }
 
 Handling delete_discovery(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api->directory, request.arguments[0]);
-    if (!line) co_return to_response(line.error());
-    const std::string& name = (*line)->name;
+    const LineEntry* const line = find_line(*api->directory, request.arguments[0]).value();
+    const std::string& name = line->name;
     if (api->providers.discovery->report(name).state == DiscoveryReport::State::running)
         log_client(*request.caller, "discovery stopped", {{"line", name}});
     api->providers.discovery->stop(name);
@@ -250,26 +238,21 @@ std::uint8_t broadcast_function(const Directory& directory, const LineEntry& lin
     return *std::ranges::max_element(functions, {}, takers);
 }
 
-Parsed<bus::Request> broadcast_request(const Directory& directory, const LineEntry& line,
-                                       const json::object& body) {
-    const auto word = string_member(body, "table");
-    if (!word) return word.error();
-    const auto table = parse_table(*word, 400);
-    if (!table) return table.error();
-    if (!is_writable(*table)) return problem(422, *word + " cannot be written", "not-writable");
-    const auto address = number_member(body, "address", 0, 0xFFFF);
-    if (!address) return address.error();
-    const auto cells = cells_of(body, *table);
-    if (!cells) return cells.error();
-
-    const auto functions = write_functions(*table, cells->size());
+bus::Request broadcast_request(const Directory& directory, const LineEntry& line,
+                               const json::object& body) {
+    const std::string word = string_member(body, "table").value();
+    const modbus::Table table = parse_table(word, 400).value();
+    if (!is_writable(table)) refuse(422, word + " cannot be written", "not-writable");
+    const auto address = number_member(body, "address", 0, 0xFFFF).value();
+    const std::vector<std::uint16_t> cells = cells_of(body, table).value();
+    const auto functions = write_functions(table, cells.size());
     const std::uint8_t function = broadcast_function(directory, line, functions);
     const unsigned limit = directory.generic->max_count(function);
-    if (cells->size() > limit || *address + static_cast<std::int64_t>(cells->size()) > 0x10000) {
-        return problem(422, "at most " + std::to_string(limit) +
-                                " values in one broadcast, up to address 65535");
-    }
-    return request_to(0, encode_write(function, static_cast<std::uint16_t>(*address), *cells));
+    if (cells.size() > limit || address + static_cast<std::int64_t>(cells.size()) > 0x10000)
+        refuse(422, "at most " + std::to_string(limit) +
+                        " values in one broadcast, up to address 65535");
+    return request_to(0, encode_write(function, static_cast<std::uint16_t>(address), cells))
+        .value();
 }
 
 /// The answer to a broadcast: 202, because no station replies to one.
@@ -301,24 +284,18 @@ Handling read_everywhere(HttpRequest request, const Api* api, const LineEntry* l
 }  // namespace
 
 Handling post_broadcast(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api->directory, request.arguments[0]);
-    if (!line) co_return to_response(line.error());
-    const auto body = parse_object(request.body, {"table", "address", "values", "verify"});
-    if (!body) co_return to_response(body.error());
-    const auto verify = flag_member(*body, "verify");
-    if (!verify) co_return to_response(verify.error());
+    const LineEntry* const line = find_line(*api->directory, request.arguments[0]).value();
+    const auto body = parse_object(request.body, {"table", "address", "values", "verify"}).value();
+    const auto verify = flag_member(body, "verify").value();
     // An invalid request is reported first; a valid one is for the bus to refuse, which counts and
     // logs it.
-    auto planned = broadcast_request(*api->directory, **line, *body);
-    if (!planned) co_return to_response(planned.error());
-    bus::Request made = std::move(*planned);
+    bus::Request made = broadcast_request(*api->directory, *line, body);
     const auto written = Verification::of(made.request);
-    const Patience patience((*line)->deadline, api->providers.now);
-    const bus::Answer answer =
-        co_await ask(request.caller, (*line)->bus, std::move(made), patience);
-    if (!*verify || answer.refusal || !answer.pdu) co_return broadcast_answer(answer);
+    const Patience patience(line->deadline, api->providers.now);
+    const bus::Answer answer = co_await ask(request.caller, line->bus, std::move(made), patience);
+    if (!verify || answer.refusal || !answer.pdu) co_return broadcast_answer(answer);
     boost::asio::awaitable<HttpResponse> reading =
-        read_everywhere(std::move(request), api, *line, *written, patience);
+        read_everywhere(std::move(request), api, line, *written, patience);
     co_return co_await std::move(reading);
 }
 
@@ -386,21 +363,18 @@ HttpResponse raw_answer(const bus::Answer& answer) {
 }  // namespace
 
 Handling post_raw(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api->directory, request.arguments[0]);
-    if (!line) co_return to_response(line.error());
-    const auto body = parse_object(request.body, {"station", "pdu"});
-    if (!body) co_return to_response(body.error());
-    auto planned = raw_request(*api->directory, **line, *body);
+    const LineEntry* const line = find_line(*api->directory, request.arguments[0]).value();
+    const auto body = parse_object(request.body, {"station", "pdu"}).value();
+    auto planned = raw_request(*api->directory, *line, body);
     if (!planned) {
-        count_refused(*request.caller, *(*line)->bus, *body);
+        count_refused(*request.caller, *line->bus, body);
         co_return to_response(planned.error());
     }
     bus::Request made = std::move(*planned);
     const bool broadcast = made.station == 0;
-    const Patience patience((*line)->deadline, api->providers.now);
+    const Patience patience(line->deadline, api->providers.now);
     made.raw = made.verbatim = true;
-    const bus::Answer answer =
-        co_await ask(request.caller, (*line)->bus, std::move(made), patience);
+    const bus::Answer answer = co_await ask(request.caller, line->bus, std::move(made), patience);
     co_return broadcast ? broadcast_answer(answer) : raw_answer(answer);
 }
 

@@ -86,18 +86,16 @@ void add_points(std::vector<Seen>& seen, const StationEntry& station, const Sigh
 }  // namespace
 
 Handling get_points(HttpRequest request, const Api* api) {
-    const auto station = find_station(*api->directory, request.arguments[0]);
-    if (!station) co_return to_response(station.error());
-    const auto raw = query_flag(request, "raw");
-    if (!raw) co_return to_response(raw.error());
-    if (*raw && wants_csv(request.headers["accept"]))
+    const auto station = find_station(*api->directory, request.arguments[0]).value();
+    const auto raw = query_flag(request, "raw").value();
+    if (raw && wants_csv(request.headers["accept"]))
         co_return to_response(problem(400, "raw is for JSON, not for text/csv"));
     const Instant now{api->providers.now(), api->providers.wall()};
     std::vector<Seen> seen;
-    add_points(seen, *station, Sight(*api->directory, request.caller->who()), now.steady, *raw);
+    add_points(seen, station, Sight(*api->directory, request.caller->who()), now.steady, raw);
     Table table{.directory = api->lent, .name = "points", .columns = kColumns};
     table.count = seen.size();
-    table.entry = [now, seen = std::move(seen), with_raw = *raw](std::size_t i) {
+    table.entry = [now, seen = std::move(seen), with_raw = raw](std::size_t i) {
         return describe(now, *seen[i].point, seen[i].reading, with_raw ? &seen[i].items : nullptr);
     };
     co_return table_answer(request, std::move(table));
@@ -124,24 +122,23 @@ Handling get_all_points(HttpRequest request, const Api* api) {
 }
 
 Handling get_point(HttpRequest request, const Api* api) {
-    const auto found = find_point(*api->directory, request.arguments[0], request.arguments[1]);
-    if (!found) co_return to_response(found.error());
-    const auto raw = query_flag(request, "raw");
-    if (!raw) co_return to_response(raw.error());
-    const Point& point = *found->point;
-    const StationEntry& station = found->station;
+    const auto found =
+        find_point(*api->directory, request.arguments[0], request.arguments[1]).value();
+    const auto raw = query_flag(request, "raw").value();
+    const Point& point = *found.point;
+    const StationEntry& station = found.station;
     // Behind a write the panel's own value is asked for, where the line has no other master.
     if (station.points->is_outdated(point) && !station.bus->status().listens) {
         const Patience patience(api->directory->line_of(station).deadline, api->providers.now);
         boost::asio::awaitable<Parsed<Reading>> reads =
-            read_all(request.caller, &station, found->span, patience);
+            read_all(request.caller, &station, found.span, patience);
         const Parsed<Reading> reading = co_await std::move(reads);
         if (reading)
             co_return json_response(
                 200, describe({api->providers.now(), api->providers.wall()}, point,
-                              point_reading(point, *reading), *raw ? &reading->items : nullptr));
+                              point_reading(point, *reading), raw ? &reading->items : nullptr));
     }
-    co_return json_response(200, describe(*api, *station.points, point, *raw));
+    co_return json_response(200, describe(*api, *station.points, point, raw));
 }
 
 Handling get_relays(HttpRequest request, const Api* api) {

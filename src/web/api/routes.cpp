@@ -215,8 +215,13 @@ Handling conduct(HttpRequest request, const Api* api, const Row* row) {
         if (const auto hidden = check_sight(request, *directory, row->shows, sight_right(*row)))
             co_return to_response(*hidden);
     }
-    Handling work = handled(std::move(request), api, *row);
-    HttpResponse response = co_await std::move(work);
+    HttpResponse response;
+    try {
+        Handling work = handled(std::move(request), api, *row);
+        response = co_await std::move(work);
+    } catch (const Refused& refused) {
+        response = to_response(refused.problem);
+    }
     if (caller->has_left()) co_return response;
     if (directory != nullptr && is_found_wrong_here(response)) {
         if (const auto hidden = instead_of_telling(path, caller->who(), *directory))

@@ -90,10 +90,9 @@ Handling get_stations(HttpRequest request, const Api* api) {
 }
 
 Handling get_station(HttpRequest request, const Api* api) {
-    const auto station = find_station(*api->directory, request.arguments[0]);
-    if (!station) co_return to_response(station.error());
-    json::object body = describe(*station, status_of(*station));
-    body["polls"] = describe_polls(station->points, api->providers.now());
+    const auto station = find_station(*api->directory, request.arguments[0]).value();
+    json::object body = describe(station, status_of(station));
+    body["polls"] = describe_polls(station.points, api->providers.now());
     co_return json_response(200, body);
 }
 
@@ -161,10 +160,10 @@ WallClock wall_of(const Api& api) { return {api.providers.now(), api.providers.w
 }  // namespace
 
 Handling get_point_history(HttpRequest request, const Api* api) {
-    const auto found = find_point(*api->directory, request.arguments[0], request.arguments[1]);
-    if (!found) co_return to_response(found.error());
-    const points::StationHistory* history = found->station.history;
-    const points::Point& point = *found->point;
+    const auto found =
+        find_point(*api->directory, request.arguments[0], request.arguments[1]).value();
+    const points::StationHistory* history = found.station.history;
+    const points::Point& point = *found.point;
     if (history == nullptr || !points::StationHistory::keeps(point))
         co_return to_response(
             problem(404, "no history is kept of '" + point.name + "'; texts have none"));
@@ -173,7 +172,7 @@ Handling get_point_history(HttpRequest request, const Api* api) {
                            [&point, wall](const points::HistorySample& sample) {
                                return describe(sample, point, wall);
                            });
-    table.members["station"] = found->station.name;
+    table.members["station"] = found.station.name;
     table.members["point"] = point.name;
     table.members["unit"] = point.unit;
     table.members["every_ms"] = whole_ms(history->width());
@@ -182,16 +181,15 @@ Handling get_point_history(HttpRequest request, const Api* api) {
 }
 
 Handling get_line_history(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api->directory, request.arguments[0]);
-    if (!line) co_return to_response(line.error());
-    const bus::LineHistory* history = (*line)->history;
+    const LineEntry* const line = find_line(*api->directory, request.arguments[0]).value();
+    const bus::LineHistory* history = line->history;
     if (history == nullptr)
-        co_return to_response(problem(404, "no history is kept of '" + (*line)->name + '\''));
+        co_return to_response(problem(404, "no history is kept of '" + line->name + '\''));
     const WallClock wall = wall_of(*api);
     Table table =
         table_of(history->samples(wall.now), kLineColumns,
                  [wall](const bus::LineSample& sample) { return describe(sample, wall); });
-    table.members["line"] = (*line)->name;
+    table.members["line"] = line->name;
     table.members["every_ms"] = whole_ms(history->width());
     table.directory = api->lent;
     co_return table_answer(request, std::move(table));
@@ -199,20 +197,19 @@ Handling get_line_history(HttpRequest request, const Api* api) {
 
 namespace {
 
-Parsed<StationEntry> find_simulated(const Directory& directory, const std::string& name) {
-    auto station = find_station(directory, name);
-    if (station && !station->simulated)
-        return problem(404, "station '" + name + "' is not simulated");
+StationEntry find_simulated(const HttpRequest& request, const Api* api) {
+    StationEntry station = find_station(*api->directory, request.arguments[0]).value();
+    if (!station.simulated) refuse(404, "station '" + station.name + "' is not simulated");
     return station;
 }
 
 /// The body's members as numbers; true is 1 and false is 0.
-Parsed<std::map<std::string, double>> numbers_of(const json::object& body) {
+std::map<std::string, double> numbers_of(const json::object& body) {
     std::map<std::string, double> numbers;
     for (const auto& [key, value] : body) {
         if (!value.is_number() && !value.is_bool())
-            return problem(400, "the fault '" + excerpt(std::string(key)) +
-                                    "' must be a number, true or false");
+            refuse(400,
+                   "the fault '" + excerpt(std::string(key)) + "' must be a number, true or false");
         numbers[key] = value.is_bool() ? (value.get_bool() ? 1 : 0) : value.to_number<double>();
     }
     return numbers;
@@ -230,23 +227,19 @@ HttpResponse faults_of(const StationEntry& station) {
 }  // namespace
 
 Handling get_simulated(HttpRequest request, const Api* api) {
-    const auto station = find_simulated(*api->directory, request.arguments[0]);
-    if (!station) co_return to_response(station.error());
-    co_return faults_of(*station);
+    const StationEntry station = find_simulated(request, api);
+    co_return faults_of(station);
 }
 
 Handling put_simulated(HttpRequest request, const Api* api) {
-    const auto station = find_simulated(*api->directory, request.arguments[0]);
-    if (!station) co_return to_response(station.error());
-    const auto body = parse_object(request.body);
-    if (!body) co_return to_response(body.error());
-    const auto numbers = numbers_of(*body);
-    if (!numbers) co_return to_response(numbers.error());
-    if (const auto wrong = station->simulated->set_faults(*numbers))
+    const StationEntry station = find_simulated(request, api);
+    const auto body = parse_object(request.body).value();
+    const auto numbers = numbers_of(body);
+    if (const auto wrong = station.simulated->set_faults(numbers))
         co_return to_response(problem(400, *wrong));
     log_client(*request.caller, "simulator faults set",
-               {{"station", station->name}, {"faults", json_text(*body)}});
-    co_return faults_of(*station);
+               {{"station", station.name}, {"faults", json_text(body)}});
+    co_return faults_of(station);
 }
 
 }  // namespace panelgate::web

@@ -169,58 +169,51 @@ HttpResponse pcapng_response(const std::string& version, const std::string& line
 }
 
 /// The page that the queries ask for.
-Parsed<TracePage> page_of(const HttpRequest& request, const bus::LineView& bus) {
+TracePage page_of(const HttpRequest& request, const bus::LineView& bus) {
     constexpr unsigned kUsual = 100;  // entries of each kind
     constexpr unsigned kMost = 500;
     const auto since = request.query.find("since");
     const bool follows = since != request.query.end();
-    const auto most = query_number(request, "last", 1, kMost, follows ? kMost : kUsual);
-    if (!most) return most.error();
-    if (!follows) return last_of_trace(bus, *most);
+    const unsigned most = query_number(request, "last", 1, kMost, follows ? kMost : kUsual).value();
+    if (!follows) return last_of_trace(bus, most);
     const auto number = to_number<std::uint64_t>(since->second);
-    if (!number) return problem(400, "since must be a sequence number: the value of `next`, or 0");
-    return trace_since(bus, *number, *most);
+    if (!number) refuse(400, "since must be a sequence number: the value of `next`, or 0");
+    return trace_since(bus, *number, most);
 }
 
 }  // namespace
 
 Handling get_trace_pcapng(HttpRequest request, const Api* api) {
     constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
-    const auto line = find_line(*api->directory, request.arguments[0]);
-    if (!line) co_return to_response(line.error());
-    const std::string& name = (*line)->name;
-    co_return pcapng_response(api->providers.version, name, (*line)->bus->trace(kAll),
-                              name + ".pcapng");
+    const LineEntry* const line = find_line(*api->directory, request.arguments[0]).value();
+    co_return pcapng_response(api->providers.version, line->name, line->bus->trace(kAll),
+                              line->name + ".pcapng");
 }
 
 Handling get_trace(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api->directory, request.arguments[0]);
-    if (!line) co_return to_response(line.error());
-    auto page = page_of(request, *(*line)->bus);
-    if (!page) co_return to_response(page.error());
-    json::object behind{{"next", page->next}};
-    co_return answer_part({}, std::move(page->part), std::move(behind));
+    const LineEntry* const line = find_line(*api->directory, request.arguments[0]).value();
+    auto page = page_of(request, *line->bus);
+    json::object behind{{"next", page.next}};
+    co_return answer_part({}, std::move(page.part), std::move(behind));
 }
 
 Handling get_incidents(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api->directory, request.arguments[0]);
-    if (!line) co_return to_response(line.error());
+    const LineEntry* const line = find_line(*api->directory, request.arguments[0]).value();
     json::array list;
-    for (const bus::IncidentHead& head : (*line)->bus->incidents()) list.push_back(json_of(head));
+    for (const bus::IncidentHead& head : line->bus->incidents()) list.push_back(json_of(head));
     co_return json_response(200, json::object{{"incidents", std::move(list)}});
 }
 
 /// The incident "7", or its capture "7.pcapng".
 Handling get_incident(HttpRequest request, const Api* api) {
     constexpr std::string_view kCapture = ".pcapng";
-    const auto line = find_line(*api->directory, request.arguments[0]);
-    if (!line) co_return to_response(line.error());
-    const std::string name = (*line)->name;
+    const LineEntry* const line = find_line(*api->directory, request.arguments[0]).value();
+    const std::string name = line->name;
     std::string_view wanted = request.arguments[1];
     const bool is_capture = wanted.ends_with(kCapture);
     if (is_capture) wanted.remove_suffix(kCapture.size());
     const auto id = to_number<std::uint64_t>(wanted);
-    auto found = id ? (*line)->bus->incident(*id) : std::nullopt;
+    auto found = id ? line->bus->incident(*id) : std::nullopt;
     if (!found)
         co_return to_response(
             problem(404, "line '" + name + "' keeps no incident '" + request.arguments[1] + "'"));

@@ -41,6 +41,10 @@ Problem problem(unsigned status, std::string detail, std::string_view kind) {
     return made;
 }
 
+void refuse(unsigned status, std::string detail, std::string_view kind) {
+    throw Refused(problem(status, std::move(detail), kind));
+}
+
 Problem passing_problem(unsigned status, std::string detail, std::int64_t seconds) {
     Problem made = problem(status, std::move(detail));
     made.headers.emplace_back("Retry-After", std::to_string(seconds));

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "panelgate/base/sha256.hpp"
+#include "panelgate/base/text.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/web/http/crossing.hpp"
 #include "panelgate/web/http/message.hpp"

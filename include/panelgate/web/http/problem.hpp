@@ -3,6 +3,7 @@
 #include <boost/json/object.hpp>
 #include <boost/system/result.hpp>
 #include <cstdint>
+#include <exception>
 #include <optional>
 #include <span>
 #include <string>
@@ -29,10 +30,25 @@ struct Problem {
 template <class T>
 using Parsed = boost::system::result<T, Problem>;
 
+/// Ends a handler before anything is sent: its route answers the problem. Parsed::value() throws
+/// Refused, too.
+struct Refused : std::exception {
+    explicit Refused(Problem with) : problem(std::move(with)) {}
+    const char* what() const noexcept override { return problem.detail.c_str(); }
+
+    Problem problem;
+};
+[[noreturn]] inline void throw_exception_from_error(const Problem& problem,
+                                                    const boost::source_location&) {
+    throw Refused(problem);
+}
+
 /// Makes a problem. `status`: 400-405, 409, 413, 415, 421, 422, 429, 431, 500 or 502-504. `kind`:
 /// "": by status.
 Problem problem(unsigned status, std::string detail, std::string_view kind = {});
-/// ... that is temporary: with Retry-After in seconds.
+/// Throws such a problem as Refused.
+[[noreturn]] void refuse(unsigned status, std::string detail, std::string_view kind = {});
+/// Makes a problem that is temporary: with Retry-After in seconds.
 Problem passing_problem(unsigned status, std::string detail, std::int64_t seconds);
 /// Returns 400 for an unknown name, suggesting the nearest of `known` or listing all. `what` is
 /// "member", "query".
