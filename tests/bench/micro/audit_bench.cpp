@@ -1,6 +1,8 @@
 // What a record of the audit costs: in the loop (composing, appending), and in all (hash, file).
 #include <benchmark/benchmark.h>
 
+#include <boost/json/array.hpp>
+
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -23,7 +25,7 @@ Members compose(std::uint64_t i) {
           std::pair{"station", "press"}, std::pair{"at", "UW102"},
           std::pair{"table", "holding-registers"}, std::pair{"outcome", "confirmed"}})
         add_text(record, key, text);
-    record["values"] = {i % 0x10000};
+    record["values"] = boost::json::array{i % 0x10000};
     record["transaction"] = i;
     return record;
 }
