@@ -2,7 +2,6 @@
 #include <benchmark/benchmark.h>
 
 #include <boost/json/array.hpp>
-
 #include <cstdint>
 #include <filesystem>
 #include <string>
