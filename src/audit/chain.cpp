@@ -55,14 +55,10 @@ Tail parse_tail(std::string_view end) {
     Tail tail;
     const auto newline = end.rfind('\n');
     tail.torn = newline == end.npos ? end : end.substr(newline + 1);
-    if (newline == end.npos) return tail;
-    const std::string_view whole = end.substr(0, newline);
+    const std::string_view whole = end.substr(0, newline == end.npos ? 0 : newline);
     const auto before = whole.rfind('\n');
     const auto record = parse_line(before == whole.npos ? whole : whole.substr(before + 1));
-    if (!record) {
-        tail.continuable = false;
-        return tail;
-    }
+    if (!record) return tail;
     tail.last = {record->number, std::string(record->hash)};
     tail.ended = member_of(record->body, "kind") == "end";
     return tail;

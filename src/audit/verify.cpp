@@ -1,7 +1,6 @@
 #include "panelgate/audit/verify.hpp"
 
 #include <algorithm>
-#include <array>
 #include <regex>
 #include <utility>
 
@@ -9,12 +8,6 @@
 #include "panelgate/base/text.hpp"
 
 namespace panelgate::audit {
-
-std::string_view label(Fault::Kind kind) {
-    constexpr std::array<std::string_view, 5> kLabels{"changed", "removed", "added", "torn",
-                                                      "anchor"};
-    return kLabels.at(static_cast<std::size_t>(kind));
-}
 
 namespace {
 
@@ -101,7 +94,7 @@ class Verifier {
     }
 
   private:
-    void fail(Fault::Kind kind, std::string text) {
+    void fail(std::string_view kind, std::string text) {
         report_.fault = Fault{kind, file_, line_, std::move(text)};
     }
 
@@ -111,12 +104,11 @@ class Verifier {
         if (record && report_.records == 0) begin_chain(*record);
         const std::string expected = record_text(report_.last.number + 1);
         if (!whole)
-            fail(Fault::Kind::torn,
+            fail("torn",
                  "the last line is not whole: the gateway was killed while it "
                  "was written, or the end was cut off");
         else if (!record)
-            fail(Fault::Kind::changed,
-                 expected + " is no record any more, or a line was added before it");
+            fail("changed", expected + " is no record any more, or a line was added before it");
         else if (!report_.fault)
             judge(*record);
         return !report_.fault;
@@ -129,23 +121,21 @@ class Verifier {
         const std::string previous(member_of(record.body, "previous"));
         report_.last = {record.number - 1, previous};
         if (member_of(record.body, "kind") != "file")
-            fail(Fault::Kind::removed, "the files begin with " + record_text(record.number) +
-                                           ", which does not begin a file: what stood before it "
-                                           "was removed");
+            fail("removed", "the files begin with " + record_text(record.number) +
+                                ", which does not begin a file: what stood before it "
+                                "was removed");
     }
 
     void judge(const Sealed& record) {
         const Position last = report_.last;
         const std::string found = record_text(record.number);
         if (record.number > last.number + 1)
-            return fail(Fault::Kind::removed, records_text(last.number + 1, record.number - 1) +
-                                                  " removed, or put elsewhere, before " + found);
+            return fail("removed", records_text(last.number + 1, record.number - 1) +
+                                       " removed, or put elsewhere, before " + found);
         if (record.number <= last.number)
-            return fail(Fault::Kind::added,
-                        found + " stands again behind " + record_text(last.number));
+            return fail("added", found + " stands again behind " + record_text(last.number));
         if (text_of(digest_.of(last.hash, record.text)) != record.hash)
-            return fail(Fault::Kind::changed,
-                        found + " was changed, or the hash of the one before");
+            return fail("changed", found + " was changed, or the hash of the one before");
         report_.last = {record.number, std::string(record.hash)};
         ++report_.records;
         if (member_of(record.body, "kind") == "file") look_at_file(record);
@@ -157,8 +147,7 @@ class Verifier {
     void look_at_file(const Sealed& record) {
         const std::string chain(member_of(record.body, "chain"));
         if (has_chain_ && chain != report_.chain)
-            fail(Fault::Kind::changed,
-                 record_text(record.number) + " begins a file of another chain");
+            fail("changed", record_text(record.number) + " begins a file of another chain");
         report_.chain = chain;
         has_chain_ = true;
         kept_from_ = number_in(member_of(record.body, "from"));
@@ -169,9 +158,9 @@ class Verifier {
         if (named == anchors_.chains.end() || !named->second.contains(record.number)) return;
         ++report_.anchored;
         if (!record.hash.starts_with(named->second.at(record.number)))
-            fail(Fault::Kind::anchor, record_text(record.number) +
-                                          " is another one than the log names: the chain was made "
-                                          "anew, from there or from an earlier record on");
+            fail("anchor", record_text(record.number) +
+                               " is another one than the log names: the chain was made "
+                               "anew, from there or from an earlier record on");
     }
 
     void note(std::string text) {
@@ -206,9 +195,9 @@ class Verifier {
             note("these files begin with " + record_text(report_.first) + "; " + missing +
                  " stand in other files of this audit");
         else
-            fail(Fault::Kind::removed, missing +
-                                           " removed: rotation has dropped only what stood "
-                                           "before");
+            fail("removed", missing +
+                                " removed: rotation has dropped only what stood "
+                                "before");
     }
 
     /// The last record in the log must be in the files, and the log must name a record of the
@@ -219,11 +208,10 @@ class Verifier {
         const std::uint64_t most =
             named == anchors_.chains.end() ? 0 : named->second.rbegin()->first;
         if (most > last)
-            fail(Fault::Kind::removed, records_text(last + 1, most) +
-                                           " removed at the end: the log names " +
-                                           record_text(most));
+            fail("removed", records_text(last + 1, most) + " removed at the end: the log names " +
+                                record_text(most));
         else if (anchors_.is_read && report_.records > 0 && report_.anchored == 0)
-            fail(Fault::Kind::anchor,
+            fail("anchor",
                  "the log names no record of the chain '" + report_.chain +
                      "', so nothing was compared: it is another log, or the chain was made anew");
     }
@@ -235,8 +223,7 @@ class Verifier {
         const std::string text =
             "the log names records of another chain '" + chain + "', up to " + record_text(last);
         if (was_here && !report_.fault)
-            fail(Fault::Kind::removed,
-                 text + ", which were written to this file and are not there");
+            fail("removed", text + ", which were written to this file and are not there");
         else
             note(text);
     }

@@ -110,7 +110,7 @@ ExitCode print_report(const audit::Report& report, std::size_t files, bool has_l
         const audit::Fault& fault = *report.fault;
         std::cout << fault.file;
         if (fault.line > 0) std::cout << ':' << fault.line;
-        std::cout << ": " << label(fault.kind) << ": " << fault.text << '\n';
+        std::cout << ": " << fault.kind << ": " << fault.text << '\n';
         if (report.records > 0)
             std::cout << report.records << " records before it are right (" << report.first
                       << " to " << report.last.number << ")\n";

@@ -34,7 +34,9 @@ void Conversation::reset() {
     hearing_ = make_hearing(settings_, served_);
     was_silent_ = true;
     unframed_bytes_ = 0;
-    own_.begin(settings_.echo);
+    sent_.reset();
+    kept_.clear();
+    echo_ = EchoState::unknown;
     confirmed_.reset();
 }
 
@@ -54,11 +56,41 @@ void Conversation::on_line_down() {
 /// Bytes are timestamped when read, not when they arrived: a silence before them counts only if
 /// on_deadline() found it with no bytes pending.
 void Conversation::on_rx(TimePoint now, ByteView bytes) {
-    if (!own_.any()) return hear(now, bytes);
+    if (!sent_) return hear(now, bytes);
     for (const std::uint8_t byte : bytes) {
-        const ByteView rest = own_.hear(now, byte, hearing_->pending() == 0);
-        if (!rest.empty()) hear(now, rest);
+        kept_.push_back(byte);
+        if (!sent_ || (kept_.size() == 1 && hearing_->pending() > 0) || !begins_echo()) {
+            release(now);
+        } else if (kept_.size() == sent_->frame.size() && is_echo(now)) {
+            sent_.reset();
+            kept_.clear();
+        } else if (kept_.size() == sent_->frame.size()) {
+            sent_.reset();
+            release(now);
+        }
     }
+}
+
+/// True if what is kept begins as the reply that was sent.
+bool Conversation::begins_echo() const {
+    return kept_.size() <= sent_->frame.size() &&
+           std::equal(kept_.begin(), kept_.end(), sent_->frame.begin());
+}
+
+/// Judges what has come whole. Where a reply equals its request, its echo is a request by its
+/// bytes: an echo by its time, if no master could have asked by then, or as long as the line may
+/// have an echo. An echo that has come once may come again, and hides a repeated request once at
+/// most.
+bool Conversation::is_echo(TimePoint now) {
+    const bool sure = sent_->is_distinct || now < sent_->sure_until;
+    if (sure) echo_ = EchoState::present;
+    return sure || settings_.echo == EchoMode::on || echo_ != EchoState::absent;
+}
+
+/// What is kept was the master's.
+void Conversation::release(TimePoint now) {
+    const Bytes bytes = std::exchange(kept_, {});
+    if (!bytes.empty()) hear(now, bytes);
 }
 
 void Conversation::hear(TimePoint now, ByteView bytes) {
@@ -146,7 +178,7 @@ void Conversation::check_silence(TimePoint now) {
 /// be taken for. Shorter noise is a glitch.
 void Conversation::judge_noise() {
     if (hearing_->pending() > 0) return;
-    if (unframed_bytes_ > 0) own_.disturb();
+    if (unframed_bytes_ > 0 && sent_) sent_->disturbed = true;
     if (std::exchange(unframed_bytes_, 0) >= modbus::kMinAdu) supersede();
 }
 
@@ -164,18 +196,19 @@ void Conversation::on_answer(TimePoint now, std::uint64_t ticket, const std::opt
 }
 
 void Conversation::on_deadline(TimePoint now) {
-    end_echoes(now);
+    end_echo(now);
     check_silence(now);
     try_send(now);
 }
 
-/// Bytes kept as a possible echo were the master's. Damage may have been the echo colliding with a
-/// transmission of the master.
-void Conversation::end_echoes(TimePoint now) {
+/// No echo has come. Damage may have been the echo colliding with a transmission of the master.
+void Conversation::end_echo(TimePoint now) {
     if (confirmed_ && now >= confirmed_->until) confirmed_.reset();
-    if (unframed_bytes_ > 0) own_.disturb();
-    const Bytes held = own_.expire(now);
-    if (!held.empty()) hear(now, held);
+    if (!sent_ || now < sent_->until) return;
+    const bool missing = kept_.empty() && !sent_->disturbed && unframed_bytes_ == 0;
+    if (missing && echo_ == EchoState::unknown) echo_ = EchoState::absent;
+    sent_.reset();
+    release(now);
 }
 
 /// If a reply equals its request, its echo looks like a retry. No master has sent one before it
@@ -187,7 +220,8 @@ void Conversation::watch_echo(const Bytes& sent) {
     const bool is_distinct = sent != asked;
     const Duration again = silence_ + wire_time(settings_.device.serial, sent.size());
     const TimePoint until = tx_done_at_ + settings_.hole;
-    own_.add(sent, is_distinct, tx_done_at_ + again, until);
+    if (settings_.echo != EchoMode::off)
+        sent_ = Sent{sent, is_distinct, tx_done_at_ + again, until};
     if (is_distinct) return confirmed_.reset();
     const int before = confirmed_ ? confirmed_->again : 0;
     confirmed_ = Confirmed{request, sent, until, before};
@@ -224,8 +258,9 @@ std::optional<Action> Conversation::poll_action() {
 }
 
 std::optional<TimePoint> Conversation::next_deadline() const {
-    std::optional<TimePoint> next = own_.next_deadline();
+    std::optional<TimePoint> next;
     const auto add = [&](TimePoint when) { next = next ? std::min(*next, when) : when; };
+    if (sent_) add(sent_->until);
     if (confirmed_) add(confirmed_->until);
     if (!was_silent_) add(last_rx_at_ + silence_);
     if (hearing_->pending() > 0) add(last_rx_at_ + pause());

@@ -8,9 +8,9 @@
 #include <variant>
 
 #include "hearing.hpp"
-#include "own_replies.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/words.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/serial_server/counters.hpp"
 #include "panelgate/serial_server/settings.hpp"
@@ -73,6 +73,14 @@ class Conversation {
         std::optional<Bytes> reply{};
         bool is_exception = false;
     };
+    /// The last reply, whose echo is taken out of what is heard (P8).
+    struct Sent {
+        Bytes frame;
+        bool is_distinct = false;  ///< no request is the same
+        TimePoint sure_until;      ///< what has come whole before is no master's
+        TimePoint until;           ///< the echo may come until then
+        bool disturbed = false;    ///< damage was heard since, which may have been the echo
+    };
     /// A write whose answer is the same.
     struct Confirmed {
         modbus::SerialAdu request;
@@ -88,7 +96,10 @@ class Conversation {
     void supersede();
     void check_silence(TimePoint now);
     void judge_noise();
-    void end_echoes(TimePoint now);
+    bool begins_echo() const;
+    bool is_echo(TimePoint now);
+    void release(TimePoint now);
+    void end_echo(TimePoint now);
     void watch_echo(const Bytes& sent);
     void try_send(TimePoint now);
     Duration pause() const;
@@ -106,7 +117,9 @@ class Conversation {
     bool was_silent_ = true;          ///< silence since then, already handled
     std::size_t unframed_bytes_ = 0;  ///< bytes since the last good frame
     TimePoint tx_done_at_{};          ///< end of the last transmission
-    OwnReplies own_;
+    std::optional<Sent> sent_;        ///< an echo may come
+    Bytes kept_;                      ///< heard, and the beginning of that echo
+    EchoState echo_ = EchoState::unknown;
     std::optional<Confirmed> confirmed_;  ///< if the master has sent nothing else since
     bool finishing_ = false;
     Counters counters_;

@@ -47,12 +47,11 @@ std::optional<Sealed> parse_line(std::string_view line);
 std::string_view member_of(std::string_view body, std::string_view key);
 /// Where a file's end is, as far as the chain is concerned.
 struct Tail {
-    Position last{};          ///< its last whole record; number 0: it has none
-    std::string_view torn;    ///< what follows the last newline
-    bool ended = false;       ///< the last record is of kind `end`
-    bool continuable = true;  ///< false: its last whole line is no record
+    Position last{};        ///< its last line that is whole; number 0: none, or no record
+    std::string_view torn;  ///< what follows the last newline
+    bool ended = false;     ///< the last record is of kind `end`
 };
-/// `end`: the end of a file, at least its last line; `is_whole`: it is the whole file. Pure.
+/// `end`: the end of a file, at least its last line. Pure.
 Tail parse_tail(std::string_view end);
 
 }  // namespace panelgate::audit

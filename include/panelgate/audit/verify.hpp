@@ -13,14 +13,11 @@ namespace panelgate::audit {
 
 /// The first thing that is wrong with a chain.
 struct Fault {
-    enum class Kind : std::uint8_t { changed, removed, added, torn, anchor };
-    Kind kind = Kind::changed;
+    std::string_view kind{};  ///< "changed", "removed", "added", "torn" or "anchor"
     std::string file{};
     std::uint64_t line = 0;  ///< from 1; 0: the end of what was read
     std::string text{};      ///< a clause for the user
 };
-/// Returns "changed", "removed", ...
-std::string_view label(Fault::Kind kind);
 
 /// What the log says of audits.
 struct Anchors {

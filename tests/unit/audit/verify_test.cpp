@@ -54,7 +54,7 @@ Report verdict(const Lines& lines, const Anchors& anchors = {}, bool whole = tru
 
 std::string said(const Report& report) {
     if (!report.fault) return "right";
-    return std::string(label(report.fault->kind)) + ": " + report.fault->text;
+    return std::string(report.fault->kind) + ": " + report.fault->text;
 }
 
 TEST(AuditVerify, AChainIsRightFromItsFirstRecordToItsLast) {
