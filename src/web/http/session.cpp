@@ -373,8 +373,9 @@ std::string HttpSession::head_of_events(const HttpResponse& response) const {
     return "HTTP/1.1 200 OK\r\nServer: " + shared_->site->product +
            "\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n"
            "X-Content-Type-Options: nosniff\r\n" +
-           (stream_.is_secure() ? "Strict-Transport-Security: " + std::string(kStrictTransport) + "\r\n"
-                        : "") +
+           (stream_.is_secure()
+                ? "Strict-Transport-Security: " + std::string(kStrictTransport) + "\r\n"
+                : "") +
            more + "Connection: close\r\n\r\n: panelgate\n\n";
 }
 
