@@ -19,8 +19,7 @@ ELSEWHERE = {"write": ("", ["line", "station", "client", "certificate", "at", "p
              "listening": ("", ["modbus_tcp", "http"]), "listener waits": ("", ["modbus_tcp", "http"]),
              "log lines left out": ("", ["of", "client", "clients", "count"]),
              "log lines dropped": ("", ["count"]), "tls handshake failed": ("info, warn", []),
-             "certificate not renewed": ("warn, error", []),
-             "certificate renewed": ("", ["files", "subject", "issuer", "serial", "valid_from", "expires"]),
+             "certificate renewed": ("", ["files", "subject", "issuer", "serial", "expires"]),
              "connection closed": ("info, warn", []),
              "connection gives way": ("info, warn", []),
              "datagram refused": ("debug, info, warn", [])}
@@ -35,7 +34,7 @@ MEANINGS = {
     "cannot start": "a listener could not be opened; the program ends",
     "certificate": "what `check` would say of a certificate: its end, its names, its purpose",
     "certificate file missing": "a file of a `tls` map is gone or cannot be read; what it held stays in use",
-    "certificate not renewed": "new files of a `tls` map cannot be used, or must not replace good ones; those stay in use",
+    "certificate not renewed": "new files of a `tls` map cannot be used; the former contents stay in use",
     "certificate renewed": "new files of a `tls` map are in use for new connections; it says which, and whose certificate it is",
     "certificate without a role": "the role in a client's certificate does not count, so it only reads",
     "collision": "another unit sent at the same time, or an echo is missing",

@@ -33,9 +33,7 @@ struct CertificateOptions {
     int days = 0;
     bool force = false;  ///< replace files
 
-    std::string path(const std::string& name) const {
-        return dir == "." ? name : dir + '/' + name;
-    }
+    std::string path(const std::string& name) const { return dir == "." ? name : dir + '/' + name; }
     tls::Validity validity() const { return {gateway::seconds_since_1970(), days}; }
     std::string read(const std::string& file) const {
         const auto text = config::RealFiles::read_any(file);
@@ -50,20 +48,36 @@ struct CertificateOptions {
     }
 };
 
-/// Writes under another name, then in one step: a gateway that reads meanwhile has the old file or
-/// the new one.
-void write(const std::string& path, const std::string& text, mode_t mode) {
-    const std::string fresh = path + ".new";
-    const int file = ::open(fresh.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode);
-    bool done = file >= 0 && ::fchmod(file, mode) == 0 &&
-                ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
-                ::fsync(file) == 0;
-    if (file >= 0) ::close(file);
-    done = done && std::rename(fresh.c_str(), path.c_str()) == 0;
-    if (done) return;
-    const std::string why = std::strerror(errno);
-    ::unlink(fresh.c_str());
-    throw tls::CannotIssue("cannot write " + path + ": " + why);
+struct File {
+    std::string path;
+    std::string text;
+    mode_t mode;
+
+    std::string fresh() const { return path + ".new"; }
+    bool write() const {
+        const int file = ::open(fresh().c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode);
+        const bool done =
+            file >= 0 && ::fchmod(file, mode) == 0 &&
+            ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
+            ::fsync(file) == 0;
+        if (file >= 0) ::close(file);
+        return done;
+    }
+    bool put_in_place() const { return std::rename(fresh().c_str(), path.c_str()) == 0; }
+};
+
+/// Writes all files under other names, then puts each in its place in one step: a gateway that
+/// reads meanwhile has the old file or the new one, and a full disk changes nothing.
+void write(const std::vector<File>& files) {
+    errno = ENOSPC;  // of a short write
+    for (const auto step : {&File::write, &File::put_in_place}) {
+        const auto failed =
+            std::ranges::find_if_not(files, [&](const File& one) { return (one.*step)(); });
+        if (failed == files.end()) continue;
+        const std::string why = std::strerror(errno);
+        for (const File& one : files) ::unlink(one.fresh().c_str());
+        throw tls::CannotIssue("cannot write " + failed->path + ": " + why);
+    }
 }
 
 /// Returns a file's name for a certificate's: letters, digits, '.', '-' and '_', at most 200.
@@ -77,15 +91,14 @@ std::string file_name(std::string name) {
 }
 
 /// Writes NAME.key and NAME.crt; says so, and what to do with them.
-void write_pair(const CertificateOptions& typed, const std::string& name,
-                const tls::Issued& issued, const std::string& advice) {
+void write_pair(const CertificateOptions& typed, const std::string& name, const tls::Issued& issued,
+                const std::string& advice) {
     const std::string key = typed.path(name + ".key");
     const std::string certificate = typed.path(name + ".crt");
     for (const std::string& path : {key, certificate})
         if (!typed.force && ::access(path.c_str(), F_OK) == 0)
             throw tls::CannotIssue(path + " is there already; --force replaces it");
-    write(key, issued.key, 0600);
-    write(certificate, issued.certificate, 0644);
+    write({{key, issued.key, 0600}, {certificate, issued.certificate, 0644}});
     std::cout << "wrote " << certificate << " and " << key << ", valid until "
               << tls::date_text(tls::summary_of(issued.certificate).end) << '\n'
               << advice;
@@ -131,9 +144,10 @@ void revoke(const CertificateOptions& typed) {
     const bool is_first = ::access(path.c_str(), F_OK) != 0 && errno == ENOENT;
     const std::string former = is_first ? "" : typed.read(path);
     if (!is_first && former.empty())
-        throw tls::CannotIssue(path + " is empty, though it should name who is revoked already: "
-                                      "bring back a copy, such as a gateway's");
-    write(path, tls::revoke(typed.ca(), former, given, typed.validity()), 0644);
+        throw tls::CannotIssue(path +
+                               " is empty, though it should name who is revoked already: "
+                               "bring back a copy, such as a gateway's");
+    write({{path, tls::revoke(typed.ca(), former, given, typed.validity()), 0644}});
     std::cout << "wrote " << path << "\nIt goes to every gateway (`tls: crl`), which takes it "
               << "without a restart"
               << (given ? ", and closes the connections of this certificate" : "") << ".\n";

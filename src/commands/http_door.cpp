@@ -21,7 +21,6 @@
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/explain/load.hpp"
 #include "panelgate/line/settings.hpp"
-#include "panelgate/tls/stream.hpp"
 #include "panelgate/yaml/document.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 #include "table.hpp"

@@ -12,7 +12,7 @@
 #include "commands.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/config/endpoint.hpp"
-#include "panelgate/tls/client.hpp"
+#include "panelgate/tls/stream.hpp"
 
 namespace panelgate::commands {
 

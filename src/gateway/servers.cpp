@@ -302,8 +302,7 @@ void Servers::apply_masters(const config::Config& config, const Plant& plant) {
 void Servers::renew(const std::string& listener, const tls::Settings& settings) {
     for (const Modbus& one : listeners_)
         if ("modbus_tcp " + one.settings.name() == listener) one.listener->renew(settings);
-    if (http_ && "http " + http_->settings.name() == listener)
-        http_->server->renew(settings);
+    if (http_ && "http " + http_->settings.name() == listener) http_->server->renew(settings);
 }
 
 void Servers::stop_accepting(Duration longest) {

@@ -188,9 +188,11 @@ void Listener::Core::on_accepted(tcp::socket socket) {
                      {{"client", text(peer)}, {"reason", "not in the allow list"}});
     } else if (shared_->handshakes) {
         set_up(socket);
-        shared_->handshakes->begin(std::move(socket), [weak = weak_from_this()](tls::Stream stream) {
-            if (const auto self = weak.lock()) self->on_secured(std::move(stream));
-        });
+        shared_->handshakes->begin(std::move(socket),
+                                   [weak = weak_from_this()](tls::Stream stream) {
+                                       if (const auto self = weak.lock())
+                                           self->on_secured(std::move(stream));
+                                   });
     } else if (make_room(peer)) {
         set_up(socket);
         admit(tls::Stream(std::move(socket)), peer);
@@ -268,8 +270,7 @@ void Listener::Core::admit(tls::Stream stream, const tcp::endpoint& peer) {
 
 void Listener::Core::on_closed(const std::shared_ptr<Session>& session) {
     sessions_.erase(session);
-    if (std::exchange(full_, false))
-        shared_->log(rt::LogLevel::info, "connections accepted again");
+    if (std::exchange(full_, false)) shared_->log(rt::LogLevel::info, "connections accepted again");
     notify_when_empty();
 }
 

@@ -1,5 +1,3 @@
-#include "panelgate/tls/client.hpp"
-
 #include <openssl/ssl.h>
 #include <openssl/x509_vfy.h>
 #include <boost/asio/ssl/context.hpp>
@@ -8,6 +6,7 @@
 #include <utility>
 
 #include "native.hpp"
+#include "panelgate/tls/stream.hpp"
 
 namespace panelgate::tls {
 namespace {
@@ -24,8 +23,7 @@ struct Believed {
 int judge_server_by(X509_STORE_CTX* chain, void* argument) {
     const auto* const believed = static_cast<const Believed*>(argument);
     if (believed->anybody) return 1;
-    if (believed->pinned &&
-        X509_cmp(believed->pinned.get(), X509_STORE_CTX_get0_cert(chain)) == 0)
+    if (believed->pinned && X509_cmp(believed->pinned.get(), X509_STORE_CTX_get0_cert(chain)) == 0)
         return 1;
     return X509_verify_cert(chain);
 }
@@ -67,11 +65,11 @@ void connect(asio::ip::tcp::socket socket, const Trust& trust, const std::string
     SSL* const tls = all->stream->native_handle();
     if (!trust.any_name && expect_peer(SSL_get0_param(tls), server))
         SSL_set_tlsext_host_name(tls, server.c_str());
-    all->stream->async_handshake(
-        asio::ssl::stream_base::client, [all, done = std::move(done)](const error_code& error) {
-            const std::string why = error ? all->reason(error) : "";
-            done(why, Stream(std::move(all->stream)));
-        });
+    all->stream->async_handshake(asio::ssl::stream_base::client,
+                                 [all, done = std::move(done)](const error_code& error) {
+                                     const std::string why = error ? all->reason(error) : "";
+                                     done(why, Stream(std::move(all->stream)));
+                                 });
 }
 
 }  // namespace panelgate::tls

@@ -90,7 +90,7 @@ void trust(SSL_CTX* context, const Settings& settings, bool is_server) {
                            "PEM form");
     for (const auto& one : trusted) {
         X509_STORE_add_cert(SSL_CTX_get_cert_store(context), one.get());
-        // Browsers choose among their certificates by the names that are sent to them.
+        // A browser chooses its certificate by the names of the CAs.
         if (is_server) SSL_CTX_add_client_CA(context, one.get());
     }
 }

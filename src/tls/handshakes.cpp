@@ -25,8 +25,8 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-constexpr Duration kBetween = 5ms;           ///< two handshakes that begin
-constexpr unsigned char kHandshakeRecord = 22;  // RFC 8446 5.1
+constexpr Duration kBetween = 5ms;     ///< two handshakes that begin
+constexpr char kHandshakeRecord = 22;  // RFC 8446 5.1
 
 std::string spoken(std::string_view first) {
     const std::size_t word = first.find(' ');
@@ -66,8 +66,7 @@ constexpr Explained kExplained[] = {
     {SSL_R_SSLV3_ALERT_BAD_CERTIFICATE, Outcome::refused, kNotTaken},
     {SSL_R_SSLV3_ALERT_CERTIFICATE_UNKNOWN, Outcome::refused, kNotTaken},
     {SSL_R_SSLV3_ALERT_UNSUPPORTED_CERTIFICATE, Outcome::refused, kNotTaken},
-    {SSL_R_SSLV3_ALERT_CERTIFICATE_REVOKED, Outcome::refused,
-     "the client says that the gateway's certificate is revoked"},
+    {SSL_R_SSLV3_ALERT_CERTIFICATE_REVOKED, Outcome::refused, kNotTaken},
     {SSL_R_SSLV3_ALERT_CERTIFICATE_EXPIRED, Outcome::refused,
      "the client says that the gateway's certificate has expired"},
     {SSL_R_TLSV1_ALERT_ACCESS_DENIED, Outcome::refused, "the client ended it"},
@@ -92,13 +91,14 @@ std::string sentence_of(X509_STORE_CTX* judging, int why) {
     if (judged != nullptr && X509_cmp(judged, own) != 0)
         text = "the CA " + subject_of(judged) + " of " + text;
     if (why == X509_V_ERR_INVALID_PURPOSE)
-        return text + "is not one of a client; its extended key usage must have clientAuth, and "
-                      "its key usage, if it has one, digitalSignature";
+        return text +
+               "is not one of a client; its extended key usage must have clientAuth, and "
+               "its key usage, if it has one, digitalSignature";
     return text + words_of_chain(why);
 }
 
-/// A list that is overdue still says who is revoked: its age locks nobody out. Between a client and
-/// its CA only those lists count that are there.
+/// Judges one certificate of a chain. An overdue list of revoked certificates still counts, and a
+/// CA between the client and the root needs no list.
 bool judge_chain(bool good, X509_STORE_CTX* judging, Refusal& refusal) {
     if (good) return true;
     const int why = X509_STORE_CTX_get_error(judging);
@@ -189,8 +189,8 @@ void Handshakes::make_room(const std::string& address) {
                    return counts[one->address] == most;
                }))->address;
     }
-    const Ref oldest = *std::ranges::find_if(
-        running_, [&](const Ref& one) { return one->address == from; });
+    const Ref oldest =
+        *std::ranges::find_if(running_, [&](const Ref& one) { return one->address == from; });
     fail(oldest, Outcome::displaced, "too many handshakes at the same time; the oldest gives way");
 }
 
@@ -201,22 +201,25 @@ void Handshakes::listen(const Ref& one) {
                           });
 }
 
-/// The first bytes stay in the socket.
+/// The first bytes of TLS stay in the socket. Other bytes are read, so that closing is no reset.
 void Handshakes::look(const Ref& one) {
-    std::array<char, 64> first;
-    const auto size =
-        ::recv(one->plain.native_handle(), first.data(), first.size(), MSG_PEEK | MSG_DONTWAIT);
+    std::array<char, 4096> first;
+    const int socket = one->plain.native_handle();
+    const auto size = ::recv(socket, first.data(), 1, MSG_PEEK | MSG_DONTWAIT);
     if (size < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) return listen(one);
     if (size <= 0) return fail(one, Outcome::broken, "the client left before the first byte");
-    if (static_cast<unsigned char>(first[0]) != kHandshakeRecord)
-        return fail(one, Outcome::plain, spoken({first.data(), static_cast<std::size_t>(size)}));
+    if (first[0] != kHandshakeRecord) {
+        const auto all = ::recv(socket, first.data(), first.size(), MSG_DONTWAIT);
+        return fail(one, Outcome::plain,
+                    spoken({first.data(), static_cast<std::size_t>(std::max(all, ssize_t{1}))}));
+    }
     one->waits_for_turn = true;
     take_turns();
 }
 
 void Handshakes::take_turns() {
-    const auto next = std::ranges::find_if(
-        running_, [](const Ref& one) { return one->waits_for_turn; });
+    const auto next =
+        std::ranges::find_if(running_, [](const Ref& one) { return one->waits_for_turn; });
     if (turn_is_armed_ || next == running_.end()) return;
     const Ref one = *next;
     one->waits_for_turn = false;

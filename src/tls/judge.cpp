@@ -50,19 +50,19 @@ void judge_pair(const Settings& settings, const std::vector<std::string>& names,
     judge_dates(own, what, "clients refuse it", now, said);
     for (const auto& one : chain)
         if (one != chain.front())
-            judge_dates(one.get(), "the certificate " + subject_of(one.get()) + " in " +
-                                       settings.certificate,
+            judge_dates(one.get(),
+                        "the certificate " + subject_of(one.get()) + " in " + settings.certificate,
                         "clients refuse the gateway's", now, said);
     if ((X509_get_extended_key_usage(own) & XKU_SSL_SERVER) == 0)
         said.push_back(what + " is not one of a server (extended key usage): clients refuse it");
     for (const std::string& name : names)
         if (!is_for(own, name))
-            said.push_back(what + " is not for " + name + ", by which clients reach it: they " +
-                           "refuse it; make one with all names (panelgate cert new-server NAME...)");
+            said.push_back(
+                what + " is not for " + name + ", by which clients reach it: they " +
+                "refuse it; make one with all names (panelgate cert new-server NAME...)");
 }
 
-void judge_authorities(const Settings& settings, const char* effect, std::int64_t now,
-                       Said& said) {
+void judge_authorities(const Settings& settings, const char* effect, std::int64_t now, Said& said) {
     for (const auto& one : certificates_of(settings.material.ca)) {
         const std::string what = "the CA " + subject_of(one.get()) + " in " + settings.ca;
         judge_dates(one.get(), what, effect, now, said);
@@ -127,7 +127,7 @@ Summary summary_of(std::string_view certificate) {
         ASN1_INTEGER_to_BN(X509_get0_serialNumber(own), nullptr), BN_free);
     char* const serial = BN_bn2hex(number.get());
     Summary made{subject_of(own), name_text(X509_get_issuer_name(own)), serial,
-                 seconds_of(X509_get0_notBefore(own)), seconds_of(X509_get0_notAfter(own))};
+                 seconds_of(X509_get0_notAfter(own))};
     OPENSSL_free(serial);
     return made;
 }

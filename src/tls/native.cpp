@@ -28,8 +28,7 @@ std::vector<Owned<T>> all_of(std::string_view pem, bool* damaged, Read read) {
     const Owned<BIO> in(BIO_new_mem_buf(pem.data(), static_cast<int>(pem.size())));
     ERR_clear_error();
     while (T* one = read(in.get(), nullptr, no_password, nullptr)) found.emplace_back(one);
-    if (damaged != nullptr)
-        *damaged = ERR_GET_REASON(ERR_peek_last_error()) != PEM_R_NO_START_LINE;
+    if (damaged != nullptr) *damaged = ERR_GET_REASON(ERR_peek_last_error()) != PEM_R_NO_START_LINE;
     ERR_clear_error();
     return found;
 }

@@ -40,8 +40,8 @@ class Context {
     std::int64_t expiry_ = 0;
 };
 
-/// What a client brings to a connection to one server: whom it trusts, and its own certificate.
-/// For one connection at a time.
+/// A client's context for connections to one server: trusted CAs, and the client's certificate. For
+/// one connection at a time.
 class ClientContext {
   public:
     /// Throws Unusable. Reads no file: settings.material has the contents. `server`: the name or

@@ -18,7 +18,8 @@ inline constexpr std::int64_t kAnnouncedDays = 14;
 std::vector<std::string> doubts(const Settings& settings, const std::vector<std::string>& names,
                                 std::int64_t now);
 
-/// The same of a client's files, and what makes them unusable. `server`: whom the client asks.
+/// Returns what is questionable in a client's files, or makes the files unusable. `server`: the
+/// host name or address of the client's server.
 std::vector<std::string> client_doubts(const Settings& settings, const std::string& server,
                                        std::int64_t now);
 
@@ -27,8 +28,7 @@ struct Summary {
     std::string subject;
     std::string issuer;
     std::string serial;
-    std::int64_t begin = 0;  ///< of its validity, in seconds since 1970
-    std::int64_t end = 0;
+    std::int64_t end = 0;  ///< of its validity, in seconds since 1970
 };
 /// Describes the first certificate of a PEM text; empty if there is none.
 Summary summary_of(std::string_view certificate);

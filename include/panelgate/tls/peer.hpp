@@ -36,15 +36,16 @@ Role role_named(std::string_view word);
 struct CertifiedRole {
     std::string word{};   ///< its role in its own words; "" none that counts
     Standing standing{};  ///< the least for a word that no role is called
-    std::string doubt{};  ///< why the role in it does not count; "" if it does, or there is none
+    std::string doubt{};  ///< why the certificate's role does not count; "": no doubt
 };
 
-/// Nothing where the listener does not go by certificates. Pure, like the next.
+/// Returns nothing where the listener does not go by certificates. Pure.
 std::optional<CertifiedRole> certified_role(const std::optional<Settings>& tls, const Peer& peer);
 
-/// A connection keeps the role that it came in with. Why one with this certificate must come in
-/// anew when these settings follow those; "" if it may do the same. `otherwise`: what it may where
-/// certificates do not decide; `least`: by a certificate without a role that counts.
+/// A connection keeps the role of its start. Returns why a connection with this certificate must
+/// come in anew when the settings `now` follow `before`; "" if its rights are the same.
+/// `otherwise`: its rights where certificates do not decide; `least`: with a certificate whose role
+/// does not count.
 std::string why_other_role(const std::optional<Settings>& before,
                            const std::optional<Settings>& now, const Peer& peer,
                            const Standing& otherwise, const Standing& least);

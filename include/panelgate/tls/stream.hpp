@@ -10,6 +10,7 @@
 #include <boost/system/error_code.hpp>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -59,7 +60,8 @@ class Stream {
     auto async_read_some(const Buffers& buffers, Token&& token);
     template <class Buffers, class Token>
     auto async_write_some(const Buffers& buffers, Token&& token);
-    /// The same without a time limit (expires_after): a plain read costs what the socket's own does.
+    /// The same without a time limit (expires_after): a plain read costs what the socket's own
+    /// does.
     template <class Handler>
     void read_some(boost::asio::mutable_buffer into, Handler handler);
     /// Writes what can be written at once; would_block if nothing, as always with TLS.
@@ -158,5 +160,19 @@ void Stream::read_some(boost::asio::mutable_buffer into, Handler handler) {
     if (is_secure()) return async_read_some(into, std::move(handler));
     plain_.async_read_some(into, std::move(handler));
 }
+
+/// Whom a client believes, in PEM form: the server that has this very certificate, whatever its
+/// name and dates, or a server whose certificate the CA has signed for its name or address.
+struct Trust {
+    std::string certificate;
+    std::string ca;
+    bool any_name = false;  ///< the CA's signature is enough, whatever names it is for
+    bool anybody = false;   ///< whoever is there: for a question that holds no secret
+};
+
+/// Makes a connected socket secure, from the client's side: for programs that ask one server, by
+/// its name or its address. `done` is called once, later: with why it failed, or "" and the stream.
+void connect(boost::asio::ip::tcp::socket socket, const Trust& trust, const std::string& server,
+             std::function<void(const std::string& why, Stream stream)> done);
 
 }  // namespace panelgate::tls

@@ -171,17 +171,16 @@ TEST_F(HandshakesTest, CarriesWhatComesTogetherWithTheHandshakesEnd) {
     Stream& stream = streams.back();
     std::string text(16, ' ');
     bool answered = false;
-    stream.async_read_some(
-        asio::buffer(text), [&](const boost::system::error_code& error, std::size_t size) {
-            EXPECT_FALSE(error);
-            text.resize(size);
-            const std::array parts{asio::buffer("po", 2), asio::buffer("ng", 2)};
-            asio::async_write(stream, parts,
-                              [&](const boost::system::error_code& failed, std::size_t) {
-                                  EXPECT_FALSE(failed);
-                                  answered = true;
-                              });
+    stream.async_read_some(asio::buffer(text), [&](const boost::system::error_code& error,
+                                                   std::size_t size) {
+        EXPECT_FALSE(error);
+        text.resize(size);
+        const std::array parts{asio::buffer("po", 2), asio::buffer("ng", 2)};
+        asio::async_write(stream, parts, [&](const boost::system::error_code& failed, std::size_t) {
+            EXPECT_FALSE(failed);
+            answered = true;
         });
+    });
     while (!answered) io.run_one();
     EXPECT_EQ(text, "ping");
     thread.join();
@@ -219,9 +218,9 @@ TEST_F(HandshakesTest, WhoIsRevokedOrNowNeedsACertificateMustLeave) {
     settings.material.crl = revoke(plant.ca, "", lost.certificate, valid());
     settings.client = ClientCertificate::required;
     handshakes->apply(settings);
-    EXPECT_EQ(leaving(), (std::vector<std::string>{
-                             "", "the client's certificate CN=lost is revoked",
-                             "the client has shown no certificate, and now must"}));
+    EXPECT_EQ(leaving(),
+              (std::vector<std::string>{"", "the client's certificate CN=lost is revoked",
+                                        "the client has shown no certificate, and now must"}));
 }
 
 }  // namespace
