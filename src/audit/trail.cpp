@@ -127,13 +127,15 @@ void Trail::work() {
     }
     if (auto remark = writer_.remark(); !remark.empty())
         hooks_.tell({Notice::Kind::remark, std::move(remark), {}});
-    if (good == failing_)
-        hooks_.tell({good ? Notice::Kind::recovered : Notice::Kind::failing, why, {}});
-    const std::scoped_lock lock(mutex_);
-    if (!good && !failing_) ++counters_.failures;
-    failing_ = counters_.failing = !good;
-    counters_.records = writer_.records();
-    counters_.rotations = writer_.rotations();
+    const bool turned = good == failing_;
+    {
+        const std::scoped_lock lock(mutex_);
+        if (!good && !failing_) ++counters_.failures;
+        failing_ = counters_.failing = !good;
+        counters_.records = writer_.records();
+        counters_.rotations = writer_.rotations();
+    }
+    if (turned) hooks_.tell({good ? Notice::Kind::recovered : Notice::Kind::failing, why, {}});
 }
 
 /// Names the last record from time to time: the first of the run, and then some of those that
