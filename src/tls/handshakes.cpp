@@ -25,7 +25,7 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-constexpr Duration kBetween = 5ms;     ///< two handshakes that begin
+constexpr Duration kBetween = 20ms;    ///< two handshakes that begin
 constexpr char kHandshakeRecord = 22;  // RFC 8446 5.1
 
 std::string spoken(std::string_view first) {

@@ -18,8 +18,8 @@ namespace panelgate::tls {
 /// The handshakes of a listener. Their number is bounded: beyond the limit of an address its oldest
 /// handshake gives way, beyond the limit of all the oldest handshake of the address with most. A
 /// handshake has `handshake_timeout`, costs no OpenSSL object before the client's first bytes, and
-/// then waits for its turn: one begins each 5 ms, so that a flood leaves the loop to the lines. One
-/// thread.
+/// then waits for its turn: one begins each 20 ms, so that a flood leaves the loop to the lines.
+/// One thread.
 class Handshakes : public std::enable_shared_from_this<Handshakes> {
   public:
     /// Takes a connection whose handshake is done.

@@ -157,8 +157,10 @@ auto Stream::async_write_some(const Buffers& buffers, Token&& token) {
 
 template <class Handler>
 void Stream::read_some(boost::asio::mutable_buffer into, Handler handler) {
-    if (is_secure()) return async_read_some(into, std::move(handler));
-    plain_.async_read_some(into, std::move(handler));
+    if (!is_secure()) return plain_.async_read_some(into, std::move(handler));
+    secure_->async_read_some(into, [this, handler = std::move(handler)](
+                                       const boost::system::error_code& error,
+                                       std::size_t size) mutable { handler(told(error), size); });
 }
 
 /// Whom a client believes, in PEM form: the server that has this very certificate, whatever its
