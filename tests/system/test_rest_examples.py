@@ -165,6 +165,8 @@ class RestExamples(unittest.TestCase):
         open_operations = set(self.document.operations()) - operations - {("GET", "/api/v1/events")}
         self.assertEqual(open_operations, set())
         described = {s for o in self.document.operations().values() for s in o["responses"]}
+        # 429 would bar the address of the other examples: test_http_doors.Logins has it. 503 comes of a
+        # line that is full, which no example can bring about at will.
         self.assertEqual(described - statuses - {"4XX", "413", "429", "503"}, set())
         wanted = {p["name"] for o in self.document.operations().values()
                   for p in self.document.parameters_of(o) if p["in"] != "path"}
