@@ -214,9 +214,7 @@ class LineView {
     /// Returns the recorded incidents, oldest first, at most IncidentSettings::incidents.
     virtual std::vector<IncidentHead> incidents() const { return {}; }
     /// Returns an incident and marks it as read; nullopt if the incident is not recorded.
-    virtual std::optional<Incident> incident(std::uint64_t /*id*/) {
-        return std::nullopt;
-    }
+    virtual std::optional<Incident> incident(std::uint64_t /*id*/) { return std::nullopt; }
     /// True if `who` may read something of this station (0: of the line), by the rules of `access`.
     virtual bool tells(const WhoRef& /*who*/, std::uint8_t /*station*/) const { return true; }
 };
