@@ -291,21 +291,13 @@ void Gateway::record(const web::ReloadVerdict& verdict) {
 }
 
 web::Providers Gateway::providers() {
-    if (!scrapes_) {
-        const auto copy = [this] {
-            return [this, points = PointCopy(snapshot_->plant),
-                    snapshot = snapshot_](metrics::Snapshot& into) mutable {
-                return copy_figures(into, points, *snapshot);
-            };
-        };
-        scrapes_ = std::make_unique<Scrapes>(executor_, copy, Scrapes::Settings{});
+    if (!discoveries_)
         discoveries_ = std::make_unique<Discoveries>(
             clock_,
             [this] { return Discoveries::Place{snapshot_->plant, snapshot_->config->profiles}; },
             events_);
-    }
     web::Providers providers;
-    providers.metrics = scrapes_.get();
+    providers.figures = [this] { return metrics_text(); };
     providers.metrics_type = metrics::kContentType;
     providers.ready = [this] { return ready_ && servers_.missing().empty(); };
     providers.missing = [this] { return servers_.missing(); };
@@ -380,15 +372,10 @@ void Gateway::stop() {
     audit_.close();
 }
 
-/// Copies one piece of the figures: a line, some points, or all the rest, which is small.
-bool Gateway::copy_figures(metrics::Snapshot& figures, PointCopy& points,
-                           const Snapshot& snapshot) const {
-    const std::size_t lines = figures.lines.size();
-    if (lines < snapshot.lines.size()) {
-        figures.lines.push_back(snapshot.lines[lines]->bus().report());
-        return true;
-    }
-    if (points.next(figures.points, clock_.now())) return true;
+/// All figures but those of points, and of the process.
+metrics::Snapshot Gateway::figures() const {
+    metrics::Snapshot figures;
+    for (const auto& line : snapshot_->lines) figures.lines.push_back(line->bus().report());
     figures.relays = relay_samples(relays_->status());
     servers_.copy_figures(figures);
     figures.mqtt = northbound_.counters();
@@ -400,7 +387,17 @@ bool Gateway::copy_figures(metrics::Snapshot& figures, PointCopy& points,
     figures.compiler = build_compiler();
     figures.runtime.log_lines_dropped = rt::log_lines_dropped();
     figures.runtime.loop_lag = lag_.seconds();
-    return false;
+    return figures;
+}
+
+std::function<std::string()> Gateway::metrics_text() const {
+    const auto copy = std::make_shared<metrics::Snapshot>(figures());
+    return [copy, points = seen_points(snapshot_->plant, clock_.now()),
+            snapshot = rt::lend(executor_, std::shared_ptr<const Snapshot>(snapshot_))] {
+        copy->points = samples_of(points);
+        copy->process = metrics::read_process_facts();
+        return metrics::exposition(*copy);
+    };
 }
 
 }  // namespace panelgate::gateway

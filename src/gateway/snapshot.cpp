@@ -78,9 +78,9 @@ web::StationEntry entry_of(const Station& station) {
     return entry;
 }
 
-points::PointSample sample_of(const Station& station, const points::Point& point, TimePoint now) {
-    const points::PointReading reading = station.points->read(point, now);
-    points::PointSample sample{station.line, station.name, point.name, point.unit, {}, {}};
+points::PointSample sample_of(const SeenPoint& seen) {
+    const auto& [station, point, reading] = seen;
+    points::PointSample sample{station->line, station->name, point->name, point->unit, {}, {}};
     if (reading.value && reading.quality == points::Quality::good)
         sample.value = points::number_of(*reading.value);
     if (reading.age) sample.age = to_seconds(*reading.age);
@@ -130,19 +130,20 @@ web::Directory directory_of(const Plant& plant, const profile::PanelProfile& gen
     return directory;
 }
 
-bool PointCopy::next(std::deque<points::PointSample>& samples, TimePoint now) {
-    for (std::size_t left = kPiece; left > 0 && station_ < plant_->stations().size();) {
-        const Station& station = plant_->stations()[station_];
-        if (!station.points || point_ == station.points->points().size()) {
-            ++station_;
-            point_ = 0;
-            continue;
-        }
-        samples.push_back(sample_of(station, station.points->points()[point_], now));
-        ++point_;
-        --left;
+std::vector<SeenPoint> seen_points(const Plant& plant, TimePoint now) {
+    std::vector<SeenPoint> seen;
+    for (const Station& station : plant.stations()) {
+        if (!station.points) continue;
+        for (const points::Point& point : station.points->points())
+            seen.push_back({&station, &point, station.points->read(point, now)});
     }
-    return station_ < plant_->stations().size();
+    return seen;
+}
+
+std::deque<points::PointSample> samples_of(const std::vector<SeenPoint>& points) {
+    std::deque<points::PointSample> samples;
+    for (const SeenPoint& seen : points) samples.push_back(sample_of(seen));
+    return samples;
 }
 
 std::vector<points::RelaySample> relay_samples(const std::vector<points::RelayStatus>& relays) {

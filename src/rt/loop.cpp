@@ -7,6 +7,7 @@
 #include <boost/asio/post.hpp>
 #include <future>
 #include <thread>
+#include <utility>
 
 namespace panelgate::rt {
 
@@ -33,6 +34,10 @@ Loop::~Loop() {
 }
 
 asio::any_io_executor Loop::get_executor() const { return running_->io.get_executor(); }
+
+void give_back(const asio::any_io_executor& owner, std::shared_ptr<const void> object) {
+    asio::post(owner, [object = std::move(object)] {});
+}
 
 void call(const asio::any_io_executor& loop, const asio::any_io_executor& own,
           const std::function<void()>& work) {

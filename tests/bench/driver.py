@@ -18,8 +18,8 @@ import traceback
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
-from measures import (cost, counts, crowd, dead, figures, growth, latency, lines, master, memory,  # noqa: E402
-                      micro, plot, readers, reload, report, rig, rivals, saturated, scrape)
+from measures import (cost, costly, counts, crowd, dead, figures, growth, latency, lines,  # noqa: E402
+                      master, memory, micro, plot, readers, reload, report, rig, rivals, saturated, scrape)
 
 Run = collections.namedtuple("Run", "tools gateways rivals quick rates left_out")
 Run.__doc__ = """`gateways`: builds of ours, the judged one first; `rivals`: programs of others; `left_out`:
@@ -32,6 +32,7 @@ TOPICS = {
     "busy": saturated.measure_busy,
     "beside": saturated.measure_beside,
     "readers": readers.measure,
+    "costly": costly.measure,
     "latency": latency.measure,
     "crowd": crowd.measure,
     "master": master.measure,
@@ -49,7 +50,8 @@ TOPICS = {
     "micro": micro.measure,
 }
 BROKEN = "broken off:"
-BARS = [bar for topic in (saturated, latency, crowd, master, lines, memory, counts, scrape, readers, reload, cost)
+BARS = [bar for topic in (saturated, latency, crowd, master, lines, memory, counts, scrape, readers, costly,
+                          reload, cost)
         for bar in topic.BARS]
 
 

@@ -18,7 +18,6 @@
 #include "panelgate/gateway/discoveries.hpp"
 #include "panelgate/gateway/northbound.hpp"
 #include "panelgate/gateway/running_line.hpp"
-#include "panelgate/gateway/scrapes.hpp"
 #include "panelgate/gateway/servers.hpp"
 #include "panelgate/gateway/snapshot.hpp"
 #include "panelgate/metrics/exposition.hpp"
@@ -88,8 +87,8 @@ class Gateway {
     void watch_certificates();
     void watch_tokens();
     void judge_waiting();
-    bool copy_figures(metrics::Snapshot& figures, PointCopy& points,
-                      const Snapshot& snapshot) const;
+    metrics::Snapshot figures() const;
+    std::function<std::string()> metrics_text() const;
 
     web::Loops loops_;
     boost::asio::any_io_executor executor_;  ///< of the plant
@@ -113,7 +112,6 @@ class Gateway {
     std::unique_ptr<Discoveries> discoveries_;       ///< null until `http:` is configured
     std::unique_ptr<LineHistories> line_histories_;  ///< the same
     std::unique_ptr<points::Relays> relays_;
-    std::unique_ptr<Scrapes> scrapes_;  ///< null until `http:` is configured
     Servers servers_;
     Northbound northbound_;
     std::unique_ptr<CertificateWatch> certificates_;           ///< null until a listener has `tls`

@@ -57,20 +57,16 @@ class LineHistories {
 /// REST's view. `generic` is the profile of unlisted stations; it and the plant outlive the view.
 web::Directory directory_of(const Plant& plant, const profile::PanelProfile& generic);
 
-/// Copies the points of the plant for a scrape, a piece at a time. The plant outlives it.
-class PointCopy {
-  public:
-    static constexpr std::size_t kPiece = 250;  ///< points: well below a millisecond
-
-    explicit PointCopy(const Plant& plant) : plant_(&plant) {}
-    /// Adds the next points with their current values; false: there are no more.
-    bool next(std::deque<points::PointSample>& samples, TimePoint now);
-
-  private:
-    const Plant* plant_;
-    std::size_t station_ = 0;
-    std::size_t point_ = 0;
+/// A point with what was read of it.
+struct SeenPoint {
+    const Station* station;
+    const points::Point* point;
+    points::PointReading reading;
 };
+/// All points of the plant, without their texts. The plant outlives the list.
+std::vector<SeenPoint> seen_points(const Plant& plant, TimePoint now);
+/// The same for metrics, in any thread.
+std::deque<points::PointSample> samples_of(const std::vector<SeenPoint>& points);
 std::vector<points::RelaySample> relay_samples(const std::vector<points::RelayStatus>& relays);
 
 /// Publishes what has happened on a line, if any client listens.

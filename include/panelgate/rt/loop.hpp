@@ -3,6 +3,7 @@
 #include <boost/asio/any_io_executor.hpp>
 #include <functional>
 #include <memory>
+#include <utility>
 
 namespace panelgate::rt {
 
@@ -27,5 +28,19 @@ class Loop {
 /// caller's loop. `work` must not throw, and `loop` must never wait for `own`.
 void call(const boost::asio::any_io_executor& loop, const boost::asio::any_io_executor& own,
           const std::function<void()>& work);
+
+/// Lets go of an object in a loop.
+void give_back(const boost::asio::any_io_executor& owner, std::shared_ptr<const void> object);
+
+/// An object of the loop `owner` for other threads: when the last of them lets go, the object ends
+/// in its own loop.
+template <class Object>
+std::shared_ptr<const Object> lend(const boost::asio::any_io_executor& owner,
+                                   std::shared_ptr<const Object> object) {
+    const Object* const lent = object.get();
+    return {lent, [owner, object = std::move(object)](const Object*) mutable {
+                give_back(owner, std::move(object));
+            }};
+}
 
 }  // namespace panelgate::rt

@@ -211,28 +211,12 @@ Handling get_readyz(HttpRequest, const Api* api) {
 }
 
 Handling get_metrics(HttpRequest request, const Api* api) {
-    const Sight sight(*api->directory, request.caller->who());
-    const bool all = sight.everything();
-    const bool gzip = all && accepts_gzip(request.headers["accept-encoding"]);
-    MetricsSource* const source = api->providers.metrics;
-    const std::uint64_t id = request.caller->id();
-    request.caller->at_leaving(source, [source, id] { source->cancel(id); });
-    std::function<void(std::function<void(SharedText)>)> start =
-        [source, id, gzip](std::function<void(SharedText)> done) {
-            source->scrape(id, gzip, std::move(done));
-        };
-    asio::awaitable<SharedText> scraping = result_of<SharedText>(std::move(start));
-    SharedText text = co_await std::move(scraping);
-    if (!text)
-        co_return to_response(passing_problem(503, "the metrics cannot be made now; try again", 1));
     HttpResponse response = text_response(200, {}, api->providers.metrics_type);
-    if (all) {
-        response.shared_body = std::move(text);
-    } else {
-        response.body = seen_metrics(*text, sight);
-    }
-    response.headers.emplace_back("Vary", "Accept-Encoding");
-    if (gzip) response.headers.emplace_back("Content-Encoding", "gzip");
+    response.finish = [text = api->providers.figures(), directory = api->lent,
+                       who = request.caller->who()](HttpResponse& made) {
+        const Sight sight(*directory, who);
+        made.body = sight.everything() ? text() : seen_metrics(text(), sight);
+    };
     co_return response;
 }
 

@@ -1,5 +1,7 @@
 #include <algorithm>
-#include <limits>
+#include <boost/asio/post.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
 
 #include "answer.hpp"
 #include "panelgate/base/text.hpp"
@@ -153,16 +155,18 @@ HttpResponse answer_part(json::object members, bus::TracePart part, json::object
     return response;
 }
 
-/// A capture of the part as a download with this file name.
+/// A capture of the parts as a download with this file name.
 HttpResponse pcapng_response(const std::string& version, const std::string& line,
-                             bus::TracePart part, const std::string& file_name) {
+                             std::vector<bus::TracePart> parts, const std::string& file_name) {
     HttpResponse response = text_response(200, {}, "application/x-pcapng");
     response.headers.emplace_back("Content-Disposition",
                                   "attachment; filename=\"" + file_name + '"');
-    response.finish = [version, line, part = std::move(part)](HttpResponse& made) {
+    response.finish = [version, line, parts = std::move(parts)](HttpResponse& made) {
         TracePcapng file(version, line);
-        file.add(part);
-        made.body = file.take();
+        for (const bus::TracePart& part : parts) {
+            file.add(part);
+            made.body += file.take();
+        }
         made.body += file.finish();
     };
     return response;
@@ -183,10 +187,23 @@ TracePage page_of(const HttpRequest& request, const bus::LineView& bus) {
 
 }  // namespace
 
+/// The whole trace at the time of the request, without entries that come later. Copied in pieces,
+/// between which the loop serves its lines.
 Handling get_trace_pcapng(HttpRequest request, const Api* api) {
-    constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+    constexpr std::size_t kPiece = 64;  // entries: about 0.1 ms of work
     const LineEntry* const line = find_line(*api->directory, request.arguments[0]).value();
-    co_return pcapng_response(api->providers.version, line->name, line->bus->trace(kAll),
+    const auto executor = co_await boost::asio::this_coro::executor;
+    const std::uint64_t newest = last_of_trace(*line->bus, 1).next;
+    std::vector<bus::TracePart> parts;
+    for (std::uint64_t since = 0; since < newest;) {
+        TracePage page = trace_since(*line->bus, since, kPiece);
+        if (page.next <= since) break;
+        since = page.next;
+        parts.push_back(std::move(page.part));
+        co_await boost::asio::post(executor, boost::asio::use_awaitable);
+        if (request.caller->has_left()) co_return HttpResponse{};
+    }
+    co_return pcapng_response(api->providers.version, line->name, std::move(parts),
                               line->name + ".pcapng");
 }
 
@@ -218,7 +235,7 @@ Handling get_incident(HttpRequest request, const Api* api) {
         co_return to_response(
             problem(404, "line '" + name + "' keeps no incident '" + request.arguments[1] + "'"));
     if (is_capture)
-        co_return pcapng_response(api->providers.version, name, std::move(found->part),
+        co_return pcapng_response(api->providers.version, name, {std::move(found->part)},
                                   name + '-' + request.arguments[1]);
     co_return answer_part(json_of(found->head), std::move(found->part), {});
 }

@@ -5,6 +5,7 @@
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <chrono>
 #include <exception>
 #include <optional>
 #include <string>
@@ -26,6 +27,8 @@ struct Crossing::Question {
     asio::steady_timer bell;
     std::optional<HttpResponse> response;
 };
+
+Crossing::Crossing(Loops loops) : loops_(std::move(loops)), pause_(loops_.faces) {}
 
 Handling Crossing::ask(HttpRequest request, Handler handler) {
     const std::shared_ptr<Caller> client = request.caller;
@@ -55,13 +58,22 @@ void Crossing::pass_next() {
     if (passing_ || waiting_.empty()) return;
     passing_ = true;
     tell([self = shared_from_this(), begin_next = std::move(waiting_.front())] {
+        const auto began = std::chrono::steady_clock::now();
         begin_next();
-        asio::post(self->loops_.faces, [self] {
-            self->passing_ = false;
-            self->pass_next();
-        });
+        const Duration took = std::chrono::steady_clock::now() - began;
+        asio::post(self->loops_.faces, [self, took] { self->rest(took); });
     });
     waiting_.pop_front();
+}
+
+/// Leaves the plant to its lines for a multiple of what the last request took.
+void Crossing::rest(Duration took) {
+    constexpr int kRest = 9;  // so that requests have a tenth of the plant's time at most
+    pause_.expires_after(kRest * took);
+    pause_.async_wait([self = shared_from_this()](const boost::system::error_code&) {
+        self->passing_ = false;
+        self->pass_next();
+    });
 }
 
 void Crossing::tell(std::function<void()> work) { asio::post(loops_.plant, std::move(work)); }
@@ -116,10 +128,6 @@ void Crossing::call(const std::function<void()>& work) const {
 void Crossing::close() {
     closed_ = true;
     for (const std::shared_ptr<Caller>& caller : std::exchange(callers_, {})) caller->leave();
-}
-
-void Crossing::give_back(const asio::any_io_executor& plant, std::shared_ptr<const void> object) {
-    asio::post(plant, [object = std::move(object)] {});
 }
 
 }  // namespace panelgate::web

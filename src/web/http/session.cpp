@@ -318,8 +318,40 @@ asio::awaitable<bool> HttpSession::refuse(ErrorCode why) {
     co_return false;
 }
 
+namespace {
+
+/// Bytes of a long body that is being sent, which count for all clients together.
+class Sending {
+  public:
+    Sending(const HttpResponse& response, std::shared_ptr<Shared> shared)
+        : shared_(std::move(shared)), bytes_(size_of(response)) {
+        shared_->sending += bytes_;
+    }
+    ~Sending() { shared_->sending -= bytes_; }
+    Sending(const Sending&) = delete;
+    Sending& operator=(const Sending&) = delete;
+
+    static bool is_too_much(const HttpResponse& response, const Shared& shared) {
+        const std::size_t bytes = size_of(response);
+        return bytes > 0 && shared.sending + bytes > shared.site->settings.max_sending;
+    }
+
+  private:
+    static std::size_t size_of(const HttpResponse& response) {
+        return response.body.size() > kWhole ? response.body.size() : 0;
+    }
+
+    std::shared_ptr<Shared> shared_;
+    std::size_t bytes_;
+};
+
+}  // namespace
+
 /// Sends the reply; true if another request may follow.
 asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool keep_alive) {
+    if (Sending::is_too_much(response, *shared_))
+        response = to_response(passing_problem(503, "too much is being sent; try again", 1));
+    const Sending sending(response, shared_);
     ErrorCode error;
     departure_.request_ends();
     ++shared_->counters.requests[response.status];

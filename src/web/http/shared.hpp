@@ -32,6 +32,7 @@ struct Shared {
     WrongTokens wrong_tokens;
     Places places;
     Counters counters;
+    std::size_t sending = 0;            ///< bytes of long bodies being sent
     std::function<Counters()> figures;  ///< the listener's, set by it
 };
 

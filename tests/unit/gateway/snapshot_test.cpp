@@ -98,16 +98,8 @@ TEST_F(SnapshotTest, RestSeesTheStationsOfThePlantAndPanelsOfAnyKind) {
     EXPECT_FALSE(directory_of(plant, generic).find_station("floor1:9"));
 }
 
-std::deque<points::PointSample> all_points(const Plant& plant, TimePoint now) {
-    std::deque<points::PointSample> samples;
-    PointCopy copy(plant);
-    while (copy.next(samples, now)) {
-    }
-    return samples;
-}
-
 TEST_F(SnapshotTest, P10AScrapeHasEveryPointButNoValueThatWasNeverRead) {
-    auto samples = all_points(plant, now);
+    auto samples = samples_of(seen_points(plant, now));
     ASSERT_EQ(samples.size(), 1u);
     EXPECT_EQ(samples[0].line, "floor1");
     EXPECT_EQ(samples[0].station, "press");
@@ -116,29 +108,10 @@ TEST_F(SnapshotTest, P10AScrapeHasEveryPointButNoValueThatWasNeverRead) {
     EXPECT_FALSE(samples[0].value);
     EXPECT_FALSE(samples[0].age);
     poll();
-    samples = all_points(plant, now + 1s);
+    samples = samples_of(seen_points(plant, now + 1s));
     EXPECT_EQ(samples[0].value, 215);
     EXPECT_EQ(samples[0].age, 1);
     EXPECT_TRUE(bus.requests.empty());
-}
-
-TEST_F(SnapshotTest, AScrapeCopiesManyPointsSomeAtATime) {
-    Plant wide;
-    auto& many = floor.stations[0].points;
-    many.resize(2 * PointCopy::kPiece + 1);
-    for (std::size_t i = 0; i < many.size(); ++i) many[i].name = std::to_string(i);
-    wide.add(floor, bus, nullptr);
-    const points::StationPolls polled(points::wants_of(many, {}),
-                                      points::make_plan_limits(panel, SerialFormat{}, 2ms), now);
-    wide.at("floor1", 31).points.emplace(many, floor.stations[0].polls, polled);
-    std::deque<points::PointSample> samples;
-    PointCopy copy(wide);
-    EXPECT_TRUE(copy.next(samples, now));
-    EXPECT_EQ(samples.size(), PointCopy::kPiece);
-    EXPECT_TRUE(copy.next(samples, now));
-    EXPECT_FALSE(copy.next(samples, now));
-    ASSERT_EQ(samples.size(), 2 * PointCopy::kPiece + 1);
-    EXPECT_EQ(samples.back().point, std::to_string(2 * PointCopy::kPiece));
 }
 
 TEST_F(SnapshotTest, TellsOfStationsByTheirNames) {

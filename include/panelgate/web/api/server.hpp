@@ -48,8 +48,9 @@ struct Site;
 /// What the server shows besides the directory. All functions but now() and wall() are called from
 /// the plant's loop.
 struct Providers {
-    MetricsSource* metrics = nullptr;      ///< never null; outlives the server
-    std::string metrics_type;              ///< the content type of its text
+    /// Copies all figures; the function returned makes the text of /metrics of them, in any thread.
+    std::function<std::function<std::string()>()> figures;
+    std::string metrics_type;              ///< the content type of that text
     std::function<bool()> ready;           ///< configuration applied and all listeners open
     std::function<std::string()> missing;  ///< what is not open yet, in words
     std::string version;

@@ -55,20 +55,6 @@ class DiscoverySource {
     virtual DiscoveryReport report(std::string_view line) const = 0;
 };
 
-/// Renders the text of /metrics. One thread.
-class MetricsSource {
-  public:
-    /// Gets null if too many scrapes are waiting or the caller was cancelled.
-    using Handler = std::function<void(SharedText)>;
-
-    virtual ~MetricsSource() = default;
-    /// Calls the handler once, never from inside this call, with figures that are not older than
-    /// this call. `gzip`: the text in that content coding. A caller may have one scrape at a time.
-    virtual void scrape(std::uint64_t caller, bool gzip, Handler handler) = 0;
-    /// Cancels the caller's scrape; its handler gets null.
-    virtual void cancel(std::uint64_t caller) = 0;
-};
-
 /// The result of a reload.
 struct ReloadVerdict {
     /// A fault in a file. Line and column count from 1; 0: the file as a whole.

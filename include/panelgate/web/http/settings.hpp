@@ -56,7 +56,8 @@ struct Settings {
     std::size_t max_connections_per_address = 32;  ///< excluding event streams
     std::size_t max_streams_per_address = 48;      ///< event streams
     std::size_t probe_places = 16;                 ///< additional places, for probes only
-    std::size_t max_body = 64 * 1024;              ///< bytes
+    std::size_t max_body = 64 * 1024;              ///< bytes of a request
+    std::size_t max_sending = 64 * 1024 * 1024;    ///< bytes of all long bodies being sent
     Duration first_request_timeout = 10s;          ///< of a new connection
     Duration idle_timeout = 60s;                   ///< of a keep-alive connection
     Duration request_timeout = 10s;  ///< to receive one request, and to send one answer

@@ -119,35 +119,6 @@ struct Asked {
     std::string detail{};
 };
 
-/// Serves the same text to all callers, or null if `text` is null.
-class FixedMetrics final : public MetricsSource {
-  public:
-    explicit FixedMetrics(boost::asio::any_io_executor executor) : executor_(std::move(executor)) {}
-
-    void scrape(std::uint64_t caller, bool gzip, Handler handler) override {
-        waiting[caller] = std::move(handler);
-        asked_gzip = gzip;
-        if (!deferred) hand_over(caller, text);
-    }
-    void cancel(std::uint64_t caller) override {
-        ++cancelled;
-        hand_over(caller, nullptr);
-    }
-
-    SharedText text = std::make_shared<const std::string>("up 1\n");
-    std::map<std::uint64_t, Handler> waiting;
-    bool deferred = false;  ///< true: answers wait
-    bool asked_gzip = false;
-    int cancelled = 0;
-
-  private:
-    void hand_over(std::uint64_t caller, SharedText what) {
-        const auto found = waiting.extract(caller);
-        if (found) boost::asio::post(executor_, std::bind(found.mapped(), std::move(what)));
-    }
-    boost::asio::any_io_executor executor_;
-};
-
 /// A server on loopback with line floor1: press (31, with test_profile) and meter (5, read-only,
 /// panel type unknown). Line floor2 has the same bus and refuses unlisted stations.
 class HttpRig : public ::testing::Test {
@@ -184,7 +155,7 @@ class HttpRig : public ::testing::Test {
     }
     Server& start() {
         Providers providers;
-        providers.metrics = &metrics;
+        providers.figures = [this] { return [text = metrics] { return text; }; };
         providers.metrics_type = "text/plain; version=0.0.4; charset=utf-8";
         providers.ready = [this] { return ready; };
         providers.missing = [this] { return missing; };
@@ -318,7 +289,7 @@ class HttpRig : public ::testing::Test {
     EventHub events;
     DiscoverySource* discovery = nullptr;
     SharedText configuration;
-    FixedMetrics metrics{io.get_executor()};
+    std::string metrics = "up 1\n";  ///< the text of /metrics
     bool ready = true;
     std::string missing;
     std::unique_ptr<Server> server;
