@@ -212,6 +212,7 @@ Handling get_readyz(HttpRequest, const Api* api) {
 
 Handling get_metrics(HttpRequest request, const Api* api) {
     HttpResponse response = text_response(200, {}, api->providers.metrics_type);
+    response.is_long = true;
     response.finish = [text = api->providers.figures(), directory = api->lent,
                        who = request.caller->who()](HttpResponse& made) {
         const Sight sight(*directory, who);

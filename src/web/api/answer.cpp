@@ -168,6 +168,8 @@ HttpResponse table_answer(const HttpRequest& request, Table table) {
     HttpResponse response;
     if (as_csv) response.content_type = "text/csv; charset=utf-8; header=present";
     if (!table.columns.empty()) response.headers.emplace_back("Vary", "Accept");
+    constexpr std::size_t kLong = 100;  // entries: about a millisecond of work
+    response.is_long = table.count > kLong;
     response.finish = [as_csv, table = std::move(table)](HttpResponse& made) {
         made.body = as_csv ? csv_of(table) : json_of(table);
     };

@@ -142,6 +142,7 @@ void add_list(LongAnswer& body, std::string_view name, const std::vector<Entry>&
 /// Answers these members, the three lists of the part, and `behind`.
 HttpResponse answer_part(json::object members, bus::TracePart part, json::object behind) {
     HttpResponse response;
+    response.is_long = true;
     response.finish = [members = std::move(members), part = std::move(part),
                        behind = std::move(behind)](HttpResponse& made) {
         LongAnswer body;
@@ -161,6 +162,7 @@ HttpResponse pcapng_response(const std::string& version, const std::string& line
     HttpResponse response = text_response(200, {}, "application/x-pcapng");
     response.headers.emplace_back("Content-Disposition",
                                   "attachment; filename=\"" + file_name + '"');
+    response.is_long = true;
     response.finish = [version, line, parts = std::move(parts)](HttpResponse& made) {
         TracePcapng file(version, line);
         for (const bus::TracePart& part : parts) {

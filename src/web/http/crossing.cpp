@@ -5,14 +5,15 @@
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
-#include <chrono>
 #include <exception>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/rt/loop.hpp"
+#include "panelgate/rt/process.hpp"
 #include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::web {
@@ -58,9 +59,9 @@ void Crossing::pass_next() {
     if (passing_ || waiting_.empty()) return;
     passing_ = true;
     tell([self = shared_from_this(), begin_next = std::move(waiting_.front())] {
-        const auto began = std::chrono::steady_clock::now();
+        const TimePoint began = rt::AsioClock::read();
         begin_next();
-        const Duration took = std::chrono::steady_clock::now() - began;
+        const Duration took = rt::AsioClock::read() - began;
         asio::post(self->loops_.faces, [self, took] { self->rest(took); });
     });
     waiting_.pop_front();
@@ -128,6 +129,44 @@ void Crossing::call(const std::function<void()>& work) const {
 void Crossing::close() {
     closed_ = true;
     for (const std::shared_ptr<Caller>& caller : std::exchange(callers_, {})) caller->leave();
+}
+
+namespace {
+
+/// A response whose text a worker makes.
+struct Making {
+    explicit Making(const asio::any_io_executor& loop) : bell(loop) {
+        bell.expires_at(asio::steady_timer::time_point::max());
+    }
+    HttpResponse response;
+    asio::steady_timer bell;
+    bool done = false;
+};
+
+}  // namespace
+
+Handling made_by_worker(HttpResponse response, std::function<void(HttpResponse&)> finish,
+                        std::shared_ptr<Caller> caller, rt::Worker* worker) {
+    const auto loop = co_await asio::this_coro::executor;
+    const auto making = std::make_shared<Making>(loop);
+    making->response = std::move(response);
+    const auto work = [making, finish = std::move(finish)] {
+        try {
+            finish(making->response);
+        } catch (const std::exception&) {  // no memory
+            making->response = to_response(problem(500, "the gateway failed to make this text"));
+        }
+    };
+    worker->run(work, [making] {
+        making->done = true;
+        making->bell.cancel();
+    });
+    while (!making->done && !caller->has_left()) {
+        boost::system::error_code rung;
+        co_await making->bell.async_wait(asio::redirect_error(asio::use_awaitable, rung));
+    }
+    if (!making->done) co_return HttpResponse();
+    co_return std::move(making->response);
 }
 
 }  // namespace panelgate::web

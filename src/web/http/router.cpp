@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/asio/this_coro.hpp>
 #include <chrono>
 #include <map>
 #include <optional>
@@ -457,9 +458,18 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     if (!mistaken) mistaken = check_encoding(request);
     if (mistaken) co_return to_response(*mistaken);
     request.arguments = std::move(found.arguments);
+    const std::shared_ptr<Caller> caller = request.caller;
     Handling handling = carry_out(std::move(request), found.route, shared);
     HttpResponse response = co_await std::move(handling);
-    if (const auto finish = std::exchange(response.finish, nullptr)) finish(response);
+    const auto finish = std::exchange(response.finish, nullptr);
+    if (finish && response.is_long) {
+        if (!shared->worker)
+            shared->worker =
+                std::make_unique<rt::Worker>(co_await boost::asio::this_coro::executor);
+        Handling making = made_by_worker(std::move(response), finish, caller, shared->worker.get());
+        co_return co_await std::move(making);
+    }
+    if (finish) finish(response);
     co_return response;
 }
 

@@ -6,6 +6,7 @@
 
 #include "admission.hpp"
 #include "origin.hpp"
+#include "panelgate/rt/process.hpp"
 #include "panelgate/web/http/counters.hpp"
 #include "panelgate/web/http/message.hpp"
 
@@ -32,8 +33,9 @@ struct Shared {
     WrongTokens wrong_tokens;
     Places places;
     Counters counters;
-    std::size_t sending = 0;            ///< bytes of long bodies being sent
-    std::function<Counters()> figures;  ///< the listener's, set by it
+    std::size_t sending = 0;             ///< bytes of long bodies being sent
+    std::function<Counters()> figures;   ///< the listener's, set by it
+    std::unique_ptr<rt::Worker> worker;  ///< makes long texts; null: none was asked for
 };
 
 }  // namespace panelgate::web

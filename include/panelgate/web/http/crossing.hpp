@@ -12,6 +12,9 @@
 #include "panelgate/rt/loop.hpp"
 #include "panelgate/web/http/message.hpp"
 
+namespace panelgate::rt {
+class Worker;
+}  // namespace panelgate::rt
 namespace panelgate::web {
 
 /// The loops of a server: the faces' has connections, TLS, tokens and texts; the plant's has lines,
@@ -79,5 +82,10 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
     std::set<std::shared_ptr<Caller>> callers_;  ///< of the requests under way
     bool closed_ = false;
 };
+
+/// Faces: makes the long text of a response in the worker, while the loop serves other clients. The
+/// response is empty if the caller leaves meanwhile.
+Handling made_by_worker(HttpResponse response, std::function<void(HttpResponse&)> finish,
+                        std::shared_ptr<Caller> caller, rt::Worker* worker);
 
 }  // namespace panelgate::web

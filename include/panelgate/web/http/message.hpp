@@ -134,6 +134,7 @@ struct HttpResponse {
     /// If set, the loop of the faces calls this to make the body, so that the plant's loop only
     /// copies. Owns or shares what it needs.
     std::function<void(HttpResponse&)> finish;
+    bool is_long = false;  ///< `finish` may take long: a worker calls it
     /// If set, there is no body: events are streamed while the client listens.
     std::shared_ptr<EventHub::Listener> events;
 };
