@@ -1,6 +1,6 @@
 #include "panelgate/rt/loop.hpp"
 
-#include <sys/resource.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
@@ -9,15 +9,28 @@
 #include <thread>
 #include <utility>
 
+#include "panelgate/rt/process.hpp"
+
 namespace panelgate::rt {
 
 namespace asio = boost::asio;
 
+namespace {
+
+/// Of the calling thread. sched_setattr(2) is among the calls that the service's unit allows.
+void be_nicer(int by) {
+    SchedAttr attributes;
+    if (::syscall(SYS_sched_getattr, 0, &attributes, sizeof attributes, 0) != 0) return;
+    attributes.nice += by;
+    ::syscall(SYS_sched_setattr, 0, &attributes, 0);
+}
+
+}  // namespace
+
 struct Loop::Running {
     explicit Running(int niceness)
         : thread([this, niceness] {
-              const auto self = static_cast<id_t>(::gettid());  // Linux: a thread has a niceness
-              ::setpriority(PRIO_PROCESS, self, ::getpriority(PRIO_PROCESS, self) + niceness);
+              be_nicer(niceness);
               io.run();
           }) {}
 

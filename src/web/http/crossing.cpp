@@ -31,7 +31,7 @@ struct Crossing::Question {
 
 Crossing::Crossing(Loops loops) : loops_(std::move(loops)), pause_(loops_.faces) {}
 
-Handling Crossing::ask(HttpRequest request, Handler handler) {
+Handling Crossing::ask(HttpRequest request, Handler handler, bool probe) {
     const std::shared_ptr<Caller> client = request.caller;
     const auto caller = std::make_shared<Caller>(client->stand_in());
     const auto question = std::make_shared<Question>(loops_.faces);
@@ -41,9 +41,9 @@ Handling Crossing::ask(HttpRequest request, Handler handler) {
     });
     request.caller = caller;
     const auto asked = std::make_shared<HttpRequest>(std::move(request));
-    waiting_.push_back(
-        [this, asked, handler = std::make_shared<const Handler>(std::move(handler)),
-         waiting = std::weak_ptr(question)] { begin(std::move(*asked), handler, waiting); });
+    queue(probe ? "" : client->address(),
+          [this, asked, handler = std::make_shared<const Handler>(std::move(handler)),
+           waiting = std::weak_ptr(question)] { begin(std::move(*asked), handler, waiting); });
     pass_next();
     while (!question->response && !client->has_left()) {
         boost::system::error_code rung;
@@ -54,17 +54,38 @@ Handling Crossing::ask(HttpRequest request, Handler handler) {
     co_return std::move(*question->response);
 }
 
+void Crossing::queue(const std::string& address, std::function<void()> beginning) {
+    Beginnings& own = waiting_[address];
+    if (own.empty() && address.empty()) turns_.push_front(address);
+    if (own.empty() && !address.empty()) turns_.push_back(address);
+    own.push_back(std::move(beginning));
+}
+
+std::function<void()> Crossing::take_next() {
+    const std::string address = std::move(turns_.front());
+    turns_.pop_front();
+    Beginnings& own = waiting_[address];
+    std::function<void()> next = std::move(own.front());
+    own.pop_front();
+    if (own.empty())
+        waiting_.erase(address);
+    else if (address.empty())
+        turns_.push_front(address);
+    else
+        turns_.push_back(address);
+    return next;
+}
+
 /// Gives the plant the next request, unless the plant has not begun the last one yet.
 void Crossing::pass_next() {
-    if (passing_ || waiting_.empty()) return;
+    if (passing_ || turns_.empty()) return;
     passing_ = true;
-    tell([self = shared_from_this(), begin_next = std::move(waiting_.front())] {
+    tell([self = shared_from_this(), begin_next = take_next()] {
         const TimePoint began = rt::AsioClock::read();
         begin_next();
         const Duration took = rt::AsioClock::read() - began;
         asio::post(self->loops_.faces, [self, took] { self->rest(took); });
     });
-    waiting_.pop_front();
 }
 
 /// Leaves the plant to its lines for a multiple of what the last request took.

@@ -417,9 +417,11 @@ Handling carry_out(HttpRequest request, const Route* route, Shared* shared) {
         return witnessed(std::move(request), route->handler, site->record);
     if (route->figures) take_figures(site, *shared);
     return site->crossing->ask(
-        std::move(request), [handler = route->handler, record = site->record](HttpRequest asked) {
+        std::move(request),
+        [handler = route->handler, record = site->record](HttpRequest asked) {
             return witnessed(std::move(asked), handler, record);
-        });
+        },
+        route->probe);
 }
 
 /// Records a refusal of the faces.

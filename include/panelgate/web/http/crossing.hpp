@@ -5,8 +5,10 @@
 #include <concepts>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <set>
+#include <string>
 #include <utility>
 
 #include "panelgate/rt/loop.hpp"
@@ -48,8 +50,8 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
     /// which leaves when the session's leaves; then the response is empty. An exception of the
     /// handler is logged, and answered with 500. The plant begins one request at a time, and
     /// then serves its lines for nine times as long: however many ask, requests have a tenth of
-    /// the plant's time.
-    Handling ask(HttpRequest request, Handler handler);
+    /// the plant's time. Addresses take turns; a probe goes first.
+    Handling ask(HttpRequest request, Handler handler, bool probe = false);
     /// Faces: runs `work` on the plant's loop, after what was asked before.
     void tell(std::function<void()> work);
     /// Plant: runs `work` on the faces' loop; at once if there is one loop.
@@ -70,12 +72,16 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
 
     void begin(HttpRequest request, std::shared_ptr<const Handler> handler,
                std::weak_ptr<Question> waiting);
+    void queue(const std::string& address, std::function<void()> beginning);
+    std::function<void()> take_next();
     void pass_next();
     void rest(Duration took);
 
     Loops loops_;
     // Of the faces' loop:
-    std::deque<std::function<void()>> waiting_;  ///< requests that the plant has not begun
+    using Beginnings = std::deque<std::function<void()>>;
+    std::map<std::string, Beginnings> waiting_;  ///< requests that the plant has not begun
+    std::deque<std::string> turns_;              ///< of addresses with such requests
     bool passing_ = false;                       ///< the plant begins one, or has its rest
     boost::asio::steady_timer pause_;
     // Of the plant's loop:

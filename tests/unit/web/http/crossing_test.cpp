@@ -100,6 +100,27 @@ TEST_F(CrossingTest, AClientThatLeavesLeavesAtThePlantToo) {
     plant.run_for(std::chrono::milliseconds(0));
 }
 
+TEST_F(CrossingTest, AddressesTakeTurnsAndAProbeGoesFirst) {
+    boost::asio::io_context both;
+    const auto one = std::make_shared<Crossing>(Loops(both.get_executor()));
+    std::string order;
+    const auto begin = [&](const std::string& address, const std::string& name, bool probe) {
+        HttpRequest request;
+        request.caller = std::make_shared<Caller>(1, address);
+        const auto handler = [&order, name](HttpRequest) -> Handling {
+            order += name + ' ';
+            co_return HttpResponse();
+        };
+        asio::co_spawn(both, one->ask(std::move(request), handler, probe),
+                       [](const std::exception_ptr&, const HttpResponse&) {});
+    };
+    for (const char* name : {"a1", "a2", "a3"}) begin("10.0.0.1", name, false);
+    begin("10.0.0.2", "b1", false);
+    begin("10.0.0.1", "probe", true);
+    both.run();
+    EXPECT_EQ(order, "a1 probe a2 b1 a3 ") << "a1 was alone when it came";
+}
+
 TEST_F(CrossingTest, AnExceptionIsA500AndInTheLog) {
     const rt::LogTap tap;
     const auto handler = [](HttpRequest) -> Handling {
