@@ -55,23 +55,6 @@ build() {
     cmake --preset "$1" -DPANELGATE_UNIT_TESTS="$2" -DPANELGATE_LONG_TESTS="$3" -DPANELGATE_UNITY=ON \
         -DPANELGATE_TEST_PCH=ON -DPANELGATE_WERROR=ON "${@:4}" && cmake --build --preset "$1"
 }
-# The sanitized build, in the processor time that nobody else wants: the release tests wait more than they
-# compute. Joined below; a run that ends before takes it along.
-build_asan_meanwhile() {
-    set -m  # a process group of its own
-    { chrt --idle -p 0 $BASHPID || renice -n 19 $BASHPID || true; build asan "$@"; } \
-        >"$logs/asan-meanwhile.log" 2>&1 &
-    set +m
-    asan=$!
-    trap 'kill -- -$asan' EXIT
-}
-join_asan() {
-    local result=0
-    wait $asan || result=$?
-    trap - EXIT
-    cat "$logs/asan-meanwhile.log"
-    return $result
-}
 run_tests() { ctest --preset "$1" -j "$jobs" "${@:2}"; }
 check_format() {
     find src include tests -name '*.[ch]pp' -print0 | xargs -0 clang-format-19 --dry-run -Werror
@@ -107,12 +90,12 @@ if [ $mode != quick ]; then
     # Optimization takes longer than it saves where no test waits for the code.
     cold=-DPANELGATE_O0="panelgate;pg_commands;pg_config;pg_doctor;pg_explain;pg_gateway;pg_mbusd;pg_metrics;pg_mqtt;pg_plan;pg_points;pg_profile;pg_rt;pg_scan;pg_sim;pg_web_api;pg_web_http;pg_yaml"
     [ $mode = nightly ] || long=OFF
-    build_asan_meanwhile ON $long "$cold" -DPANELGATE_TEST_UBSAN=$long
+    # Before the tests: a compiler beside them makes panels late, however nice it is.
+    must "build asan" build asan ON $long "$cold" -DPANELGATE_TEST_UBSAN=$long
 fi
 step "tests release" run_tests release "${which[@]}"
 step "deploy/demo.sh" /usr/bin/python3 -B tests/system/demo_script.py
 if [ $mode != quick ]; then
-    must "build asan" join_asan
     export ASAN_SYMBOLIZER_PATH=/usr/bin/llvm-symbolizer-19 PANELGATE_SANITIZED=1
     [ $mode = nightly ] || which=(-L "unit|scenario|fuzz|sanitized")
     step "tests asan" run_tests asan "${which[@]}"
