@@ -20,9 +20,9 @@ constexpr std::size_t kRefusals = 256;  ///< on their way to the session, for th
 
 }  // namespace
 
-std::string refusal_text(const web::Problem& why) {
-    boost::json::object body{{"ok", false}};
-    for (const auto& [name, value] : web::json_of(why)) body[name] = value;
+std::string answer_text(bool ok, const boost::json::object& members) {
+    boost::json::object body{{"ok", ok}};
+    for (const auto& [name, value] : members) body[name] = value;
     return web::json_text(body);
 }
 
@@ -67,13 +67,27 @@ void BrokerDesk::offer(std::size_t subject, mqtt::State state) {
 
 void BrokerDesk::repeat(std::size_t subject) { publisher_.repeat(subject); }
 
+void BrokerDesk::end_write() { under_way_ -= std::min<std::size_t>(under_way_, 1); }
+
 void BrokerDesk::answer(const std::string& topic, const std::string& id, const std::string& body,
-                        WriteEnd end) {
-    under_way_ -= std::min<std::size_t>(under_way_, 1);
-    if (end == WriteEnd::refused) ++counters_.writes_refused;
-    if (end == WriteEnd::confirmed) ++counters_.writes_ok;
-    if (end == WriteEnd::failed) ++counters_.writes_failed;
-    publisher_.answer({topic, id, body}, end == WriteEnd::refused);
+                        bool ok) {
+    end_write();
+    ++(ok ? counters_.writes_ok : counters_.writes_failed);
+    publisher_.answer({topic, id, body}, false);
+    client_.wake();
+}
+
+void BrokerDesk::answer_refused(const std::string& topic, const std::string& id,
+                                const web::Problem& why) {
+    end_write();
+    refuse(topic, id, why);
+}
+
+void BrokerDesk::refuse(const std::string& topic, const std::string& id, const web::Problem& why) {
+    ++counters_.writes_refused;
+    rt::log(rt::LogLevel::warn, "mqtt write refused",
+            {{"client", "mqtt"}, {"topic", web::excerpt(topic)}, {"why", why.detail}});
+    publisher_.answer({topic, id, answer_text(false, web::json_of(why))}, true);
     client_.wake();
 }
 
@@ -102,15 +116,15 @@ void BrokerDesk::on_command(const mqtt::Command& command) {
         return alarm_->arm(std::max(clock_.now(), next_rebirth_), [this] { on_rebirth(); });
     }
     if (const auto* bad = std::get_if<mqtt::BadCommand>(&command))
-        return refuse(bad->topic, bad->id, web::problem(400, bad->why), {});
+        return refuse_here(bad->topic, bad->id, web::problem(400, bad->why), {});
     const auto& write = std::get<mqtt::WriteCommand>(command);
     const std::string topic = publisher_.topic_of(write.point);
     if (under_way_ >= settings_.writes)
-        return refuse(topic, write.id, web::problem(503, "too many writes are under way"),
-                      write.point);
+        return refuse_here(topic, write.id, web::problem(503, "too many writes are under way"),
+                           write.point);
     if (!publisher_.has_room_for_answer(under_way_))
-        return refuse(topic, write.id, web::problem(503, "too many answers wait for the broker"),
-                      write.point);
+        return refuse_here(topic, write.id,
+                           web::problem(503, "too many answers wait for the broker"), write.point);
     ++under_way_;
     tell([write, topic](BrokerSession& session) { session.write(write, topic); });
 }
@@ -123,12 +137,9 @@ void BrokerDesk::on_rebirth() {
 }
 
 /// Answers at once; the session gets the refusal for the audit, if not too many are on their way.
-void BrokerDesk::refuse(const std::string& topic, const std::string& id, const web::Problem& why,
-                        std::optional<std::size_t> point) {
-    ++under_way_;  // answer() ends it
-    answer(topic, id, refusal_text(why), WriteEnd::refused);
-    rt::log(rt::LogLevel::warn, "mqtt write refused",
-            {{"client", "mqtt"}, {"topic", web::excerpt(topic)}, {"why", why.detail}});
+void BrokerDesk::refuse_here(const std::string& topic, const std::string& id,
+                             const web::Problem& why, std::optional<std::size_t> point) {
+    refuse(topic, id, why);
     if (*told_ >= kRefusals) return;
     ++*told_;
     tell([told = told_, topic, why, point](BrokerSession& session) {

@@ -77,8 +77,7 @@ std::shared_ptr<const web::Directory> directory_in(const std::shared_ptr<Snapsho
 Gateway::Gateway(web::Loops loops, std::shared_ptr<const config::Config> config, bool simulate,
                  Reloader* reloads)
     : loops_(std::move(loops)),
-      executor_(loops_.plant),
-      clock_(executor_),
+      clock_(loops_.plant),
       simulate_(simulate),
       reloads_(reloads),
       events_(std::make_shared<web::EventHub>(new_epoch()), loops_.faces),
@@ -152,7 +151,7 @@ Gateway::Lines Gateway::lines_of(const config::Config& config) {
         lines.push_back(
             found != known_.lines.end()
                 ? found->second
-                : std::make_shared<RunningLine>(executor_, clock_, line, simulate_, watch()));
+                : std::make_shared<RunningLine>(loops_.plant, clock_, line, simulate_, watch()));
     }
     return lines;
 }
@@ -269,7 +268,7 @@ void Gateway::watch_certificates() {
         std::ranges::any_of(config.modbus_tcp, [](const auto& one) { return one.tls.has_value(); });
     if (any && !certificates_)
         certificates_ = std::make_unique<CertificateWatch>(
-            executor_, clock_, [this](const CertificateWatch::Served& served) {
+            loops_.plant, clock_, [this](const CertificateWatch::Served& served) {
                 if (served.server.empty())
                     servers_.renew(served.listener, served.settings);
                 else
@@ -393,7 +392,7 @@ metrics::Snapshot Gateway::figures() const {
 std::function<std::string()> Gateway::metrics_text() const {
     const auto copy = std::make_shared<metrics::Snapshot>(figures());
     return [copy, points = seen_points(snapshot_->plant, clock_.now()),
-            snapshot = rt::lend(executor_, std::shared_ptr<const Snapshot>(snapshot_))] {
+            snapshot = rt::lend(loops_.plant, std::shared_ptr<const Snapshot>(snapshot_))] {
         copy->points = samples_of(points);
         copy->process = metrics::read_process_facts();
         return metrics::exposition(*copy);

@@ -8,14 +8,11 @@
 
 #include "panelgate/base/words.hpp"
 #include "panelgate/points/station_points.hpp"
-#include "panelgate/rt/log.hpp"
 #include "panelgate/tls/judge.hpp"
-#include "panelgate/web/http/json_text.hpp"
 #include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::gateway {
 
-namespace json = boost::json;
 namespace {
 
 constexpr std::size_t kSwept = 500;  ///< subjects per turn: well below a millisecond
@@ -60,7 +57,7 @@ BrokerSession::BrokerSession(web::Loops loops, rt::Clock& clock,
     show(snapshot);
 }
 
-/// The desk ends in its own loop, behind what is on its way.
+/// The desk ends in the loop of the faces, after the messages that are on their way to the desk.
 BrokerSession::~BrokerSession() {
     boost::asio::post(loops_.faces, [desk = std::move(desk_)] {});
 }
@@ -237,11 +234,7 @@ void BrokerSession::refused(const std::string& topic, const web::Problem& why,
 
 void BrokerSession::answer_refused(const std::string& topic, const std::string& id,
                                    const web::Problem& why) const {
-    rt::log(rt::LogLevel::warn, "mqtt write refused",
-            {{"client", "mqtt"}, {"topic", web::excerpt(topic)}, {"why", why.detail}});
-    at_desk([topic, id, body = refusal_text(why)](BrokerDesk& desk) {
-        desk.answer(topic, id, body, BrokerDesk::WriteEnd::refused);
-    });
+    at_desk([topic, id, why](BrokerDesk& desk) { desk.answer_refused(topic, id, why); });
 }
 
 void BrokerSession::write(const mqtt::WriteCommand& command, const std::string& topic) {
@@ -273,12 +266,10 @@ void BrokerSession::finish(const Order& order, const bus::Answer& answer) {
     const auto point = subjects_.find_point(order.station, order.point);
     if (!result && point) at_desk([point = *point](BrokerDesk& desk) { desk.repeat(point); });
     if (!result && answer.refusal) return answer_refused(order.topic, order.id, result.error());
-    json::object body{{"ok", static_cast<bool>(result)}};
-    for (const auto& [name, value] : result ? *result : web::json_of(result.error()))
-        body[name] = value;
-    const auto end = result ? BrokerDesk::WriteEnd::confirmed : BrokerDesk::WriteEnd::failed;
-    at_desk([topic = order.topic, id = order.id, text = web::json_text(body),
-             end](BrokerDesk& desk) { desk.answer(topic, id, text, end); });
+    const bool ok = result.has_value();
+    at_desk([topic = order.topic, id = order.id, ok,
+             text = answer_text(ok, ok ? *result : web::json_of(result.error()))](
+                BrokerDesk& desk) { desk.answer(topic, id, text, ok); });
 }
 
 Northbound::Northbound(web::Loops loops, rt::Clock& clock, TopicRefusals refused)
@@ -324,6 +315,7 @@ void Northbound::leave() {
     session_->stop();
     leaving_ = session_;
 }
+
 void Northbound::on_bus_event(const std::string& line, const bus::BusEvent& event) {
     if (session_) session_->on_bus_event(line, event);
 }

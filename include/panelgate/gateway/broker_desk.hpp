@@ -20,8 +20,8 @@ namespace panelgate::gateway {
 
 class BrokerSession;
 
-/// The answer to a write that was refused: a JSON object.
-std::string refusal_text(const web::Problem& why);
+/// The answer to a write: a JSON object of `ok` and these members.
+std::string answer_text(bool ok, const boost::json::object& members);
 
 /// The faces' end of a session at an MQTT broker: the connection, what waits for the broker, and
 /// the refusal of writes that are malformed or too many. Made and owned by the session, of the
@@ -53,10 +53,10 @@ class BrokerDesk {
     void offer(std::size_t subject, mqtt::State state);
     /// Publishes the current state again, for clients that ignore answers.
     void repeat(std::size_t subject);
-    enum class WriteEnd : std::uint8_t { confirmed, failed, refused };
-    /// Answers a write that the session has got. `body`: a JSON object.
-    void answer(const std::string& topic, const std::string& id, const std::string& body,
-                WriteEnd end);
+    /// Answers a write that a panel has got, or may have got. `body`: of answer_text().
+    void answer(const std::string& topic, const std::string& id, const std::string& body, bool ok);
+    /// Answers a write that the session has refused.
+    void answer_refused(const std::string& topic, const std::string& id, const web::Problem& why);
 
     mqtt::Counters counters() const;
     const std::weak_ptr<BrokerSession>& session() const { return session_; }
@@ -64,8 +64,10 @@ class BrokerDesk {
   private:
     void on_command(const mqtt::Command& command);
     void on_rebirth();
-    void refuse(const std::string& topic, const std::string& id, const web::Problem& why,
-                std::optional<std::size_t> point);
+    void end_write();
+    void refuse(const std::string& topic, const std::string& id, const web::Problem& why);
+    void refuse_here(const std::string& topic, const std::string& id, const web::Problem& why,
+                     std::optional<std::size_t> point);
     void tell(std::function<void(BrokerSession&)> work);
     void wait_for(const std::shared_ptr<std::atomic<bool>>& closed);
 

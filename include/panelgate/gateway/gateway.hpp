@@ -91,11 +91,10 @@ class Gateway {
     std::function<std::string()> metrics_text() const;
 
     web::Loops loops_;
-    boost::asio::any_io_executor executor_;  ///< of the plant
     rt::AsioClock clock_;
     rt::LoopLag lag_{clock_};
-    AuditBook audit_{executor_, clock_};  ///< lines record in it until they are destroyed
-    explain::Doors doors_;                ///< lines ask it until they are destroyed
+    AuditBook audit_{loops_.plant, clock_};  ///< lines record in it until they are destroyed
+    explain::Doors doors_;                   ///< lines ask it until they are destroyed
     bool simulate_;
     Reloader* reloads_;
     web::EventOutlet events_;  ///< buses publish by it until they are destroyed

@@ -104,8 +104,8 @@ void adopt_readings(const std::vector<Want>& wants, std::vector<Reading>& readin
 
 /// How the tables of a panel show the same memory.
 struct SharedMemory {
-    /// Returns everything that a write of these items changes. Empty: the write may change all
-    /// other tables.
+    /// Returns the spans whose items change with a write of these items. Empty: the write may
+    /// change all other tables.
     std::function<std::vector<modbus::Span>(const modbus::Span&)> shown_as;
     /// False: the panel may share more memory than this.
     bool known = true;

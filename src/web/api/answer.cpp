@@ -104,12 +104,6 @@ std::string csv_line(const json::object& object, std::span<const std::string_vie
     return csv_line(fields);
 }
 
-std::string packed(std::string_view body) {
-    Gzip gzip;
-    gzip.add(body);
-    return gzip.finish();
-}
-
 void LongAnswer::begin_member(std::string_view name) {
     if (!std::exchange(is_first_, false)) text_ += ',';
     text_ += json_text(json::value(name)) + ':';
@@ -162,9 +156,7 @@ std::string json_of(const Table& table) {
 }  // namespace
 
 HttpResponse table_answer(const HttpRequest& request, Table table) {
-    const auto accept = request.headers.find("accept");
-    const bool as_csv =
-        !table.columns.empty() && accept != request.headers.end() && wants_csv(accept->second);
+    const bool as_csv = !table.columns.empty() && wants_csv(header(request, "accept"));
     HttpResponse response;
     if (as_csv) response.content_type = "text/csv; charset=utf-8; header=present";
     if (!table.columns.empty()) response.headers.emplace_back("Vary", "Accept");
@@ -182,17 +174,13 @@ KeptAnswer::KeptAnswer(std::string text, std::string_view content_type)
       content_type_(content_type) {}
 
 HttpResponse KeptAnswer::give(const std::shared_ptr<KeptAnswer>& self, const HttpRequest& request) {
-    const auto header = [&](const char* name) {
-        const auto found = request.headers.find(name);
-        return found == request.headers.end() ? std::string() : found->second;
-    };
     HttpResponse response;
     response.content_type = self->content_type_;
-    const bool known = add_etag(response, header("if-none-match"), self->tag_);
+    const bool known = add_etag(response, header(request, "if-none-match"), self->tag_);
     response.headers.emplace_back("Vary", "Accept-Encoding");
     if (known) return response;
     response.shared_body = self->text_;
-    if (!accepts_gzip(header("accept-encoding"))) return response;
+    if (!accepts_gzip(header(request, "accept-encoding"))) return response;
     response.headers.emplace_back("Content-Encoding", "gzip");
     response.finish = [self](HttpResponse& made) {
         if (!self->packed_)

@@ -36,9 +36,6 @@ std::string csv_line(std::span<const std::string_view> fields);
 /// The same from an object's members: null and missing ones become empty fields.
 std::string csv_line(const boost::json::object& object, std::span<const std::string_view> columns);
 
-/// The body packed with gzip.
-std::string packed(std::string_view body);
-
 /// Builds the text of a large JSON object of lists and members without a tree of all of them.
 class LongAnswer {
   public:

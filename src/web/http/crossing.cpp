@@ -20,21 +20,37 @@ namespace panelgate::web {
 
 namespace asio = boost::asio;
 
-/// A request that waits at the faces. Only their loop locks the plant's reference to a question.
-struct Crossing::Question {
-    explicit Question(const asio::any_io_executor& faces) : bell(faces) {
+/// A response that is made elsewhere while a session waits in the loop of the faces, which alone
+/// uses all of this.
+struct Crossing::Awaited {
+    explicit Awaited(const asio::any_io_executor& faces) : bell(faces) {
         bell.expires_at(asio::steady_timer::time_point::max());
     }
+    void give(HttpResponse made) {
+        response = std::move(made);
+        bell.cancel();
+    }
+
     asio::steady_timer bell;
     std::optional<HttpResponse> response;
 };
+
+/// Waits for the response; it is empty if the client leaves before.
+Handling Crossing::wait_for(std::shared_ptr<Awaited> awaited, std::shared_ptr<Caller> client) {
+    while (!awaited->response && !client->has_left()) {
+        boost::system::error_code rung;
+        co_await awaited->bell.async_wait(asio::redirect_error(asio::use_awaitable, rung));
+    }
+    if (!awaited->response) co_return HttpResponse();
+    co_return std::move(*awaited->response);
+}
 
 Crossing::Crossing(Loops loops) : loops_(std::move(loops)), pause_(loops_.faces) {}
 
 Handling Crossing::ask(HttpRequest request, Handler handler, bool probe) {
     const std::shared_ptr<Caller> client = request.caller;
     const auto caller = std::make_shared<Caller>(client->stand_in());
-    const auto question = std::make_shared<Question>(loops_.faces);
+    const auto question = std::make_shared<Awaited>(loops_.faces);
     client->at_leaving(question.get(), [self = shared_from_this(), caller, question] {
         self->tell([caller] { caller->leave(); });
         question->bell.cancel();
@@ -45,13 +61,10 @@ Handling Crossing::ask(HttpRequest request, Handler handler, bool probe) {
           [this, asked, handler = std::make_shared<const Handler>(std::move(handler)),
            waiting = std::weak_ptr(question)] { begin(std::move(*asked), handler, waiting); });
     pass_next();
-    while (!question->response && !client->has_left()) {
-        boost::system::error_code rung;
-        co_await question->bell.async_wait(asio::redirect_error(asio::use_awaitable, rung));
-    }
+    Handling waiting = wait_for(question, client);
+    HttpResponse response = co_await std::move(waiting);
     client->forget(question.get());
-    if (!question->response) co_return HttpResponse();
-    co_return std::move(*question->response);
+    co_return response;
 }
 
 void Crossing::queue(const std::string& address, std::function<void()> beginning) {
@@ -117,7 +130,7 @@ HttpResponse failure(const std::string& path, const std::exception_ptr& failed) 
 }  // namespace
 
 void Crossing::begin(HttpRequest request, std::shared_ptr<const Handler> handler,
-                     std::weak_ptr<Question> waiting) {
+                     std::weak_ptr<Awaited> waiting) {
     if (closed_ || request.caller->has_left()) return;
     const std::string path = request.path.empty() ? "/" : request.path.front();
     const std::shared_ptr<Caller> caller = request.caller;
@@ -130,10 +143,8 @@ void Crossing::begin(HttpRequest request, std::shared_ptr<const Handler> handler
                        if (failed) response = failure(path, failed);
                        asio::post(self->loops_.faces,
                                   [waiting, response = std::move(response)]() mutable {
-                                      const auto question = waiting.lock();
-                                      if (!question) return;
-                                      question->response = std::move(response);
-                                      question->bell.cancel();
+                                      if (const auto question = waiting.lock())
+                                          question->give(std::move(response));
                                   });
                    });
 }
@@ -152,42 +163,20 @@ void Crossing::close() {
     for (const std::shared_ptr<Caller>& caller : std::exchange(callers_, {})) caller->leave();
 }
 
-namespace {
-
-/// A response whose text a worker makes.
-struct Making {
-    explicit Making(const asio::any_io_executor& loop) : bell(loop) {
-        bell.expires_at(asio::steady_timer::time_point::max());
-    }
-    HttpResponse response;
-    asio::steady_timer bell;
-    bool done = false;
-};
-
-}  // namespace
-
-Handling made_by_worker(HttpResponse response, std::function<void(HttpResponse&)> finish,
-                        std::shared_ptr<Caller> caller, rt::Worker* worker) {
-    const auto loop = co_await asio::this_coro::executor;
-    const auto making = std::make_shared<Making>(loop);
-    making->response = std::move(response);
+Handling Crossing::made_by_worker(HttpResponse response, std::function<void(HttpResponse&)> finish,
+                                  std::shared_ptr<Caller> caller, rt::Worker* worker) {
+    const auto awaited = std::make_shared<Awaited>(co_await asio::this_coro::executor);
+    const auto making = std::make_shared<HttpResponse>(std::move(response));
     const auto work = [making, finish = std::move(finish)] {
         try {
-            finish(making->response);
+            finish(*making);
         } catch (const std::exception&) {  // no memory
-            making->response = to_response(problem(500, "the gateway failed to make this text"));
+            *making = to_response(problem(500, "the gateway failed to make this text"));
         }
     };
-    worker->run(work, [making] {
-        making->done = true;
-        making->bell.cancel();
-    });
-    while (!making->done && !caller->has_left()) {
-        boost::system::error_code rung;
-        co_await making->bell.async_wait(asio::redirect_error(asio::use_awaitable, rung));
-    }
-    if (!making->done) co_return HttpResponse();
-    co_return std::move(making->response);
+    worker->run(work, [making, awaited] { awaited->give(std::move(*making)); });
+    Handling waiting = wait_for(awaited, std::move(caller));
+    co_return co_await std::move(waiting);
 }
 
 }  // namespace panelgate::web

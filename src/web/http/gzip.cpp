@@ -4,9 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
+#include <memory>
 #include <new>
-#include <utility>
 
 #include "panelgate/base/text.hpp"
 
@@ -48,46 +47,23 @@ std::string unpacked(std::string_view body) {
     return state == Z_STREAM_END ? text : std::string();
 }
 
-struct Gzip::Stream {
-    Stream() {
-        if (deflateInit2(&z, kLevel, Z_DEFLATED, kGzipWindow, kMemory, Z_DEFAULT_STRATEGY) != Z_OK)
-            throw std::bad_alloc();
-    }
-    ~Stream() { deflateEnd(&z); }
-
-    /// Compresses all input of z, flushing as `flush` requests.
-    void run(int flush) {
-        std::array<char, 64 * 1024> space;
-        do {
-            z.next_out = reinterpret_cast<Bytef*>(space.data());
-            z.avail_out = static_cast<uInt>(space.size());
-            deflate(&z, flush);  // Z_BUF_ERROR: nothing to do
-            body.append(space.data(), space.size() - z.avail_out);
-        } while (z.avail_out == 0);
-    }
-
+std::string packed(std::string_view body) {
     z_stream z{};
-    std::string body;
-};
-
-Gzip::Gzip() : stream_(std::make_unique<Stream>()) {}
-
-Gzip::~Gzip() = default;
-
-void Gzip::add(std::string_view piece) {
-    while (!piece.empty()) {
-        const auto size = std::min<std::size_t>(piece.size(), std::numeric_limits<uInt>::max());
-        // zlib only reads, but takes no const.
-        stream_->z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(piece.data()));
-        stream_->z.avail_in = static_cast<uInt>(size);
-        stream_->run(Z_NO_FLUSH);
-        piece.remove_prefix(size);
-    }
-}
-
-std::string Gzip::finish() {
-    stream_->run(Z_FINISH);
-    return std::move(stream_->body);
+    if (deflateInit2(&z, kLevel, Z_DEFLATED, kGzipWindow, kMemory, Z_DEFAULT_STRATEGY) != Z_OK)
+        throw std::bad_alloc();
+    const std::unique_ptr<z_stream, decltype(&deflateEnd)> owned(&z, deflateEnd);
+    // zlib only reads, but takes no const.
+    z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(body.data()));
+    z.avail_in = static_cast<uInt>(body.size());
+    std::array<char, 64 * 1024> space;
+    std::string text;
+    do {
+        z.next_out = reinterpret_cast<Bytef*>(space.data());
+        z.avail_out = static_cast<uInt>(space.size());
+        deflate(&z, Z_FINISH);
+        text.append(space.data(), space.size() - z.avail_out);
+    } while (z.avail_out == 0);
+    return text;
 }
 
 }  // namespace panelgate::web

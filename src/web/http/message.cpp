@@ -29,6 +29,11 @@ void Caller::certify(std::string subject, std::string word, std::optional<Standi
     who_ = make_who(std::move(who));
 }
 
+std::string_view header(const HttpRequest& request, const std::string& name) {
+    const auto found = request.headers.find(name);
+    return found == request.headers.end() ? std::string_view() : found->second;
+}
+
 void add_vary(HttpResponse& response, const std::string& name) {
     for (auto& [header, value] : response.headers) {
         if (header != "Vary") continue;

@@ -102,11 +102,6 @@ bool HostNames::knows(const std::string& host, const ip::address& local) const {
 
 namespace {
 
-std::string field_of(const HttpRequest& request, const char* name) {
-    const auto found = request.headers.find(name);
-    return found == request.headers.end() ? std::string() : to_lower(found->second);
-}
-
 /// True for a page; API and metrics are for programs, and each call may use a line.
 bool is_page(const HttpRequest& request) {
     return request.path.empty() || (request.path[0] != "api" && request.path[0] != "metrics");
@@ -115,8 +110,8 @@ bool is_page(const HttpRequest& request) {
 /// A user followed a link. Fetch Metadata: https://www.w3.org/TR/fetch-metadata/
 bool follows_link(const HttpRequest& request) {
     return (request.method == "GET" || request.method == "HEAD") &&
-           field_of(request, "sec-fetch-mode") == "navigate" &&
-           field_of(request, "sec-fetch-dest") == "document" && is_page(request);
+           to_lower(header(request, "sec-fetch-mode")) == "navigate" &&
+           to_lower(header(request, "sec-fetch-dest")) == "document" && is_page(request);
 }
 
 /// True for an origin of ours, such as "http://gateway:8080"; "null" is not. Another port is
@@ -144,13 +139,13 @@ std::optional<Problem> check_origin(const HttpRequest& request, const HostNames&
     }
     const bool may_read = !listed_origin(request, readers).empty();
     if (may_read && is_reading(request)) return std::nullopt;
-    if (field_of(request, "sec-fetch-site") == "cross-site" && !follows_link(request)) {
+    if (to_lower(header(request, "sec-fetch-site")) == "cross-site" && !follows_link(request)) {
         return problem(403, "a page of another site may not ask this gateway", "foreign-page");
     }
     // Browsers send Origin with a change, or a read of the answer by script, even where they send
     // no Fetch Metadata (plain HTTP). A read uses the line too.
     const bool is_foreign = request.method != "OPTIONS" && request.headers.contains("origin") &&
-                            !is_ours(field_of(request, "origin"), request, names, local);
+                            !is_ours(to_lower(header(request, "origin")), request, names, local);
     if (is_foreign && may_read)
         return problem(403, "a page of another site may only read (GET) what this gateway has",
                        "foreign-page");

@@ -82,11 +82,6 @@ bool same_hash(std::string_view given, std::string_view known) {
     return difference == 0;
 }
 
-std::string_view header(const HttpRequest& request, const char* name) {
-    const auto found = request.headers.find(name);
-    return found == request.headers.end() ? std::string_view() : found->second;
-}
-
 /// Returns the token after "Bearer" and blanks (RFC 9110 11.4; schemes are case-insensitive, 11.1).
 std::optional<std::string_view> bearer_token(std::string_view authorization) {
     constexpr std::string_view kScheme = "bearer ";
@@ -317,16 +312,20 @@ void record_use(const Caller& caller, Shared& shared) {
     });
 }
 
+std::string path_of(const HttpRequest& request) {
+    std::string path;
+    for (const std::string& segment : request.path) path += '/' + segment;
+    return path;
+}
+
 /// Logs a token or a certificate with insufficient rights; unknown tokens are logged as failed
 /// logins.
 void count_refused(const HttpRequest& request, const Problem& why) {
     const bool by_certificate =
         why.status == 401 && !carries_token(request) && !request.caller->who()->certificate.empty();
     if (why.status != 403 && !by_certificate) return;
-    std::string path;
-    for (const std::string& segment : request.path) path += '/' + segment;
     log_client(*request.caller, "http request refused",
-               {{"path", path}, {"method", request.method}, {"why", why.detail}});
+               {{"path", path_of(request)}, {"method", request.method}, {"why", why.detail}});
 }
 
 /// 429 while no token of the request's address is judged.
@@ -371,7 +370,7 @@ class Witness {
           who_(request.caller->who()) {
         if (!record_) return;
         method_ = request.method;
-        for (const std::string& segment : request.path) path_ += '/' + segment;
+        path_ = path_of(request);
         if (changes_) body_ = request.body.substr(0, Deed::kMostOfBody);
         shown_token_ = carries_token(request);
     }
@@ -468,7 +467,8 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
         if (!shared->worker)
             shared->worker =
                 std::make_unique<rt::Worker>(co_await boost::asio::this_coro::executor);
-        Handling making = made_by_worker(std::move(response), finish, caller, shared->worker.get());
+        Handling making =
+            Crossing::made_by_worker(std::move(response), finish, caller, shared->worker.get());
         co_return co_await std::move(making);
     }
     if (finish) finish(response);

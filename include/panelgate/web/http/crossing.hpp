@@ -52,7 +52,11 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
     /// then serves its lines for nine times as long: however many ask, requests have a tenth of
     /// the plant's time. Addresses take turns; a probe goes first.
     Handling ask(HttpRequest request, Handler handler, bool probe = false);
-    /// Faces: runs `work` on the plant's loop, after what was asked before.
+    /// Faces: makes the long text of a response in the worker, while the loop serves other clients.
+    /// The response is empty if the caller leaves meanwhile.
+    static Handling made_by_worker(HttpResponse response, std::function<void(HttpResponse&)> finish,
+                                   std::shared_ptr<Caller> caller, rt::Worker* worker);
+    /// Faces: runs `work` on the plant's loop, perhaps before requests that wait for their turn.
     void tell(std::function<void()> work);
     /// Plant: runs `work` on the faces' loop; at once if there is one loop.
     void run(std::function<void()> work) const;
@@ -68,10 +72,11 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
     }
 
   private:
-    struct Question;
+    struct Awaited;
 
+    static Handling wait_for(std::shared_ptr<Awaited> awaited, std::shared_ptr<Caller> client);
     void begin(HttpRequest request, std::shared_ptr<const Handler> handler,
-               std::weak_ptr<Question> waiting);
+               std::weak_ptr<Awaited> waiting);
     void queue(const std::string& address, std::function<void()> beginning);
     std::function<void()> take_next();
     void pass_next();
@@ -88,10 +93,5 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
     std::set<std::shared_ptr<Caller>> callers_;  ///< of the requests under way
     bool closed_ = false;
 };
-
-/// Faces: makes the long text of a response in the worker, while the loop serves other clients. The
-/// response is empty if the caller leaves meanwhile.
-Handling made_by_worker(HttpResponse response, std::function<void(HttpResponse&)> finish,
-                        std::shared_ptr<Caller> caller, rt::Worker* worker);
 
 }  // namespace panelgate::web

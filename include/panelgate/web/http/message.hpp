@@ -114,6 +114,9 @@ struct HttpRequest {
     WallTime at{};           ///< when it was judged: tokens expire
     bool folder = false;     ///< the path ends with '/'
 };
+/// A header that is read, as sent; "" if there is none. Valid as long as the request's headers.
+std::string_view header(const HttpRequest& request, const std::string& name);
+
 /// The request headers that are read; each may occur once.
 inline constexpr const char* kHeadersRead[] = {
     "authorization",  "origin",         "content-type",    "content-encoding", "sec-fetch-site",
