@@ -45,7 +45,7 @@ Handling Crossing::wait_for(std::shared_ptr<Awaited> awaited, std::shared_ptr<Ca
     co_return std::move(*awaited->response);
 }
 
-Crossing::Crossing(Loops loops) : loops_(std::move(loops)), pause_(loops_.faces) {}
+Crossing::Crossing(Loops loops) : loops_(std::move(loops)) {}
 
 Handling Crossing::ask(HttpRequest request, Handler handler, bool probe) {
     const std::shared_ptr<Caller> client = request.caller;
@@ -104,8 +104,8 @@ void Crossing::pass_next() {
 /// Leaves the plant to its lines for a multiple of what the last request took.
 void Crossing::rest(Duration took) {
     constexpr int kRest = 9;  // so that requests have a tenth of the plant's time at most
-    pause_.expires_after(kRest * took);
-    pause_.async_wait([self = shared_from_this()](const boost::system::error_code&) {
+    const auto pause = std::make_shared<asio::steady_timer>(loops_.faces, kRest * took);
+    pause->async_wait([self = shared_from_this(), pause](const boost::system::error_code&) {
         self->passing_ = false;
         self->pass_next();
     });

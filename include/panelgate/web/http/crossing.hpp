@@ -1,7 +1,6 @@
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <concepts>
 #include <deque>
 #include <functional>
@@ -36,7 +35,8 @@ struct Loops {
 /// What crosses between the loops of a server, as messages: a request to the plant, its response
 /// back, that a client has left, a deed for the audit. (Events cross by an EventOutlet, counters by
 /// Server::counters().) The loops share nothing but immutable objects. The number of requests under
-/// way is bounded by that of connections.
+/// way is bounded by that of connections. A Crossing holds no timer, because the loop that ends
+/// last ends it.
 class Crossing : public std::enable_shared_from_this<Crossing> {
   public:
     using Handler = std::function<Handling(HttpRequest)>;
@@ -88,7 +88,6 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
     std::map<std::string, Beginnings> waiting_;  ///< requests that the plant has not begun
     std::deque<std::string> turns_;              ///< of addresses with such requests
     bool passing_ = false;                       ///< the plant begins one, or has its rest
-    boost::asio::steady_timer pause_;
     // Of the plant's loop:
     std::set<std::shared_ptr<Caller>> callers_;  ///< of the requests under way
     bool closed_ = false;

@@ -14,6 +14,7 @@
 #include <string>
 #include <thread>
 
+#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/rt/loop.hpp"
 
@@ -152,6 +153,26 @@ TEST_F(CrossingTest, AServerThatIsGoneAsksNothingMore) {
     EXPECT_FALSE(*answered);
     on_faces([&] { client->leave(); });
     run_until_answered();
+}
+
+TEST_F(CrossingTest, ARequestMayEndWithThePlantsLoopAfterThatOfTheFaces) {
+    bool begun = false;
+    const auto handler = [&](HttpRequest) -> Handling {
+        const TimePoint slow_until = rt::AsioClock::read() + std::chrono::milliseconds(50);
+        while (rt::AsioClock::read() < slow_until) {
+        }
+        begun = true;
+        asio::steady_timer never(co_await asio::this_coro::executor,
+                                 asio::steady_timer::time_point::max());
+        co_await never.async_wait(asio::use_awaitable);
+        co_return HttpResponse();
+    };
+    ask(handler, [](const HttpResponse&) {});
+    while (!begun) plant.run_one_for(std::chrono::milliseconds(5));
+    on_faces([] {});  // the rest of the plant goes on; AddressSanitizer looks at what its end does
+    const std::weak_ptr<Crossing> held = crossing;
+    crossing.reset();
+    EXPECT_FALSE(held.expired()) << "by the coroutine in the plant's loop";
 }
 
 TEST_F(CrossingTest, WhatThePlantHasLentEndsThere) {
