@@ -49,6 +49,7 @@ Crossing::Crossing(Loops loops) : loops_(std::move(loops)) {}
 
 Handling Crossing::ask(HttpRequest request, Handler handler, bool probe) {
     const std::shared_ptr<Caller> client = request.caller;
+    if (client->has_left()) co_return HttpResponse();  // its reset came along with the request
     const auto caller = std::make_shared<Caller>(client->stand_in());
     const auto question = std::make_shared<Awaited>(loops_.faces);
     client->at_leaving(question.get(), [self = shared_from_this(), caller, question] {

@@ -101,6 +101,21 @@ TEST_F(CrossingTest, AClientThatLeavesLeavesAtThePlantToo) {
     plant.run_for(std::chrono::milliseconds(0));
 }
 
+TEST_F(CrossingTest, AClientThatLeftBeforeAsksNothing) {
+    bool asked = false;
+    client->leave();
+    ask(
+        [&](HttpRequest) -> Handling {
+            asked = true;
+            co_return HttpResponse();
+        },
+        [&](HttpResponse) { *answered = true; });
+    on_faces([] {});
+    plant.poll();
+    EXPECT_TRUE(*answered);
+    EXPECT_FALSE(asked);
+}
+
 TEST_F(CrossingTest, AddressesTakeTurnsAndAProbeGoesFirst) {
     boost::asio::io_context both;
     const auto one = std::make_shared<Crossing>(Loops(both.get_executor()));
