@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+namespace panelgate::store {
+
+struct Settings {
+    std::string file;                        ///< of SQLite; "": in memory, gone with the process
+    std::uint64_t size = 200 * 1024 * 1024;  ///< bytes of the file; SQLite's log adds some 4 MiB
+    unsigned days = 30;                      ///< how long entries and samples are kept
+    std::size_t queue = 10'000;  ///< writes that wait for the disk; further ones are lost
+
+    friend bool operator==(const Settings&, const Settings&) = default;
+};
+
+/// Figures for metrics. `waiting` is bounded by Settings::queue.
+struct Counters {
+    std::uint64_t written = 0;   ///< writes that are on the disk
+    std::uint64_t lost = 0;      ///< writes that the queue or the disk did not take
+    std::uint64_t failures = 0;  ///< how often the disk began to take nothing
+    std::uint64_t bytes = 0;     ///< of the file
+    std::size_t waiting = 0;
+    bool failing = false;
+};
+
+}  // namespace panelgate::store
