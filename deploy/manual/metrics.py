@@ -17,6 +17,7 @@ mqtt: {broker: "mqtt://127.0.0.1:1"}
 http: {listen: "127.0.0.1:0"}
 audit: {file: /dev/shm/panelgate-manual-none/audit.jsonl}
 access: {rules: [{name: no-writes, deny: [write]}]}
+alarms: [{name: panel-lost, station: panel, offline: true}]
 """
 # What neither has: its labels, and what it takes.
 OTHERS = {"panelgate_findings": "line, station, cause", "panelgate_framing_errors_total": "line",
@@ -40,7 +41,7 @@ GROUPS = [("Requests", ("requests", "translated", "request_duration", "queue"),
           ("Rights", ("access",), "With rules of `access`."),
           ("Modbus/TCP", ("tcp",), "For each listener."), ("HTTP", ("http", "login", "token"), ""),
           ("TLS", ("tls", "certificate"), "For each listener with `tls`."),
-          ("MQTT", ("mqtt",), "With `mqtt`."), ("Audit", ("audit",), "With `audit`."),
+          ("MQTT", ("mqtt",), "With `mqtt`."), ("Audit", ("audit",), "With `audit`."), ("Store and alarms", ("store", "alarm"), "Alarms with `alarms`."),
           ("Serial masters", ("serial_master",), "With `serial_masters`."),
           ("The gateway", ("config", "loop", "build", "log"), "")]
 

@@ -16,6 +16,7 @@ constexpr Role least_with(Right right) {
         case Right::read:
             return Role::viewer;
         case Right::write:
+        case Right::acknowledge:
             return Role::operator_;
         case Right::broadcast:
         case Right::raw:
@@ -62,6 +63,8 @@ std::string_view label(Right right) {
             return "simulator";
         case Right::reload:
             return "reload";
+        case Right::acknowledge:
+            return "acknowledge";
     }
     std::abort();
 }

@@ -127,57 +127,17 @@ std::string audit_line(const json::object& record) {
 
 namespace {
 
-/// Takes a number of two digits, up to `most`, behind `separator` off.
-bool take_two(std::string_view& text, char separator, int most, int& value) {
-    if (!text.starts_with(separator)) return false;
-    text.remove_prefix(1);
-    const auto number = take_number(text, 2);
-    value = number.value_or(0);
-    return number && value <= most;
-}
-
-/// "Z", "+01:00", or nothing for UTC; its minutes.
-std::optional<int> zone_of(std::string_view text) {
-    if (text.empty() || text == "Z" || text == "z") return 0;
-    const bool before = text.front() == '-';
-    int hours = 0;
-    int minutes = 0;
-    if (!take_two(text, before ? '-' : '+', 14, hours) || !take_two(text, ':', 59, minutes))
-        return std::nullopt;
-    if (!text.empty()) return std::nullopt;
-    return (before ? -1 : 1) * (hours * 60 + minutes);
-}
-
-/// Takes ".25" off; nullopt if no digit follows the point.
-std::optional<std::string> take_fraction(std::string_view& text) {
-    if (!text.starts_with('.')) return std::string();
-    const std::size_t end = std::min(text.find_first_not_of("0123456789", 1), text.size());
-    if (end < 2) return std::nullopt;
-    std::string fraction(text.substr(0, end));
-    text.remove_prefix(end);
-    return fraction;
-}
-
 /// A day, or a day and a time (RFC 3339), as the beginning of a record's time; nullopt if there is
 /// no such.
 std::optional<std::string> point_in_time(std::string_view typed) {
     std::string_view rest = typed;
-    const auto day = take_day(rest);
-    if (!day) return std::nullopt;
-    if (rest.empty()) return std::string(typed);
-    int hour = 0;
-    int minute = 0;
-    int second = 0;
-    if (std::string_view("Tt ").find(rest.front()) == rest.npos) return std::nullopt;
-    if (!take_two(rest, rest.front(), 23, hour) || !take_two(rest, ':', 59, minute))
-        return std::nullopt;
-    if (rest.starts_with(':') && !take_two(rest, ':', 60, second)) return std::nullopt;
-    const auto fraction = take_fraction(rest);
-    const auto zone = fraction ? zone_of(rest) : std::nullopt;
-    if (!zone) return std::nullopt;
-    const WallTime time = WallTime(day->time_since_epoch()) + std::chrono::hours(hour) +
-                          std::chrono::minutes(minute - *zone) + std::chrono::seconds(second);
-    return rfc3339(time).substr(0, 19) + *fraction;
+    if (take_day(rest) && rest.empty()) return std::string(typed);
+    const auto time = parse_rfc3339(typed);
+    if (!time) return std::nullopt;
+    std::string text = rfc3339(*time);
+    text.erase(text.find_last_not_of("0Z") + 1);
+    if (text.ends_with('.')) text.pop_back();
+    return text;
 }
 
 }  // namespace

@@ -49,18 +49,18 @@ std::vector<std::string_view> right_words() {
 }
 
 const Keys<OwnRole>& own_role_keys() {
-    KeyShape rights = items_shape("rights",
-                                  {"[read, write]", kAny,
-                                   [] {
-                                       std::string pattern;
-                                       for (const std::string_view name : right_words())
-                                           pattern +=
-                                               (pattern.empty() ? "^(" : "|") + std::string(name);
-                                       return pattern + ")$";
-                                   }()},
-                                  "What it may do: read, write, broadcast, raw, discover, "
-                                  "simulator, reload. A broadcast is also a write, and raw also a "
-                                  "read or a write.");
+    KeyShape rights =
+        items_shape("rights",
+                    {"[read, write]", kAny,
+                     [] {
+                         std::string pattern;
+                         for (const std::string_view name : right_words())
+                             pattern += (pattern.empty() ? "^(" : "|") + std::string(name);
+                         return pattern + ")$";
+                     }()},
+                    "What it may do: read, write, broadcast, raw, discover, "
+                    "simulator, reload, acknowledge. A broadcast is also a write, and raw also a "
+                    "read or a write.");
     rights.required = true;
     static const auto kKeys =
         Keys<OwnRole>()

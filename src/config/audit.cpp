@@ -11,47 +11,18 @@ namespace panelgate::config {
 
 namespace {
 
-constexpr std::size_t kKiB = 1024;
-constexpr std::array<std::pair<std::string_view, std::size_t>, 3> kUnits{
-    {{"KiB", kKiB}, {"MiB", kKiB* kKiB}, {"GiB", kKiB* kKiB* kKiB}}};
-constexpr std::size_t kSmallest = 64 * kKiB;
-constexpr std::size_t kLargest = 4 * kKiB * kKiB * kKiB;
-
-/// Parses "50MiB".
-std::optional<std::size_t> parse_size(std::string_view text) {
-    for (const auto& [name, bytes] : kUnits) {
-        if (!text.ends_with(name)) continue;
-        const auto number = yaml::parse_integer(text.substr(0, text.size() - name.size()));
-        constexpr std::int64_t kMost = 1 << 30;
-        if (!number || *number < 1 || *number > kMost) return std::nullopt;
-        return static_cast<std::size_t>(*number) * bytes;
-    }
-    return std::nullopt;
-}
-
-std::string size_text(std::size_t bytes) {
-    auto unit = kUnits.front();
-    for (const auto& larger : kUnits)
-        if (bytes % larger.second == 0 && bytes >= larger.second) unit = larger;
-    return std::to_string(bytes / unit.second) + std::string(unit.first);
-}
+constexpr std::size_t kSmallest = 64 * 1024;
+constexpr std::size_t kLargest = std::size_t{4} * 1024 * 1024 * 1024;
 
 /// Keys of former versions.
 constexpr std::array<yaml::Elsewhere, 1> kGone{
     {{"syslog", {}, {}, "let the machine's syslog read the file, as imfile of rsyslog does"}}};
 
-bool read_size(Reader& in, audit::Settings& settings) {
+bool read_rotate(Reader& in, audit::Settings& settings) {
     in.elsewhere(kGone);
-    const auto typed = in.text("rotate");
-    if (!typed) return false;
-    const auto bytes = parse_size(*typed);
-    const bool fits = bytes && *bytes >= kSmallest && *bytes <= kLargest;
-    if (!fits)
-        in.problem("rotate", "rotate must be a size such as 50MiB (KiB, MiB, GiB), from " +
-                                 size_text(kSmallest) + " to " + size_text(kLargest) + ", not " +
-                                 yaml::quote(*typed));
-    settings.rotate = fits ? *bytes : settings.rotate;
-    return fits;
+    const auto size = read_size(in, "rotate", kSmallest, kLargest);
+    settings.rotate = size.value_or(settings.rotate);
+    return size.has_value();
 }
 
 std::string file_fault(std::string_view typed) {
@@ -74,9 +45,8 @@ const Keys<audit::Settings>& audit_keys() {
             .weaker(By::any)
             .required()
             .example("/var/log/panelgate/audit.jsonl")
-            .value(text_shape("rotate", {"^[1-9][0-9]*(KiB|MiB|GiB)$"},
-                              "Size of a file, such as 50MiB; then the next one begins."),
-                   read_size, [](const Settings& of) { return size_text(of.rotate); })
+            .value(size_shape("rotate", "Size of a file, such as 50MiB; then the next one begins."),
+                   read_rotate, [](const Settings& of) { return size_text(of.rotate); })
             .weaker(By::falling)
             .integer("keep", &Settings::keep, 1, 10'000, "Full files that are kept.")
             .weaker(By::falling)

@@ -1,6 +1,7 @@
 #include "keys.hpp"
 
 #include <algorithm>
+#include <array>
 #include <string>
 
 #include "hints.hpp"
@@ -98,6 +99,48 @@ KeyShape text_shape(std::string_view key, const Form& form, std::string_view tex
     shape.may_be_number = form.pattern.empty() || form.may_be_number;
     shape.longest_text = form.longest;
     return shape;
+}
+
+namespace {
+
+constexpr std::uint64_t kKiB = 1024;
+constexpr std::array<std::pair<std::string_view, std::uint64_t>, 3> kUnits{
+    {{"KiB", kKiB}, {"MiB", kKiB* kKiB}, {"GiB", kKiB* kKiB* kKiB}}};
+
+std::optional<std::uint64_t> parse_size(std::string_view text) {
+    for (const auto& [name, bytes] : kUnits) {
+        if (!text.ends_with(name)) continue;
+        const auto number = yaml::parse_integer(text.substr(0, text.size() - name.size()));
+        constexpr std::int64_t kMost = 1 << 30;
+        if (!number || *number < 1 || *number > kMost) return std::nullopt;
+        return static_cast<std::uint64_t>(*number) * bytes;
+    }
+    return std::nullopt;
+}
+
+}  // namespace
+
+KeyShape size_shape(std::string_view key, std::string_view text) {
+    return text_shape(key, {"^[1-9][0-9]*(KiB|MiB|GiB)$"}, text);
+}
+
+std::string size_text(std::uint64_t bytes) {
+    auto unit = kUnits.front();
+    for (const auto& larger : kUnits)
+        if (bytes % larger.second == 0 && bytes >= larger.second) unit = larger;
+    return std::to_string(bytes / unit.second) + std::string(unit.first);
+}
+
+std::optional<std::uint64_t> read_size(Reader& in, std::string_view key, std::uint64_t least,
+                                       std::uint64_t most) {
+    const auto typed = in.text(key);
+    if (!typed) return std::nullopt;
+    const auto bytes = parse_size(*typed);
+    if (bytes && *bytes >= least && *bytes <= most) return bytes;
+    in.problem(key, std::string(key) + " must be a size such as 50MiB (KiB, MiB, GiB), from " +
+                        size_text(least) + " to " + size_text(most) + ", not " +
+                        yaml::quote(*typed));
+    return std::nullopt;
 }
 
 KeyShape items_shape(std::string_view key, const Items& items, std::string_view text) {

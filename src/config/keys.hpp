@@ -85,6 +85,14 @@ std::optional<Decimal> read_number(Reader& in, std::string_view key);
 /// Reads a number; more digits than a double holds are a problem.
 std::optional<double> read_exact(Reader& in, std::string_view key);
 
+/// A size such as 50MiB.
+KeyShape size_shape(std::string_view key, std::string_view text);
+/// Reads such a size, in bytes.
+std::optional<std::uint64_t> read_size(Reader& in, std::string_view key, std::uint64_t least,
+                                       std::uint64_t most);
+/// Returns "50MiB".
+std::string size_text(std::uint64_t bytes);
+
 /// Reads an item of a list of networks.
 std::function<std::optional<Network>(Reader&, const yaml::Node&)> read_network(
     std::string_view key);

@@ -265,7 +265,12 @@ const Keys<Config>& root_keys() {
                                  audit_keys),
                 shown_section("audit", &Config::audit, audit_keys))
             .weaker(By::removed)
-            .not_empty("give file, or leave it out");
+            .not_empty("give file, or leave it out")
+            .maps("alarms", &Config::alarms, alarm_keys,
+                  "[{name: hot, point: oven/temperature, above: 80}]", alarms::Settings::kMost,
+                  load_alarm, &alarms::Settings::name, "What operators are told of at once.")
+            .map("store", &Config::store, store_keys, "{days: 30}",
+                 "Events and history of days, in one file.");
     return kKeys;
 }
 

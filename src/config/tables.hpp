@@ -67,6 +67,8 @@ const Keys<tls::Settings>& tls_keys();
 const Keys<points::Relay>& relay_keys();
 const Keys<mqtt::Settings>& mqtt_keys();
 const Keys<audit::Settings>& audit_keys();
+const Keys<store::Settings>& store_keys();
+const Keys<alarms::Settings>& alarm_keys();
 const Keys<access::Settings>& access_keys();
 
 // What reads an entry of a list.
@@ -82,6 +84,7 @@ Keys<tcp_server::Settings> make_reach_keys(std::int64_t first, std::int64_t last
 /// `units` must distinguish a station id that is on two lines of one listener.
 void check_overlap(Reader& in, const tcp_server::Settings& settings);
 std::optional<serial_server::Settings> load_master(Reader& root, const yaml::Node& node);
+std::optional<alarms::Settings> load_alarm(Reader& root, const yaml::Node& node);
 /// Reads the relays, which must not overlap or form a circle.
 bool load_relays(Reader& root, Config& config);
 /// Reads `access.roles`, which other maps name.

@@ -199,6 +199,11 @@ void AuditBook::end_trail(const std::string& why) {
                   [end, file = settings_.file] { tell_of_end(*end, file); });
 }
 
+void AuditBook::put(const Members& record) {
+    if (trail_) trail_->add(record);
+    if (listener_) listener_(record);
+}
+
 void AuditBook::close() {
     if (!trail_) return;
     record_repeats(true);
@@ -229,7 +234,7 @@ void AuditBook::tell(const audit::Notice& notice) const {
 }
 
 void AuditBook::write(const std::string& line, const bus::WriteEnd& end) {
-    if (!trail_) return;
+    if (!is_heard()) return;
     const bool refused = end.outcome == Outcome::refused;
     if (refused) refused_ = end.who;
     const Station* const station = snapshot_ ? snapshot_->plant.find(line, end.station) : nullptr;
@@ -259,7 +264,7 @@ void AuditBook::write(const std::string& line, const bus::WriteEnd& end) {
         record["pdu"] = to_hex(end.pdu, "");
     }
     add_outcome(record, end);
-    trail_->add(record);
+    put(record);
     if (end.transmitted) written_[{line, end.station}] = clock_.now();
 }
 
@@ -306,10 +311,10 @@ void AuditBook::wait_for_repeats() {
 
 void AuditBook::record_repeats(bool all) {
     for (const Members& counted : repeats_.due(clock_.now(), all)) {
-        if (!trail_) return;
+        if (!is_heard()) return;
         Members record = audit::record_of("repeats", rt::wall_now());
         audit::add(record, counted);
-        trail_->add(record);
+        put(record);
     }
 }
 

@@ -47,7 +47,7 @@ std::function<void(const web::Deed&)> AuditBook::deeds() {
 }
 
 void AuditBook::deed(const web::Deed& deed) {
-    if (!trail_) return;
+    if (!is_heard()) return;
     // A write has one record: the bus records refusals of its own, the reloader reloads.
     const bool is_told = std::exchange(refused_, nullptr) == deed.who && deed.who != nullptr;
     const bool lacks_right = deed.status == 401 || deed.status == 403 || deed.status == 429;
@@ -62,7 +62,7 @@ void AuditBook::deed(const web::Deed& deed) {
         add_text(record, "method", deed.method);
         add_text(record, "path", deed.path);
         add_text(record, "body", deed.body);
-        trail_->add(record);
+        put(record);
     } else if (lacks_right && deed.status != 403 && deed.shown_token) {
         add_text(details, "path", deed.path);
         add_text(details, "why", text_in(deed.answer, "detail"));
@@ -93,12 +93,12 @@ void AuditBook::record_refusal(std::string_view kind, const WhoRef& who, const M
     add_who(record, who);
     audit::add(record, what);
     audit::add(record, details);
-    trail_->add(record);
+    put(record);
 }
 
 std::function<void(const TopicRefusal&)> AuditBook::topic_refusals() {
     return [this, life = std::weak_ptr(alive_)](const TopicRefusal& refusal) {
-        if (life.expired() || !trail_) return;
+        if (life.expired() || !is_heard()) return;
         AskedPlace place;
         place.station = refusal.station;
         if (refusal.station != nullptr) place.line = refusal.station->line;
@@ -117,7 +117,7 @@ std::function<void(const TopicRefusal&)> AuditBook::topic_refusals() {
 std::function<void(const WhoRef&, std::uint8_t, ByteView)> AuditBook::stray_writes() {
     return
         [this, life = std::weak_ptr(alive_)](const WhoRef& who, std::uint8_t unit, ByteView pdu) {
-            if (life.expired() || !trail_ || pdu.empty()) return;
+            if (life.expired() || !is_heard() || pdu.empty()) return;
             record_refusal("refusal", who,
                            {{"unit", unit}, {"function", pdu[0]}, {"outcome", "refused"}},
                            {{"pdu", to_hex(pdu, "")},
@@ -126,7 +126,7 @@ std::function<void(const WhoRef&, std::uint8_t, ByteView)> AuditBook::stray_writ
 }
 
 void AuditBook::reload(const web::ReloadVerdict& verdict) {
-    if (!trail_) return;
+    if (!is_heard()) return;
     Members record = audit::record_of("reload", rt::wall_now());
     add_text(record, "cause", verdict.cause);
     record["rollback"] = verdict.rollback;
@@ -137,11 +137,11 @@ void AuditBook::reload(const web::ReloadVerdict& verdict) {
         record["more_changes"] = verdict.changes.size() - kChanges;
     if (!verdict.weaker.empty()) add_some(record, "weaker", verdict.weaker);
     if (!verdict.faults.empty()) record["faults"] = verdict.faults.size();
-    trail_->add(record);
+    put(record);
 }
 
 void AuditBook::tokens(const std::vector<web::Token>& before, const std::vector<web::Token>& now) {
-    if (!trail_) return;
+    if (!is_heard()) return;
     for (const web::Token& token : now) {
         const auto old = std::ranges::find(before, token.name, &web::Token::name);
         if (old == before.end()) {
@@ -159,13 +159,13 @@ void AuditBook::tokens(const std::vector<web::Token>& before, const std::vector<
 }
 
 void AuditBook::record_token(const web::Token& token, std::string_view event) {
-    if (!trail_) return;
+    if (!is_heard()) return;
     Members record = audit::record_of("token", rt::wall_now());
     add_text(record, "token", token.name);
     add_text(record, "role", token.standing.name());
     record["event"] = event;
     if (token.expires) record["expires"] = web::expiry_text(*token.expires);
-    trail_->add(record);
+    put(record);
 }
 
 }  // namespace panelgate::gateway

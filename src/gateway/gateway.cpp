@@ -18,6 +18,8 @@
 #include "panelgate/gateway/running_line.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/rt/loop.hpp"
+#include "panelgate/web/api/render.hpp"
+#include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::gateway {
 
@@ -66,6 +68,10 @@ std::vector<points::RelayRoute> routes_of(const Snapshot& snapshot) {
 
 std::vector<web::Token> tokens_of(const config::Config& config) {
     return config.http ? config.http->tokens : std::vector<web::Token>{};
+}
+
+std::shared_ptr<const Plant> plant_in(const std::shared_ptr<Snapshot>& snapshot) {
+    return {snapshot, &snapshot->plant};
 }
 
 std::shared_ptr<const web::Directory> directory_in(const std::shared_ptr<Snapshot>& snapshot) {
@@ -128,6 +134,7 @@ LineWatch Gateway::watch() {
 
 void Gateway::on_event(const std::string& line, const bus::BusEvent& event) {
     publish(events_, snapshot_->plant, line, event);
+    journal_.on_event(line, event);
     northbound_.on_bus_event(line, event);
     const auto* write = std::get_if<bus::WriteEvent>(&event);
     if (write != nullptr && relay_listener_) relay_listener_(line, *write);
@@ -139,8 +146,24 @@ void Gateway::on_points(const std::string& line, std::uint8_t id,
         return;  // the new snapshot is about to replace this one
     Station& station = snapshot_->plant.at(line, id);
     remember(station, wants, clock_.now());
+    journal_.on_points(station, wants);
+    alarms_.on_points(station, wants);
     publish_points(events_, station, wants, clock_.now());
     northbound_.on_points(station, wants);
+}
+
+void Gateway::on_alarm(const alarms::Change& change) {
+    const alarms::Settings& alarm = *change.alarm;
+    const Station* const station = snapshot_->plant.find(alarm.station);
+    const std::string line = station != nullptr ? station->line : alarm.line;
+    rt::log(change.kind == alarms::Change::Kind::raised ? rt::LogLevel::warn : rt::LogLevel::info,
+            "alarm",
+            {{"alarm", alarm.name},
+             {"state", std::string(alarms::label(change.now.state))},
+             {"severity", alarm.severity}});
+    if (events_.is_wanted())
+        events_.publish({"alarm", line, alarm.station, alarm.point},
+                        web::json_text(web::describe_alarm(alarm, change.now)));
 }
 
 /// Existing lines where possible, and new ones.
@@ -207,6 +230,7 @@ void Gateway::show(const std::shared_ptr<Snapshot>& snapshot) {
     }
     snapshot_ = snapshot;
     audit_.show(snapshot_);
+    journal_.show(snapshot_);
     northbound_.show(snapshot_);
 }
 
@@ -284,8 +308,10 @@ std::vector<ServedCertificate> Gateway::certificates() const {
 
 void Gateway::record(const web::ReloadVerdict& verdict) {
     const bool was_kept = audit_.is_kept();
-    audit_.reload(verdict);
+    if (was_kept) audit_.reload(verdict);
     audit_.apply(snapshot_->config->audit);
+    journal_.apply(snapshot_->config->store);
+    alarms_.apply(snapshot_->config->alarms, plant_in(snapshot_));
     if (!was_kept) audit_.reload(verdict);
 }
 
@@ -310,8 +336,14 @@ web::Providers Gateway::providers() {
     providers.wall = rt::wall_now;
     providers.collect = northbound_.collector();
     providers.discovery = discoveries_.get();
+    providers.alarms = &alarms_;
     providers.reload = reloads_;
     providers.record = audit_.deeds();
+    providers.ask_store = [this](std::function<void(const store::Database*)> read,
+                                 std::function<void()> done) {
+        journal_.ask(std::move(read), std::move(done));
+    };
+    providers.write_history = [this](const std::string& point) { journal_.flush(point); };
     return providers;
 }
 
@@ -323,6 +355,11 @@ void Gateway::start() {
                   {directory, [this] { return providers(); }});
     lag_.start();
     audit_.apply(snapshot_->config->audit);
+    journal_.apply(snapshot_->config->store);
+    audit_.on_record([this](const audit::Members& record) { journal_.on_record(record); });
+    alarms_.apply(snapshot_->config->alarms, plant_in(snapshot_));
+    journal_.add(
+        {.kind = store::Kind::start, .text = std::string("panelgate ") + PANELGATE_VERSION});
     for (const auto& line : snapshot_->lines) line->start();
     relays_->start();
     if (line_histories_) line_histories_->start();
@@ -369,6 +406,9 @@ void Gateway::stop() {
     relays_->stop();
     for (const auto& line : snapshot_->lines) line->stop();
     audit_.close();
+    alarms_.stop();
+    journal_.add({.kind = store::Kind::stop});
+    journal_.close();
 }
 
 /// All figures but those of points, and of the process.
@@ -378,6 +418,10 @@ metrics::Snapshot Gateway::figures() const {
     figures.relays = relay_samples(relays_->status());
     servers_.copy_figures(figures);
     figures.mqtt = northbound_.counters();
+    figures.store = journal_.counters();
+    for (const web::AlarmView& alarm : alarms_.list())
+        figures.alarms.push_back(
+            {alarm.settings.name, alarm.settings.severity, alarm.status.is_active()});
     if (certificates_) figures.renewals = certificates_->renewals();
     if (audit_.is_kept()) figures.audit = audit_.counters();
     if (reloads_->barred(false).empty()) figures.reloads = reloads_->counters();

@@ -372,8 +372,8 @@ constexpr Part kParts[] = {
     add_requests,      add_translated,    add_station_times, add_wire_counters, add_exceptions,
     add_line_counters, add_uart_counters, add_line_state,    add_findings,      add_denials,
     add_station_state, add_points,        add_relays,        add_listeners,     add_serial_masters,
-    add_tls,           add_http,          add_mqtt,          add_audit,         add_loop,
-    add_reloads,       add_process,
+    add_tls,           add_http,          add_mqtt,          add_audit,         add_store,
+    add_alarms,        add_loop,          add_reloads,       add_process,
 };
 
 }  // namespace

@@ -180,6 +180,32 @@ void add_audit(Families& out, const Snapshot& snapshot) {
                 audit.rotations);
 }
 
+void add_store(Families& out, const Snapshot& snapshot) {
+    if (!snapshot.store) return;
+    const store::Counters& store = *snapshot.store;
+    const auto gauge = [&out](const char* name, const char* text, double value) {
+        Family one = make_gauge(name, text);
+        one.gauge({}, value);
+        out.push_back(one.take());
+    };
+    gauge("panelgate_store_up", "1 while the store takes events and values.",
+          store.failing ? 0 : 1);
+    gauge("panelgate_store_bytes", "Size of the store.", static_cast<double>(store.bytes));
+    add_counter(out, "panelgate_store_writes_total", "Events and blocks of values that are stored.",
+                store.written);
+    add_counter(out, "panelgate_store_lost_total",
+                "Events and blocks of values that queue or disk did not take.", store.lost);
+}
+
+void add_alarms(Families& out, const Snapshot& snapshot) {
+    if (snapshot.alarms.empty()) return;
+    Family active = make_gauge("panelgate_alarm_active",
+                               "1 while the alarm's condition holds, acknowledged or not.");
+    for (const Snapshot::Alarm& alarm : snapshot.alarms)
+        active.gauge({{"alarm", alarm.name}, {"severity", alarm.severity}}, alarm.active ? 1 : 0);
+    out.push_back(active.take());
+}
+
 void add_points(Families& out, const Snapshot& snapshot) {
     Family value = make_gauge("panelgate_point_value",
                               "Value of a point; absent when the last attempt to read it failed.");

@@ -58,6 +58,8 @@ void add_http(Families& out, const Snapshot& snapshot);
 /// Adds the MQTT families; nothing without a broker.
 void add_mqtt(Families& out, const Snapshot& snapshot);
 void add_audit(Families& out, const Snapshot& snapshot);
+void add_alarms(Families& out, const Snapshot& snapshot);
+void add_store(Families& out, const Snapshot& snapshot);
 
 void add_points(Families& out, const Snapshot& snapshot);
 void add_relays(Families& out, const Snapshot& snapshot);

@@ -34,7 +34,10 @@ Store::Store(Settings settings, std::function<WallTime()> wall, Tell tell)
     thread_ = start_thread([this] { run(); });
 }
 
-Store::~Store() {
+Store::~Store() { end(); }
+
+void Store::end() {
+    if (!thread_.joinable()) return;
     {
         const std::scoped_lock lock(mutex_);
         stop_ = true;
@@ -117,7 +120,7 @@ bool Store::ensure_open() {
     }
     try {
         database_ = std::make_unique<Database>(settings_);
-        if (!database_->remark().empty()) tell_(true, database_->remark());
+        if (!database_->remark().empty()) tell_(false, database_->remark());
         settle("", 0, 0);
         seen_ = wall_();
         prune_at_ = std::max(prune_at_, seen_ + kPrune);
@@ -164,7 +167,7 @@ void Store::settle(const std::string& why, std::size_t written, std::size_t lost
     bool turned = false;
     {
         const std::scoped_lock lock(mutex_);
-        turned = counters_.failing == why.empty();
+        turned = counters_.failing != !why.empty();
         counters_.failing = !why.empty();
         counters_.written += written;
         counters_.lost += lost;

@@ -52,6 +52,7 @@ def running():
         text = config.gateway(FLOOR1, FLOOR2, FLOOR3, FLOOR4, http=door,
                               modbus=config.FREE_PORT + ", lines: [floor1]",
                               relays="[{from: press/UW160, to: press/UW170, every: 1s}]")
+        text += "alarms: [{name: press-hot, point: press/setpoint, above: 55}]\n"
         with harness.configured(text) as program:
             while not is_settled(program):
                 pass  # each look is a request to the program

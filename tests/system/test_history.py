@@ -1,96 +1,162 @@
-"""The last hour of points and lines, in memory."""
+"""The store: what happened and the values of days, over a restart; alarms over a restart, too."""
+import contextlib
 import csv
-import datetime
 import io
-import json
-import subprocess
+import pathlib
+import sqlite3
+import tempfile
 import unittest
+import urllib.request
 
-import config
 import harness
-from test_points import until
 
-LINE = config.line(timing="{response_timeout: 60ms}", retries=0, stations="""
-      {id: 31, name: press, profile: autonics-gplp-s, points: [
-        {name: level, at: UW100, type: i16, scale: 0.1, unit: celsius, writable: true, every: 200ms},
-        {name: running, at: UB1632, writable: true, every: 200ms},
-        {name: title, at: UW200, type: string, length: 4}]}""")
-GATEWAY = config.gateway(LINE, config.line("floor3", device="/dev/null", stations="{id: 8, name: scale}"),
-                         http=config.ADMIN, modbus=None)
-POINT = "/api/v1/stations/press/points/"
+PRESS = "/api/v1/stations/press/"
+ALARM = "/api/v1/alarms/press-hot/acknowledge"
 
-
-def instant(text):
-    return datetime.datetime.fromisoformat(text.replace("Z", "+00:00"))
+CONFIG = """lines:
+  - name: floor1
+    device: sim
+    serial: {{baud: 38400, parity: none}}
+    stations:
+      - id: 31
+        name: press
+        profile: autonics-gplp-s
+        points:
+          - {{name: setpoint, at: UW120, unit: celsius, writable: true, every: 100ms}}
+http: {{listen: "127.0.0.1:0", anonymous: admin}}
+store: {{file: {folder}/state.db}}
+alarms:
+  - {{name: press-hot, point: press/setpoint, above: 40, back: 30, severity: urgent, text: The press is too hot}}
+  - {{name: press-lost, station: press, offline: true}}
+"""
 
 
 class History(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.program = cls.enterClassContext(harness.configured(GATEWAY))
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.file = self.folder / "panelgate.yaml"
+        self.file.write_text(CONFIG.format(folder=folder.name))
 
-    def samples(self, name):
-        return self.program.get(POINT + name + "/history")[1]["samples"]
+    def run_gateway(self):
+        return harness.Program("run", "--simulate", "-c", str(self.file))
 
-    def write(self, name, value):
-        self.assertEqual(self.program.rest("PUT", POINT + name, {"value": value})[0], 200)
+    def set_point(self, program, value):
+        self.assertEqual(program.rest("PUT", PRESS + "points/setpoint", {"value": value})[0], 200)
 
-    def test_a_point_has_what_it_was_at_the_time_it_was_read(self):
-        before = datetime.datetime.now(datetime.timezone.utc) - datetime.timedelta(seconds=1)
-        for value in (17.5, 0, -3.2):
-            self.write("level", value)
-            until(lambda: [s["value"] for s in self.samples("level")][-1:] == [value])
-        status, told = self.program.get(POINT + "level/history")
-        self.assertEqual((status, told["unit"], told["every_ms"]), (200, "celsius", 1000))
-        times = [instant(sample["time"]) for sample in told["samples"]]
-        self.assertEqual(times, sorted(set(times)))
-        after = datetime.datetime.now(datetime.timezone.utc)
-        self.assertTrue(before <= times[-1] <= after, (before, times[-1], after))
-        self.write("running", True)
-        until(lambda: self.samples("running")[-1]["value"] is True)
-        self.assertEqual(self.program.get(POINT + "title/history")[0], 404)
+    def entries(self, program, query=""):
+        status, body = program.get("/api/v1/journal" + query)
+        self.assertEqual(status, 200, body)
+        return body["entries"]
 
-    def test_P10_a_dead_panel_leaves_a_gap_and_no_zero(self):
-        self.write("level", 21.5)
-        until(lambda: [s["value"] for s in self.samples("level")][-1:] == [21.5])
-        self.program.rest("PUT", "/api/v1/simulator/press", {"dead": True})
-        try:
-            until(lambda: self.samples("level")[-1]["value"] is None)
-        finally:
-            self.program.rest("PUT", "/api/v1/simulator/press", {})
-        until(lambda: self.samples("level")[-1]["value"] == 21.5)
-        values = [sample["value"] for sample in self.samples("level")]
-        self.assertEqual(values[values.index(21.5):].count(0), 0)
+    def alarm(self, program):
+        return program.get("/api/v1/alarms")[1]["alarms"][0]
 
-    def test_a_line_has_its_load_requests_and_latency(self):
-        path = "/api/v1/lines/floor1/history"
-        until(lambda: any(s["requests"] and s["wire_ms"] for s in self.program.get(path)[1]["samples"]))
-        sample = next(s for s in self.program.get(path)[1]["samples"] if s["wire_ms"])
-        self.assertTrue(0 < sample["load_percent"] <= 100, sample)
-        self.assertGreater(sample["latency_ms"], 0)
-        self.assertGreaterEqual(sample["requests"], sample["errors"])
+    def test_a_write_is_an_entry_with_who_old_and_new_value_also_after_a_restart(self):
+        with self.run_gateway() as program:
+            self.set_point(program, 7)
+            self.wait_for_samples(program)
+            self.set_point(program, 9)
+        with self.run_gateway() as program:
+            writes = self.entries(program, "?kind=write")
+            self.assertEqual([e["text"] for e in writes][0], "setpoint = 9, was 7 (confirmed)")
+            self.assertEqual(writes[0]["who"], "http 127.0.0.1")
+            self.assertEqual((writes[0]["line"], writes[0]["station"], writes[0]["point"]),
+                             ("floor1", "press", "setpoint"))
+            kinds = [e["kind"] for e in self.entries(program)]
+            self.assertLess(kinds.index("start"), kinds.index("stop"))
+            self.assertEqual(kinds.count("start"), 2)
 
-    def test_P10_a_line_that_is_down_has_no_load(self):
-        path = "/api/v1/lines/floor3/history"
-        until(lambda: self.program.get(path)[1]["samples"])
-        self.assertEqual({s["load_percent"] for s in self.program.get(path)[1]["samples"]}, {None})
+    def wait_for_samples(self, program):
+        """Until the store has a value; each turn is a request, which is answered by the store's thread."""
+        for _ in range(2000):
+            samples = program.get(PRESS + "points/setpoint/history?step=10s")[1]["samples"]
+            if samples:
+                return samples
+        raise AssertionError("no sample came")
 
-    def test_a_table_for_spreadsheets_by_curl(self):
-        self.write("level", 12.5)
-        until(lambda: [s["value"] for s in self.samples("level")][-1:] == [12.5])
-        done = subprocess.run(["curl", "-s", "-H", "Accept: text/csv",
-                               self.program.url(POINT + "level/history")],
-                              capture_output=True, text=True, timeout=harness.PATIENCE, check=True)
-        rows = list(csv.DictReader(io.StringIO(done.stdout)))
-        self.assertEqual(set(rows[0]), {"time", "value"})
-        self.assertIn("12.5", [row["value"] for row in rows])
+    def test_history_has_least_greatest_and_mean_also_after_a_restart(self):
+        with self.run_gateway() as program:
+            self.set_point(program, 12)
+            self.wait_for_samples(program)
+        with self.run_gateway() as program:
+            samples = program.get(PRESS + "points/setpoint/history?step=1d")[1]["samples"]
+            self.assertEqual(samples[-1]["max"], 12)
+            self.assertEqual(set(samples[-1]), {"time", "min", "max", "mean", "count"})
+            for wrong in ("?step=7s", "?from=yesterday", "?from=2026-01-02T00:00:00Z&to=2026-01-01T00:00:00Z"):
+                self.assertEqual(program.get(PRESS + "points/setpoint/history" + wrong)[0], 400, wrong)
 
-    def test_it_stays_small_for_many_points(self):
-        many = config.wide(2, 10, 100, every="60s")
-        with harness.configured(many) as program:
-            told = program.get("/api/v1/stations/s1-1/points/p0/history")[1]
-            self.assertEqual(told["every_ms"], 5000)  # 2000 points in 16 MiB
-            self.assertLess(len(json.dumps(told)), 1000)
+    def test_an_alarm_is_raised_told_acknowledged_and_ends_over_restarts(self):
+        with self.run_gateway() as program:
+            self.assertEqual(program.rest("POST", ALARM)[0], 409, "it is normal")
+            self.set_point(program, 50)
+            program.log.wait_for("warn alarm alarm=press-hot state=active severity=urgent")
+            self.assertIn('panelgate_alarm_active{alarm="press-hot",severity="urgent"} 1',
+                          program.get("/metrics")[1])
+        with self.run_gateway() as program:
+            program.log.wait_for("station online|listening http")
+            while self.alarm(program)["state"] == "normal":  # until the store has been read
+                pass
+            self.assertEqual(self.alarm(program)["state"], "active")
+            status, alarm = program.rest("POST", ALARM)
+            self.assertEqual((status, alarm["state"]), (200, "acknowledged"))
+            self.assertEqual(alarm["acknowledged_by"], "http 127.0.0.1")
+            self.assertEqual(program.rest("POST", ALARM)[0], 409)
+            self.assertEqual(program.rest("POST", "/api/v1/alarms/none/acknowledge")[0], 404)
+        with self.run_gateway() as program:
+            self.set_point(program, 35)
+            self.set_point(program, 20)
+            program.log.wait_for("info alarm alarm=press-hot state=normal")
+            kinds = [e["kind"] for e in reversed(self.entries(program))]
+            told = [k for k in kinds if k.startswith("alarm")]
+            self.assertEqual(told, ["alarm_raised", "alarm_acknowledged", "alarm_cleared"])
+
+    def test_the_journal_as_csv_and_by_pages(self):
+        with self.run_gateway() as program:
+            for value in range(1, 6):
+                self.set_point(program, value)
+            request = urllib.request.Request(program.url("/api/v1/journal?kind=write"),
+                                             headers={"Accept": "text/csv"})
+            with urllib.request.urlopen(request, timeout=harness.PATIENCE) as answer:
+                rows = list(csv.DictReader(io.StringIO(answer.read().decode())))
+            self.assertEqual(len(rows), 5)
+            self.assertEqual(rows[0]["kind"], "write")
+            seen, after = [], 0
+            while after is not None:
+                page = program.get(f"/api/v1/journal?kind=write&limit=2&after={after}")[1]
+                seen += [e["id"] for e in page["entries"]]
+                after = page["next"]
+            self.assertEqual(len(seen), 5)
+            self.assertEqual(seen, sorted(seen, reverse=True))
+            self.assertEqual(program.get("/api/v1/journal?kind=nothing")[0], 400)
+
+    def test_a_kill_leaves_a_file_that_opens(self):
+        with self.run_gateway() as program:
+            self.set_point(program, 1)
+            self.entries(program)  # the store's thread has written
+            self.set_point(program, 2)
+            program.process.kill()
+            program.ends_with = -9
+        with contextlib.closing(sqlite3.connect(self.folder / "state.db")) as database:
+            self.assertEqual(database.execute("PRAGMA integrity_check").fetchone(), ("ok",))
+        with self.run_gateway() as program:
+            self.assertIn("setpoint = 1", self.entries(program, "?kind=write")[-1]["text"])
+
+    def test_a_damaged_file_is_kept_and_told(self):
+        (self.folder / "state.db").write_text("this is no database, but a text of some length\n" * 100)
+        with self.run_gateway() as program:
+            program.log.wait_for(r"warn store file .*state\.db\.damaged, and a new one begins")
+            self.assertTrue(self.entries(program))
+        self.assertTrue((self.folder / "state.db.damaged").exists())
+
+    def test_a_file_that_cannot_be_made_is_told_and_the_line_goes_on(self):
+        self.file.write_text(self.file.read_text().replace("/state.db", "/none/state.db"))
+        with self.run_gateway() as program:
+            program.log.wait_for("warn store fails .*unable to open database file")
+            self.set_point(program, 3)
+            self.assertEqual(program.get("/api/v1/journal")[0], 503)
+            self.assertIn("panelgate_store_up 0", program.get("/metrics")[1])
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ LARGEST = 150_000  # bytes of everything a browser fetches, packed
 LONGEST = 300      # lines of a file
 
 
-TABLES = ("words.js", "finding_words.js")
+TABLES = ("words.js", "finding_words.js", "day_words.js")
 
 
 def words():

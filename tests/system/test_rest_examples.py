@@ -31,6 +31,7 @@ OF_A_RELOAD = {"at", "warnings"}
 OF_A_BUILD = {"version", "commit", "compiler", "libraries"}
 OF_A_RELAY = {"state", "reads", "writes"}
 OF_A_POINT = {"time"}
+OF_AN_ENTRY = {"id", "time", "text"}
 # Of panels that confirm and do not keep (verify_test.cpp), and of a line whose master speaks.
 UNSEEN = {("Written", "read_back"), ("Written", "verify_detail"), ("Problem", "read_back"),
           ("StationDetail", "heard")}
@@ -85,7 +86,8 @@ def settled(value):
     passing = set(PASSING)
     for mark, names in (("busy_seconds", OF_A_CLIENT), ("direction", OF_A_FRAME), ("repairs", OF_A_RELAY),
                         ("first_bit_out", OF_A_TRANSACTION), ("errors", OF_AN_INCIDENT),
-                        ("rollback", OF_A_RELOAD), ("libraries", OF_A_BUILD), ("every_ms", OF_A_POINT)):
+                        ("rollback", OF_A_RELOAD), ("libraries", OF_A_BUILD), ("every_ms", OF_A_POINT),
+                        ("who", OF_AN_ENTRY)):
         passing |= names if mark in value else set()
     return {key: "~" if key in passing and one is not None else settled(one)
             for key, one in value.items()}

@@ -14,7 +14,7 @@ namespace panelgate {
 enum class Role : std::uint8_t {
     none,
     viewer,     ///< reads
-    operator_,  ///< writes
+    operator_,  ///< writes, acknowledges alarms
     engineer,   ///< raw requests, broadcasts, discoveries, simulated faults
     admin,      ///< reload and rollback
 };
@@ -29,11 +29,12 @@ enum class Right : std::uint8_t {
     raw,
     discover,
     simulator,
-    reload,  ///< and rollback
+    reload,       ///< and rollback
+    acknowledge,  ///< alarms
 };
-inline constexpr std::array kAllRights{Right::read,  Right::write,    Right::broadcast,
-                                       Right::raw,   Right::discover, Right::simulator,
-                                       Right::reload};
+inline constexpr std::array kAllRights{Right::read,   Right::write,      Right::broadcast,
+                                       Right::raw,    Right::discover,   Right::simulator,
+                                       Right::reload, Right::acknowledge};
 /// Returns its name in the configuration.
 std::string_view label(Right right);
 

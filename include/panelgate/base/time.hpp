@@ -24,6 +24,9 @@ using WallTime = std::chrono::sys_time<std::chrono::microseconds>;
 
 /// Formats RFC 3339 in UTC: "2026-11-22T07:15:19.000250Z".
 std::string rfc3339(WallTime time);
+/// Parses a day and a time as in RFC 3339: "2026-11-22T07:15:19.25+01:00"; seconds and zone may
+/// lack, a blank may stand for the T. Digits behind microseconds do not count.
+std::optional<WallTime> parse_rfc3339(std::string_view text);
 /// Takes a number of `width` digits off the front of the text; nothing if it does not begin so.
 std::optional<int> take_number(std::string_view& text, std::size_t width);
 /// Takes a day, "2026-11-22", off; nothing if the text begins with none.

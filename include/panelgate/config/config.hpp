@@ -10,6 +10,7 @@
 
 #include "panelgate/access/line_rules.hpp"
 #include "panelgate/access/settings.hpp"
+#include "panelgate/alarms/settings.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/audit/settings.hpp"
 #include "panelgate/line/settings.hpp"
@@ -20,6 +21,7 @@
 #include "panelgate/rt/settings.hpp"
 #include "panelgate/serial_server/settings.hpp"
 #include "panelgate/sim/settings.hpp"
+#include "panelgate/store/settings.hpp"
 #include "panelgate/tcp_server/settings.hpp"
 #include "panelgate/web/http/settings.hpp"
 #include "panelgate/yaml/document.hpp"
@@ -90,6 +92,8 @@ struct Config {
     rt::LogSettings log;
     rt::RealtimeSettings realtime;
     std::optional<audit::Settings> audit{};  ///< empty: nothing is recorded
+    std::vector<alarms::Settings> alarms{};
+    store::Settings store{};  ///< events and history
     /// Where each line's name stands, by that name.
     std::map<std::string, yaml::Mark> line_marks;
     /// Warnings of legal but questionable settings ("8N1 is outside the standard"), as

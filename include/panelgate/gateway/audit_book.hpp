@@ -50,6 +50,12 @@ class AuditBook {
     /// The gateway ends in order: records that, and ends the trail.
     void close();
 
+    /// Calls the listener with each record but those of the trail itself, with and without an
+    /// audit.
+    void on_record(std::function<void(const audit::Members&)> listener) {
+        listener_ = std::move(listener);
+    }
+
     void write(const std::string& line, const bus::WriteEnd& end);
     /// True while writes must not be sent.
     bool refuses_writes() const {
@@ -79,6 +85,8 @@ class AuditBook {
     using Members = audit::Members;
 
     void begin_trail();
+    bool is_heard() const { return trail_ != nullptr || listener_; }
+    void put(const Members& record);
     /// Records the end; the trail writes what waits on a thread of its own, for a disk may be slow.
     void end_trail(const std::string& why);
     /// True if `what` of this client was recorded a short time ago: it is counted then. Each kind
@@ -100,6 +108,7 @@ class AuditBook {
     audit::Settings settings_;             ///< of the trail
     std::optional<rt::Worker> closing_;    ///< ends trails
     std::unique_ptr<audit::Trail> trail_;  ///< null without an audit
+    std::function<void(const Members&)> listener_;
     audit::Repeats repeats_;
     bool waits_ = false;
     std::shared_ptr<const Snapshot> snapshot_;

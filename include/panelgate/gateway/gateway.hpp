@@ -13,9 +13,11 @@
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/explain/doors.hpp"
+#include "panelgate/gateway/alarm_desk.hpp"
 #include "panelgate/gateway/audit_book.hpp"
 #include "panelgate/gateway/certificates.hpp"
 #include "panelgate/gateway/discoveries.hpp"
+#include "panelgate/gateway/journal.hpp"
 #include "panelgate/gateway/northbound.hpp"
 #include "panelgate/gateway/running_line.hpp"
 #include "panelgate/gateway/servers.hpp"
@@ -78,6 +80,7 @@ class Gateway {
     void on_event(const std::string& line, const bus::BusEvent& event);
     void on_points(const std::string& line, std::uint8_t station,
                    const std::vector<std::size_t>& wants);
+    void on_alarm(const alarms::Change& change);
     Lines lines_of(const config::Config& config);
     void apply_lines(const config::Config& config, const Lines& lines);
     void rest_wires(const config::Config& config, const Lines& lines);
@@ -94,7 +97,9 @@ class Gateway {
     rt::AsioClock clock_;
     rt::LoopLag lag_{clock_};
     AuditBook audit_{loops_.plant, clock_};  ///< lines record in it until they are destroyed
-    explain::Doors doors_;                   ///< lines ask it until they are destroyed
+    Journal journal_{loops_.plant, clock_};  ///< lines tell it until they are destroyed
+    AlarmDesk alarms_{clock_, journal_, [this](const alarms::Change& change) { on_alarm(change); }};
+    explain::Doors doors_;  ///< lines ask it until they are destroyed
     bool simulate_;
     Reloader* reloads_;
     web::EventOutlet events_;  ///< buses publish by it until they are destroyed

@@ -16,6 +16,7 @@
 #include "panelgate/points/counters.hpp"
 #include "panelgate/rt/counters.hpp"
 #include "panelgate/serial_server/counters.hpp"
+#include "panelgate/store/counters.hpp"
 #include "panelgate/tcp_server/counters.hpp"
 #include "panelgate/tls/counters.hpp"
 #include "panelgate/web/http/counters.hpp"
@@ -30,8 +31,15 @@ struct Snapshot {
     std::deque<points::PointSample> points;  ///< deque: many points, never moved
     std::vector<points::RelaySample> relays;
     std::optional<web::Counters> http;
-    std::optional<mqtt::Counters> mqtt;               ///< nullopt: no broker
-    std::optional<audit::Counters> audit{};           ///< nullopt: no audit
+    std::optional<mqtt::Counters> mqtt;      ///< nullopt: no broker
+    std::optional<audit::Counters> audit{};  ///< nullopt: no audit
+    std::optional<store::Counters> store{};
+    struct Alarm {
+        std::string name{};
+        std::string severity{};
+        bool active = false;
+    };
+    std::vector<Alarm> alarms{};
     std::optional<config::ReloadCounters> reloads;    ///< nullopt: built-in configuration
     std::map<std::string, tls::Renewals> renewals{};  ///< by listener, as its other metrics name it
     std::string version;

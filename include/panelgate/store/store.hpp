@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/store/counters.hpp"
 #include "panelgate/store/database.hpp"
 #include "panelgate/store/settings.hpp"
 
@@ -21,17 +22,18 @@ namespace panelgate::store {
 /// Used by one thread besides its own.
 class Store {
   public:
-    /// What the owner should say in the log; called from the store's thread. Empty `why`: writes
-    /// are taken again.
+    /// What the owner should say in the log; called from the store's thread. Not failing: `why` is
+    /// about the file that was found, or empty when writes are taken again.
     using Tell = std::function<void(bool failing, const std::string& why)>;
 
     /// `wall` is called from the store's thread.
     Store(Settings settings, std::function<WallTime()> wall, Tell tell);
-    /// Writes what waits, once, and ends the thread.
-    ~Store();
+    ~Store();  ///< as end()
     Store(const Store&) = delete;
     Store& operator=(const Store&) = delete;
 
+    /// Writes what waits, once, and ends the thread. Any thread.
+    void end();
     /// Carries out a write soon; counted as lost where queue or disk do not take the write.
     void put(std::function<void(Database&)> write);
     /// Carries out a read behind the writes that wait. `read` gets nullptr while the file cannot be

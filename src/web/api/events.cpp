@@ -16,13 +16,11 @@ struct Kind {
     bool names_station;
     bool names_point;
 };
-constexpr Kind kKinds[] = {{"point", true, true},
-                           {"station", true, false},
-                           {"line", false, false},
-                           {"transaction", true, false},
-                           {"discovery", false, false}};
+constexpr Kind kKinds[] = {{"point", true, true},       {"station", true, false},
+                           {"line", false, false},      {"transaction", true, false},
+                           {"discovery", false, false}, {"alarm", true, true}};
 
-/// "point, station, line, transaction and discovery"
+/// "point, station, line, transaction, discovery and alarm"
 std::string known_types() {
     std::string text;
     for (const Kind& kind : kKinds) {

@@ -94,7 +94,12 @@ constexpr Row kRows[] = {
     {"GET", "/api/v1/stations/{}/points", get_points, kSee, kShowsStation, kTagged, "raw"},
     {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee, kShowsPoint, kMayAsk, "raw"},
     {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange, kShowsNone, kWrites, "round"},
-    {"GET", "/api/v1/stations/{}/points/{}/history", get_point_history, kSee, kShowsPoint},
+    {"GET", "/api/v1/stations/{}/points/{}/history", get_point_history, kSee, kShowsPoint, kPlain,
+     "from to step"},
+    {"GET", "/api/v1/alarms", get_alarms, kSee, kShowsNone, kTagged},
+    {"POST", "/api/v1/alarms/{}/acknowledge", post_acknowledge, kChange, kShowsNone, kOnce},
+    {"GET", "/api/v1/journal", get_journal, kSee, kShowsNone, kPlain,
+     "since until kind station limit after"},
     {"GET", "/api/v1/stations/{}/{}/{}/interpretations", get_interpretations, kSee, kShowsStation,
      kAsks, "count"},
     // Before the table routes: "devices" is not a table.
@@ -111,6 +116,7 @@ constexpr Row kRows[] = {
 /// The right that a role of the configuration needs for the route.
 Right right_for(const Row& row) {
     if (row.needed == kSee) return Right::read;
+    if (row.pattern.ends_with("/acknowledge")) return Right::acknowledge;
     if (row.needed == kChange) return Right::write;
     if (row.needed == kAdmin) return Right::reload;
     if (row.pattern.ends_with("/raw")) return Right::raw;

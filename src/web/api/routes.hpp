@@ -64,6 +64,13 @@ Handling get_all_points(HttpRequest request, const Api* api);
 Handling get_point(HttpRequest request, const Api* api);
 Handling put_point(HttpRequest request, const Api* api);
 Handling get_point_history(HttpRequest request, const Api* api);
+/// The history of a point over days, as the store has it.
+Handling get_days(HttpRequest request, const Api* api);
+/// True if a request for a point's history asks the store: it names from, to or step.
+bool asks_for_days(const HttpRequest& request);
+Handling get_journal(HttpRequest request, const Api* api);
+Handling get_alarms(HttpRequest request, const Api* api);
+Handling post_acknowledge(HttpRequest request, const Api* api);
 Handling get_table_plan(HttpRequest request, const Api* api);
 Handling get_device_plan(HttpRequest request, const Api* api);
 Handling get_interpretations(HttpRequest request, const Api* api);

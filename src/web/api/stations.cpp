@@ -160,6 +160,10 @@ WallClock wall_of(const Api& api) { return {api.providers.now(), api.providers.w
 }  // namespace
 
 Handling get_point_history(HttpRequest request, const Api* api) {
+    if (asks_for_days(request)) {
+        Handling days = get_days(std::move(request), api);
+        co_return co_await std::move(days);
+    }
     const auto found =
         find_point(*api->directory, request.arguments[0], request.arguments[1]).value();
     const points::StationHistory* history = found.station.history;

@@ -63,8 +63,8 @@ export const remove = (path) => ask('DELETE', path);
 export const post = (path, body) => ask('POST', path, body);
 
 /** An answer as a file, for a link carries no token. */
-export async function getFile(target) {
-    const response = await send(target);
+export async function getFile(target, accept) {
+    const response = await send(target, accept ? {headers: {Accept: accept}} : {});
     return response.ok ? response.blob() : parsedOf(response);
 }
 
@@ -99,6 +99,7 @@ export function offers(pattern) {
 
 const may = (right) => gateway.rights.includes(right);
 export const mayWrite = () => may('write');
+export const mayAcknowledge = () => may('acknowledge');
 export const mayDiscover = () => may('discover');
 /** May set faults of simulated panels. */
 export const maySimulate = () => may('simulator');

@@ -1,9 +1,12 @@
 // The page: what is shown where, in which language and theme.
+import {alarms, alarmsView} from './alarms.js';
 import {forgetToken, gateway, hasToken, introduce, offers} from './api.js';
 import {attribute, choice, h, replace, text} from './dom.js';
 import {language, languages, store, stored, t} from './language.js';
 import {discoveryView} from './discovery.js';
 import {helpLink} from './help.js';
+import {historyView} from './history.js';
+import {journalView} from './journal.js';
 import {latencyView} from './latency.js';
 import {live} from './live.js';
 import {overviewView, tone} from './overview.js';
@@ -15,14 +18,15 @@ import {settingsView} from './settings.js';
 import {stationView} from './station.js';
 import {roleButton, signIn} from './token.js';
 
-const VIEWS = {'': overviewView, scope: scopeView, latency: latencyView, points: pointsView, relays: relaysView,
+const VIEWS = {'': overviewView, alarms: alarmsView, journal: journalView, history: historyView, scope: scopeView, latency: latencyView, points: pointsView, relays: relaysView,
     clients: clientsView, request: requestView, discovery: discoveryView, settings: settingsView, station: stationView};
-const NAMED = {'': 'overview', scope: 'scope', latency: 'latency', points: 'points', relays: 'relays', clients: 'clients',
+const NAMED = {'': 'overview', alarms: 'alarms', journal: 'journal', history: 'history', scope: 'scope', latency: 'latency', points: 'points', relays: 'relays', clients: 'clients',
     request: 'request', discovery: 'discovery', settings: 'settings'};
 /** Sections of the manual's page on this page: what the view is called in English. */
 const EXPLAINED = {...NAMED, '': 'overview', scope: 'bus-scope', settings: 'configuration', station: 'a-station'};
 /** Views that a gateway may not have the paths for. */
-const NEEDS = {discovery: 'POST /api/v1/lines/{}/discover'};
+const NEEDS = {alarms: 'GET /api/v1/alarms', journal: 'GET /api/v1/journal', history: 'GET /api/v1/journal',
+    discovery: 'POST /api/v1/lines/{}/discover'};
 const THEMES = ['auto', 'light', 'dark'];
 
 const main = document.getElementById('main');
@@ -64,8 +68,11 @@ function build() {
 /** A tab that nobody looks at says how many do not answer. */
 function entitle() {
     const silent = live.stations.filter((station) => tone(station.state) === 'bad').length;
+    const waiting = alarms.waiting.length;
     const name = `${main.querySelector('h1')?.textContent.trim() ?? ''} · panelgate`;
-    document.title = silent > 0 ? `⚠ ${silent} · ${name}` : name;
+    document.title = silent + waiting > 0 ? `⚠ ${silent + waiting} · ${name}` : name;
+    const link = document.querySelector('#nav a[data-view="alarms"]');
+    if (link) text(link, waiting > 0 ? `${t('nav.alarms')} (${waiting})` : t('nav.alarms'));
 }
 
 function show() {
@@ -129,6 +136,8 @@ async function start() {
     live.addEventListener('status', refresh);
     live.addEventListener('refused', () => location.reload());
     live.start();
+    alarms.addEventListener('change', entitle);
+    alarms.start();
     window.addEventListener('hashchange', () => { show(); main.focus(); });
     document.addEventListener('role', show);
     show();

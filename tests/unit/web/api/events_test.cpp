@@ -113,7 +113,7 @@ TEST_F(ApiEvents, AreOfWhatThereIs) {
                 {"point=oil", "types=line&station=press", "types=line,station&point=press/oil"});
     expect_gets(events_of, {{"types=line,bus", 400,
                              "there is no event 'bus'; types are point, station, line, "
-                             "transaction and discovery"}});
+                             "transaction, discovery and alarm"}});
 }
 
 TEST_F(ApiEvents, GoOnForWhoComesBackWithTheLastId) {

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panelgate/alarms/alarms.hpp"
+#include "panelgate/gateway/journal.hpp"
+#include "panelgate/gateway/plant.hpp"
+#include "panelgate/rt/clock.hpp"
+#include "panelgate/web/api/sources.hpp"
+
+namespace panelgate::gateway {
+
+/// Watches the alarms' conditions: values as they are read, all else once a second. Changes go into
+/// the journal, states into the store, so that both outlive a restart. An object of the plant's
+/// loop.
+class AlarmDesk : public web::AlarmSource {
+  public:
+    using Listener = std::function<void(const alarms::Change&)>;
+
+    /// Clock and journal outlive the desk. `tell` gets each change.
+    AlarmDesk(rt::Clock& clock, Journal& journal, Listener tell);
+    AlarmDesk(const AlarmDesk&) = delete;
+    AlarmDesk& operator=(const AlarmDesk&) = delete;
+
+    /// Watches these alarms of this plant from now on. The first time their states are read from
+    /// the store; nothing is watched before.
+    void apply(const std::vector<alarms::Settings>& settings, std::shared_ptr<const Plant> plant);
+    void stop() { alarm_->cancel(); }
+    /// Values of the points among these wants of the station's polls.
+    void on_points(const Station& station, const std::vector<std::size_t>& wants);
+
+    std::vector<web::AlarmView> list() const override;
+    Acknowledged acknowledge(const std::string& name, const std::string& who) override;
+
+  private:
+    alarms::Alarms::Time time() const;
+    void restore(const std::vector<std::pair<std::string, std::string>>& kept);
+    void look();
+    bool is_finding(std::string_view cause) const;
+    std::optional<alarms::Change> look_at(std::size_t alarm);
+    void on_change(const std::optional<alarms::Change>& change);
+
+    rt::Clock& clock_;
+    Journal& journal_;
+    Listener tell_;
+    std::unique_ptr<rt::Alarm> alarm_;
+    std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+    alarms::Alarms alarms_;
+    std::shared_ptr<const Plant> plant_;
+    std::multimap<std::string, std::size_t> by_point_;  ///< alarms by "STATION/POINT"
+    bool asked_ = false;                                ///< the store was asked for states
+    bool ready_ = false;                                ///< ... and has answered
+};
+
+}  // namespace panelgate::gateway

@@ -1,0 +1,187 @@
+// Alarms: their rows, and what an alarm can be of.
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "tables.hpp"
+
+namespace panelgate::config {
+
+namespace {
+
+using alarms::Settings;
+using yaml::Node;
+
+constexpr Duration kLongest = 24h;
+
+/// STATION/POINT
+bool read_point(Reader& in, Settings& alarm) {
+    const auto text = in.text("point");
+    if (!text) return false;
+    const std::size_t slash = text->find('/');
+    if (slash == text->npos || slash == 0 || slash + 1 == text->size()) {
+        in.problem("point", "point must be STATION/POINT such as oven/temperature, not " +
+                                yaml::quote(*text));
+        return false;
+    }
+    alarm.station = text->substr(0, slash);
+    alarm.point = text->substr(slash + 1);
+    return true;
+}
+
+/// A number that an alarm may lack.
+Keys<Settings> number(Keys<Settings>&& keys, std::string_view key,
+                      std::optional<double> Settings::* member, std::string_view text) {
+    return std::move(keys).value(
+        shape_of(key, Kind::number, text),
+        [=](Reader& in, Settings& into) {
+            into.*member = read_exact(in, key);
+            return (into.*member).has_value();
+        },
+        [=](const Settings& of) { return as_written(of.*member); });
+}
+
+template <class List, class Name>
+std::vector<std::string_view> names_in(const List& list, Name name) {
+    std::vector<std::string_view> names;
+    for (const auto& one : list) names.push_back(std::invoke(name, one));
+    return names;
+}
+
+const Station* find_station(const Config& config, std::string_view name) {
+    for (const Line& line : config.lines)
+        for (const Station& station : line.stations)
+            if (station.name == name) return &station;
+    return nullptr;
+}
+
+void check_station(Reader& in, const Settings& alarm) {
+    const Loading& loading = in.loading;
+    const std::string_view key = alarm.point.empty() ? "station" : "point";
+    const Station* const station = find_station(loading.config, alarm.station);
+    if (station == nullptr) {
+        const std::vector<std::string_view> names(loading.station_names.begin(),
+                                                  loading.station_names.end());
+        if (!loading.names_missing) in.problem(key, yaml::no_such("station", alarm.station, names));
+    } else if (!alarm.point.empty() &&
+               std::ranges::find(station->points, alarm.point, &points::Point::name) ==
+                   station->points.end()) {
+        in.problem(key, yaml::no_such("point of " + alarm.station, alarm.point,
+                                      names_in(station->points, &points::Point::name)));
+    }
+}
+
+void check_place(Reader& in, const Settings& alarm) {
+    const std::vector<Line>& lines = in.loading.config.lines;
+    if (!alarm.station.empty()) check_station(in, alarm);
+    if (!alarm.line.empty() && std::ranges::find(lines, alarm.line, &Line::name) == lines.end())
+        in.problem("line", yaml::no_such("line", alarm.line, names_in(lines, &Line::name)));
+}
+
+/// A condition belongs to what it is a condition of.
+struct PlacedCondition {
+    std::string_view key;
+    std::string_view of;
+    bool is_given = false;
+};
+
+std::vector<PlacedCondition> conditions_of(const Settings& alarm) {
+    std::vector<PlacedCondition> given{
+        {"above", "point", alarm.above.has_value()},   {"below", "point", alarm.below.has_value()},
+        {"equals", "point", alarm.equals.has_value()}, {"stale", "point", alarm.stale},
+        {"offline", "station", alarm.offline},         {"down", "line", alarm.down},
+        {"finding", "", !alarm.finding.empty()}};
+    std::erase_if(given, [](const PlacedCondition& one) { return !one.is_given; });
+    return given;
+}
+
+void check_condition(Reader& in, const Settings& alarm) {
+    const std::vector<PlacedCondition> given = conditions_of(alarm);
+    if (given.size() != 1)
+        return in.problem("name",
+                          "an alarm has one condition: above, below, equals or stale of a point, "
+                          "offline of a station, down of a line, or finding");
+    const std::string key(given.front().key);
+    for (const std::string_view place : {"point", "station", "line"}) {
+        const bool fits = given.front().of == place;
+        const std::string name(place);
+        if (fits && !in.has(place))
+            in.problem(key,
+                       key + " is a condition of a " + name + ": say which, by the key " + name);
+        if (!fits && in.has(place)) in.problem(place, name + " does not go with " + key);
+    }
+    const bool wrong = alarm.back && ((alarm.above && *alarm.back > *alarm.above) ||
+                                      (alarm.below && *alarm.back < *alarm.below));
+    if (wrong || (alarm.back && !alarm.above && !alarm.below))
+        in.problem("back", "back is where the alarm ends: below `above`, or above `below`");
+}
+
+}  // namespace
+
+std::optional<Settings> load_alarm(Reader& root, const Node& node) {
+    Reader in(root.loading, node, "an alarm", "{name: hot, point: oven/temperature, above: 80}");
+    Settings alarm;
+    alarm_keys().read(in, alarm);
+    check_unique(in, "alarm", alarm.name);
+    check_condition(in, alarm);
+    check_place(in, alarm);
+    in.finish();
+    return alarm;
+}
+
+const Keys<Settings>& alarm_keys() {
+    static constexpr Words<std::string_view, 4> kSeverities{
+        {{"low", "low"}, {"medium", "medium"}, {"high", "high"}, {"urgent", "urgent"}}};
+    static const auto kKeys = [] {
+        auto keys =
+            Keys<Settings>()
+                .text("name", &Settings::name, name_form(), "Name of the alarm; unique.")
+                .required()
+                .example("oven-hot")
+                .value(text_shape("point", {"^[^/]+/."}, "STATION/POINT that is watched."),
+                       read_point,
+                       [](const Settings& of) {
+                           return of.point.empty() ? "" : of.station + '/' + of.point;
+                       })
+                .example("oven/temperature")
+                .value(
+                    text_shape("station", {}, "Station that may be offline."),
+                    [](Reader& in, Settings& into) {
+                        const auto name = in.text("station");
+                        if (name) into.station = *name;
+                        return name.has_value();
+                    },
+                    [](const Settings& of) { return of.point.empty() ? of.station : ""; })
+                .example("press")
+                .text("line", &Settings::line, {}, "Line that may be down.")
+                .example("floor1")
+                .text("finding", &Settings::finding, {"^[a-z][a-z0-9-]*$"},
+                      "Cause of a finding of the line doctor, or any.")
+                .example("any")
+                .boolean("stale", &Settings::stale, "The point's value is too old or unreadable.")
+                .boolean("offline", &Settings::offline, "The station does not answer.")
+                .boolean("down", &Settings::down, "The line cannot be opened.");
+        keys = number(std::move(keys), "above", &Settings::above, "Raised above this value.")
+                   .example("80");
+        keys = number(std::move(keys), "below", &Settings::below, "Raised below this value.")
+                   .example("10");
+        keys = number(std::move(keys), "equals", &Settings::equals, "Raised at this value.")
+                   .example("3");
+        keys = number(std::move(keys), "back", &Settings::back,
+                      "Value at which it ends; without it the limit itself.")
+                   .example("78");
+        return std::move(keys)
+            .duration("for", &Settings::delay, 0ms, kLongest,
+                      "How long the condition must hold before it is raised.")
+            .word("severity", &Settings::severity, kSeverities, "How bad it is.")
+            .text("text", &Settings::text, {}, "What operators read; without it the name.")
+            .example("The oven is too hot");
+    }();
+    return kKeys;
+}
+
+}  // namespace panelgate::config

@@ -1,0 +1,193 @@
+#include "panelgate/gateway/alarm_desk.hpp"
+
+#include <algorithm>
+#include <boost/json/parse.hpp>
+#include <boost/json/serialize.hpp>
+#include <utility>
+
+#include "panelgate/points/station_points.hpp"
+#include "panelgate/rt/log.hpp"
+
+namespace panelgate::gateway {
+
+namespace json = boost::json;
+
+namespace {
+
+constexpr Duration kAlarmLook = 1s;
+constexpr std::string_view kAlarmKey = "alarm/";
+
+store::Kind kind_of(alarms::Change::Kind kind) {
+    if (kind == alarms::Change::Kind::raised) return store::Kind::alarm_raised;
+    if (kind == alarms::Change::Kind::cleared) return store::Kind::alarm_cleared;
+    return store::Kind::alarm_acknowledged;
+}
+
+std::string text_of(const alarms::Settings& alarm) {
+    return alarm.text.empty() ? alarm.name : alarm.text;
+}
+
+/// What the store keeps of an alarm; "" of a normal one.
+std::string kept_text(const alarms::Status& status) {
+    if (status.state == alarms::State::normal) return {};
+    json::object kept;
+    kept["state"] = alarms::label(status.state);
+    kept["since"] = status.since.time_since_epoch().count();
+    kept["by"] = status.by;
+    if (status.value) kept["value"] = *status.value;
+    return json::serialize(kept);
+}
+
+/// Nothing if the text is none of kept_text().
+std::optional<alarms::Status> parse_kept(const std::string& text) {
+    boost::system::error_code wrong;
+    const json::value value = json::parse(text, wrong);
+    const auto* const kept = wrong ? nullptr : value.if_object();
+    if (kept == nullptr) return std::nullopt;
+    try {
+        alarms::Status status;
+        status.state = alarms::state_of(kept->at("state").as_string()).value();
+        status.since = WallTime(WallTime::duration(kept->at("since").as_int64()));
+        status.by = kept->at("by").as_string();
+        if (const auto* number = kept->if_contains("value"))
+            status.value = number->to_number<double>();
+        return status;
+    } catch (const std::exception&) {
+        return std::nullopt;
+    }
+}
+
+std::string point_of(const alarms::Settings& alarm) { return alarm.station + '/' + alarm.point; }
+
+std::optional<double> value_of(const Station& station, const points::Point& point, TimePoint now) {
+    const points::PointReading reading = station.points->read(point, now);
+    if (!reading.value || reading.quality != points::Quality::good) return std::nullopt;
+    return points::number_of(*reading.value);
+}
+
+}  // namespace
+
+AlarmDesk::AlarmDesk(rt::Clock& clock, Journal& journal, Listener tell)
+    : clock_(clock), journal_(journal), tell_(std::move(tell)), alarm_(clock.make_alarm()) {}
+
+alarms::Alarms::Time AlarmDesk::time() const { return {clock_.now(), rt::wall_now()}; }
+
+void AlarmDesk::apply(const std::vector<alarms::Settings>& settings,
+                      std::shared_ptr<const Plant> plant) {
+    plant_ = std::move(plant);
+    alarms_.apply(settings);
+    by_point_.clear();
+    for (std::size_t i = 0; i < alarms_.size(); ++i)
+        if (!alarms_.settings(i).point.empty()) by_point_.emplace(point_of(alarms_.settings(i)), i);
+    if (asked_) return;
+    asked_ = true;
+    using Kept = std::vector<std::pair<std::string, std::string>>;
+    const auto kept = std::make_shared<Kept>();
+    journal_.ask(
+        [kept](const store::Database* from) {
+            if (from != nullptr) *kept = from->kept(kAlarmKey);
+        },
+        [this, kept, life = std::weak_ptr(alive_)] {
+            if (!life.expired()) restore(*kept);
+        });
+}
+
+void AlarmDesk::restore(const std::vector<std::pair<std::string, std::string>>& kept) {
+    for (const auto& [key, text] : kept)
+        if (auto status = parse_kept(text))
+            alarms_.restore(std::string_view(key).substr(kAlarmKey.size()), std::move(*status));
+    ready_ = true;
+    look();
+}
+
+/// Looks at every alarm's condition, and at delays that have passed.
+void AlarmDesk::look() {
+    for (std::size_t i = 0; i < alarms_.size(); ++i) on_change(look_at(i));
+    for (const alarms::Change& change : alarms_.on_time(time())) on_change(change);
+    alarm_->arm(clock_.now() + kAlarmLook, [this] { look(); });
+}
+
+bool AlarmDesk::is_finding(std::string_view cause) const {
+    return std::ranges::any_of(plant_->lines(), [&](const Line& line) {
+        const auto findings = line.bus->status().findings;
+        return std::ranges::any_of(findings, [&](const bus::LineFinding& finding) {
+            return cause == "any" || finding.cause == cause;
+        });
+    });
+}
+
+std::optional<alarms::Change> AlarmDesk::look_at(std::size_t alarm) {
+    const alarms::Settings& of = alarms_.settings(alarm);
+    if (!of.finding.empty()) return alarms_.on_condition(alarm, time(), is_finding(of.finding));
+    if (of.down) {
+        const auto line = std::ranges::find(plant_->lines(), of.line,
+                                            [](const Line& one) { return one.configured->name; });
+        const bool down = line != plant_->lines().end() && !line->bus->status().up;
+        return alarms_.on_condition(alarm, time(), down);
+    }
+    const Station* const station = plant_->find(of.station);
+    if (station == nullptr) return std::nullopt;
+    if (of.offline) {
+        const auto health = station->bus->station_status(station->id).state;
+        return alarms_.on_condition(alarm, time(), health == Health::offline);
+    }
+    if (!station->points) return std::nullopt;
+    const auto& points = station->points->points();
+    const auto point = std::ranges::find(points, of.point, &points::Point::name);
+    if (point == points.end()) return std::nullopt;
+    return alarms_.on_value(alarm, time(), value_of(*station, *point, clock_.now()));
+}
+
+void AlarmDesk::on_points(const Station& station, const std::vector<std::size_t>& wants) {
+    if (!ready_ || by_point_.empty() || !station.points) return;
+    for (const std::size_t want : wants) {
+        const points::Point* const point = station.points->point_of(want);
+        if (point == nullptr) continue;
+        const auto [first, last] = by_point_.equal_range(station.name + '/' + point->name);
+        for (auto at = first; at != last; ++at)
+            on_change(
+                alarms_.on_value(at->second, time(), value_of(station, *point, clock_.now())));
+    }
+}
+
+void AlarmDesk::on_change(const std::optional<alarms::Change>& change) {
+    if (!change) return;
+    const alarms::Settings& alarm = *change->alarm;
+    store::Entry entry;
+    entry.kind = kind_of(change->kind);
+    entry.severity = alarm.severity;
+    entry.station = alarm.station;
+    entry.point = alarm.point;
+    entry.line = alarm.line;
+    if (const Station* const station = plant_->find(alarm.station)) entry.line = station->line;
+    entry.text = text_of(alarm);
+    if (change->kind == alarms::Change::Kind::acknowledged) entry.who = change->now.by;
+    json::object data;
+    data["alarm"] = alarm.name;
+    if (change->now.value) data["value"] = *change->now.value;
+    entry.data = json::serialize(data);
+    journal_.add(std::move(entry));
+    journal_.keep(std::string(kAlarmKey) + alarm.name, kept_text(change->now));
+    tell_(*change);
+}
+
+std::vector<web::AlarmView> AlarmDesk::list() const {
+    std::vector<web::AlarmView> list;
+    for (std::size_t i = 0; i < alarms_.size(); ++i) {
+        const alarms::Settings& of = alarms_.settings(i);
+        const Station* const station = plant_->find(of.station);
+        list.push_back({of, alarms_.status(i), station != nullptr ? station->line : of.line});
+    }
+    return list;
+}
+
+web::AlarmSource::Acknowledged AlarmDesk::acknowledge(const std::string& name,
+                                                      const std::string& who) {
+    if (!alarms_.find(name)) return Acknowledged::unknown;
+    const auto change = alarms_.acknowledge(time(), name, who);
+    if (!change) return Acknowledged::nothing;
+    on_change(change);
+    return Acknowledged::done;
+}
+
+}  // namespace panelgate::gateway

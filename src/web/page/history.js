@@ -1,0 +1,119 @@
+// Values of days: several points in one plot, with least and greatest values as a band.
+import {get, path} from './api.js';
+import {choice, h, text} from './dom.js';
+import {download} from './download.js';
+import {dayTime, number, t} from './language.js';
+import {live} from './live.js';
+import {colour, library} from './plot.js';
+
+const HOUR = 3600000;  // ms
+const SPANS = [['1', '1 h'], ['8', '8 h'], ['24', '1 d'], ['168', '7 d'], ['720', '30 d']];
+const COLOURS = ['c0', 'c1', 'c2', 'c3'];
+const MOST = COLOURS.length;  // points of a plot
+const STEPS = 500;
+
+/** A multiple of 10 s, so that a span has some 500 steps. */
+const stepOf = (span) => Math.max(10, Math.ceil(span / 1000 / STEPS / 10) * 10);
+
+/** Rows of the plot: [Date, [min, mean, max], ...]; a step that a point lacks is a gap. */
+function rowsOf(all, step) {
+    const times = new Map();
+    all.forEach(({samples}, index) => samples.forEach((one) => {
+        const at = Date.parse(one.time);
+        if (!times.has(at)) times.set(at, all.map(() => [null, null, null]));
+        times.get(at)[index] = [one.min, one.mean, one.max];
+    }));
+    const rows = [];
+    let before = null;
+    for (const at of [...times.keys()].sort((a, b) => a - b)) {
+        if (before !== null && at - before > step * 1500) rows.push([new Date(before + step * 1000), ...all.map(() => [null, null, null])]);
+        rows.push([new Date(at), ...times.get(at)]);
+        before = at;
+    }
+    return rows;
+}
+
+/** Alarms and writes as lines from top to foot. */
+function marks(canvas, area, graph, entries) {
+    for (const entry of entries) {
+        const x = graph.toDomXCoord(Date.parse(entry.time));
+        if (x < area.x || x > area.x + area.w) continue;
+        canvas.fillStyle = colour(entry.kind === 'write' ? 'muted' : 'bad');
+        canvas.fillRect(x, area.y, 1, area.h);
+    }
+}
+
+export function historyView({argument, detail}) {
+    let span = 24 * HOUR;
+    let graph = null;
+    let ended = false;
+    let entries = [];
+    const names = [];
+    const chosen = new Set(argument && detail ? [`${argument}/${detail}`] : []);
+    const box = h('div', {class: 'plot tall', role: 'img', 'aria-label': t('nav.history')});
+    const said = h('p', {class: 'muted plot-values'});
+    const picks = h('fieldset', {class: 'picks'}, h('legend', null, t('history.points', {count: MOST})));
+    const none = h('p', {class: 'empty', hidden: true}, t('history.none'));
+    const failed = h('p', {class: 'problem', hidden: true});
+    const files = h('span');
+
+    const say = (at, values) => said.replaceChildren(at === null ? '' : `${dayTime(at)} `, ...[...chosen].map((name, i) => h('span', {class: `tone ${COLOURS[i]}`},
+        `${name} ${values[i] === null || values[i] === undefined ? '–' : number(values[i], 3)}`)));
+    const draw = async (all, step) => {
+        const Dygraph = await library();
+        const rows = rowsOf(all, step);
+        if (ended) return;
+        graph?.destroy();
+        graph = null;
+        none.hidden = rows.length > 0 || chosen.size === 0;
+        say(null, rows.at(-1)?.slice(1).map((one) => one[1]) ?? []);
+        if (rows.length < 2) return;
+        graph = new Dygraph(box, rows, {labels: ['t', ...chosen], colors: COLOURS.map(colour), customBars: true, strokeWidth: 1.5, fillAlpha: 0.25,
+            axisLineColor: colour('border'), gridLineColor: colour('border'), animatedZooms: false, showRangeSelector: true, rangeSelectorHeight: 30,
+            axes: {y: {axisLabelFormatter: (v) => number(v, 2), axisLabelWidth: 46}},
+            underlayCallback: (canvas, area, drawn) => marks(canvas, area, drawn, entries),
+            highlightCallback: (event, x, points) => say(x, points.map((point) => point.yval))});
+        for (const handle of box.querySelectorAll('img')) handle.alt = '';
+        box.dataset.rows = rows.length;
+    };
+    const read = async () => {
+        const step = stepOf(span);
+        const now = Date.now();
+        const query = `?from=${new Date(now - span).toISOString()}&step=${step}s`;
+        const target = (name) => path('stations', name.slice(0, name.indexOf('/')), 'points', name.slice(name.indexOf('/') + 1), 'history') + query;
+        files.replaceChildren(...[...chosen].map((name) => h('span', null, ' ', download(target(name), `${name.replace('/', '-')}.csv`, `CSV ${name}`, {}, 'text/csv'))));
+        try {
+            const kinds = `?kind=write,alarm_raised,alarm_cleared&limit=500&since=${new Date(now - span).toISOString()}`;
+            const [journal, ...all] = await Promise.all([get(path('journal') + kinds), ...[...chosen].map((name) => get(target(name)))]);
+            entries = journal.entries.filter((entry) => [...chosen].some((name) => name === `${entry.station}/${entry.point}`));
+            failed.hidden = true;
+            await draw(all, step);
+        } catch (error) {
+            failed.hidden = error.status === 0;
+            text(failed, error.message);
+        }
+    };
+    const pick = (name, input) => {
+        if (input.checked) chosen.add(name);
+        else chosen.delete(name);
+        for (const other of picks.querySelectorAll('input')) other.disabled = chosen.size >= MOST && !other.checked;
+        read();
+    };
+    const spans = choice(t('history.span'), SPANS, '24', (hours) => { span = Number(hours) * HOUR; read(); });
+    const learn = async () => {
+        for (const station of live.stations) {
+            const {points} = await get(path('stations', station.name, 'points'));
+            for (const point of points) if (point.type !== 'string') names.push(`${station.name}/${point.name}`);
+        }
+        if (chosen.size === 0 && names.length > 0) chosen.add(names[0]);
+        picks.append(...names.map((name) => {
+            const input = h('input', {type: 'checkbox', checked: chosen.has(name), onchange: () => pick(name, input)});
+            return h('label', {class: 'tick'}, input, ' ', name);
+        }));
+        read();
+    };
+    learn().catch(() => { /* the bar above the page says it */ });
+    const timer = setInterval(() => document.hidden || span > 8 * HOUR || read(), 30000);
+    return {node: h('div', null, h('h1', null, t('nav.history')), h('div', {class: 'bar'}, h('label', null, t('history.span'), ' ', spans), files), failed, box, said, none, picks),
+        stop: () => { ended = true; clearInterval(timer); graph?.destroy(); }};
+}
