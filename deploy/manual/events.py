@@ -94,6 +94,8 @@ MEANINGS = {
     "store fails": "the file of events and history takes nothing: what comes is lost until `store writes`",
     "store file": "the file of events and history was damaged and is kept, and a new one begins",
     "store writes": "the file of events and history takes events and values again",
+    "webhook answers": "the webhook of alarms takes them again",
+    "webhook fails": "the webhook of alarms took nothing; it is asked again, up to once a minute",
     "station has become slow": "a panel thinks nearly as long as its timeout",
     "station offline": "a panel is silent; it is probed now and then",
     "station online": "a panel answers again",

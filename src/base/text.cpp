@@ -286,4 +286,10 @@ std::string_view trimmed(std::string_view text) {
     return text.substr(begin, text.find_last_not_of(kBlank) + 1 - begin);
 }
 
+std::string printable(std::string_view text) {
+    std::string made = as_utf8(text);
+    std::ranges::replace_if(made, is_control, '?');
+    return made;
+}
+
 }  // namespace panelgate

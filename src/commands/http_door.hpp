@@ -1,7 +1,5 @@
 #pragma once
 
-#include <boost/asio/any_io_executor.hpp>
-#include <boost/system/error_code.hpp>
 #include <cstddef>
 #include <functional>
 #include <optional>
@@ -13,6 +11,7 @@
 #include "panelgate/base/time.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/tls/stream.hpp"
+#include "panelgate/web/http/client.hpp"
 
 namespace panelgate::commands {
 
@@ -38,26 +37,10 @@ struct HttpDoor {
 /// `options.ca`. If the default file does not exist, the default door, which `panelgate demo` has.
 std::variant<HttpDoor, NoHttpDoor> http_door(const GatewayOptions& options);
 
-/// A gateway's reply to an HTTP request: the raw text including its head.
-struct HttpReply {
-    std::string text;
-    boost::system::error_code error;  ///< why reading ended; no error also after a timeout
-    std::string refused{};            ///< why there is no TLS, in words
-    bool secure = false;              ///< the handshake of TLS was done
+using web::first_line;
+using web::HttpReply;
 
-    bool is_http() const { return text.starts_with("HTTP/1."); }
-    /// "200 OK" of the status line (RFC 9112, 4); safe for a terminal.
-    std::string status() const;
-    /// The body; empty before the head is complete.
-    std::string_view body() const;
-    /// Why there was no reply at all, in words.
-    std::string failure() const;
-};
-/// The first line of `text`, safe for a terminal.
-std::string first_line(std::string_view text);
-
-/// Sends a request over a new connection and reads until `enough`, `most` bytes, the end of the
-/// connection, or `patience` is over.
+/// As web::ask().
 HttpReply ask(const HttpDoor& door, const std::string& request, Duration patience, std::size_t most,
               const std::function<bool(const HttpReply&)>& enough);
 

@@ -47,12 +47,6 @@ bool wants_colours(bool is_terminal, const char* no_color, const char* term) {
     return term == nullptr || std::string_view(term) != "dumb";
 }
 
-std::string printable(std::string_view text) {
-    std::string made = as_utf8(text);
-    std::ranges::replace_if(made, is_control, '?');
-    return made;
-}
-
 std::size_t width_of(std::string_view text) {
     return static_cast<std::size_t>(std::ranges::count_if(
         text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));

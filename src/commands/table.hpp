@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/base/text.hpp"
+
 namespace panelgate::commands {
 
 enum class Colour : std::uint8_t { none, good, warning, bad, heading };
@@ -42,8 +44,6 @@ class TextTable {
 std::string painted(const std::string& text, Colour colour, bool coloured);
 /// Colours are for terminals, and not for who has set NO_COLOR (no-color.org) or has a dumb one.
 bool wants_colours(bool is_terminal, const char* no_color, const char* term);
-/// Text of another program for a terminal: UTF-8, control characters as '?'.
-std::string printable(std::string_view text);
 /// Characters of UTF-8.
 std::size_t width_of(std::string_view text);
 

@@ -133,6 +133,31 @@ std::optional<Settings> load_alarm(Reader& root, const Node& node) {
     return alarm;
 }
 
+const Keys<alarms::WebhookSettings>& webhook_keys() {
+    using alarms::WebhookSettings;
+    using Format = WebhookSettings::Format;
+    static constexpr Words<Format, 2> kFormats{
+        {{"alertmanager", Format::alertmanager}, {"json", Format::json}}};
+    const auto fault = [](std::string_view typed) {
+        return alarms::parse_url(typed) ? std::string()
+                                        : "url must be http://HOST:PORT/PATH such as "
+                                          "http://alertmanager:9093/api/v2/alerts, not " +
+                                              yaml::quote(typed);
+    };
+    static const auto kKeys =
+        Keys<WebhookSettings>()
+            .text("url", &WebhookSettings::url, {"^http://.", false, 0, fault},
+                  "Where changes of alarms are posted to; plain HTTP.")
+            .required()
+            .example("http://127.0.0.1:9093/api/v2/alerts")
+            .word("format", &WebhookSettings::format, kFormats,
+                  "alertmanager: what is active, again and again, and each end. json: each change "
+                  "once.")
+            .duration("every", &WebhookSettings::every, 1s, 1h,
+                      "With alertmanager: how often what is active is told again.");
+    return kKeys;
+}
+
 const Keys<Settings>& alarm_keys() {
     static constexpr Words<std::string_view, 4> kSeverities{
         {{"low", "low"}, {"medium", "medium"}, {"high", "high"}, {"urgent", "urgent"}}};

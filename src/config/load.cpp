@@ -269,6 +269,12 @@ const Keys<Config>& root_keys() {
             .maps("alarms", &Config::alarms, alarm_keys,
                   "[{name: hot, point: oven/temperature, above: 80}]", alarms::Settings::kMost,
                   load_alarm, &alarms::Settings::name, "What operators are told of at once.")
+            .below(
+                shape_of("alarm_webhook", Kind::map, "Where changes of alarms are posted to."),
+                []() -> const Table& { return webhook_keys(); },
+                optional_section("alarm_webhook", "{url: http://127.0.0.1:9093/api/v2/alerts}",
+                                 &Config::webhook, webhook_keys),
+                shown_section("alarm_webhook", &Config::webhook, webhook_keys))
             .map("store", &Config::store, store_keys, "{days: 30}",
                  "Events and history of days, in one file.");
     return kKeys;

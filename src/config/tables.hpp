@@ -69,6 +69,7 @@ const Keys<mqtt::Settings>& mqtt_keys();
 const Keys<audit::Settings>& audit_keys();
 const Keys<store::Settings>& store_keys();
 const Keys<alarms::Settings>& alarm_keys();
+const Keys<alarms::WebhookSettings>& webhook_keys();
 const Keys<access::Settings>& access_keys();
 
 // What reads an entry of a list.

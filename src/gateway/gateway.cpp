@@ -18,7 +18,6 @@
 #include "panelgate/gateway/running_line.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/rt/loop.hpp"
-#include "panelgate/web/api/render.hpp"
 #include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::gateway {
@@ -153,6 +152,7 @@ void Gateway::on_points(const std::string& line, std::uint8_t id,
 }
 
 void Gateway::on_alarm(const alarms::Change& change) {
+    hook_.on_change(change);
     const alarms::Settings& alarm = *change.alarm;
     const Station* const station = snapshot_->plant.find(alarm.station);
     const std::string line = station != nullptr ? station->line : alarm.line;
@@ -163,7 +163,7 @@ void Gateway::on_alarm(const alarms::Change& change) {
              {"severity", alarm.severity}});
     if (events_.is_wanted())
         events_.publish({"alarm", line, alarm.station, alarm.point},
-                        web::json_text(web::describe_alarm(alarm, change.now)));
+                        web::json_text(alarms::describe(alarm, change.now)));
 }
 
 /// Existing lines where possible, and new ones.
@@ -311,6 +311,7 @@ void Gateway::record(const web::ReloadVerdict& verdict) {
     if (was_kept) audit_.reload(verdict);
     audit_.apply(snapshot_->config->audit);
     journal_.apply(snapshot_->config->store);
+    hook_.apply(snapshot_->config->webhook);
     alarms_.apply(snapshot_->config->alarms, plant_in(snapshot_));
     if (!was_kept) audit_.reload(verdict);
 }
@@ -357,6 +358,7 @@ void Gateway::start() {
     audit_.apply(snapshot_->config->audit);
     journal_.apply(snapshot_->config->store);
     audit_.on_record([this](const audit::Members& record) { journal_.on_record(record); });
+    hook_.apply(snapshot_->config->webhook);
     alarms_.apply(snapshot_->config->alarms, plant_in(snapshot_));
     journal_.add(
         {.kind = store::Kind::start, .text = std::string("panelgate ") + PANELGATE_VERSION});
@@ -407,6 +409,7 @@ void Gateway::stop() {
     for (const auto& line : snapshot_->lines) line->stop();
     audit_.close();
     alarms_.stop();
+    hook_.stop();
     journal_.add({.kind = store::Kind::stop});
     journal_.close();
 }

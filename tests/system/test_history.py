@@ -1,10 +1,14 @@
 """The store: what happened and the values of days, over a restart; alarms over a restart, too."""
 import contextlib
 import csv
+import http.server
 import io
+import json
 import pathlib
+import queue
 import sqlite3
 import tempfile
+import threading
 import unittest
 import urllib.request
 
@@ -157,6 +161,57 @@ class History(unittest.TestCase):
             self.set_point(program, 3)
             self.assertEqual(program.get("/api/v1/journal")[0], 503)
             self.assertIn("panelgate_store_up 0", program.get("/metrics")[1])
+
+    def test_a_webhook_is_told_of_the_alarm_and_of_its_end_also_where_it_was_away(self):
+        with Alertmanager(answers=[500]) as hook:
+            self.file.write_text(self.file.read_text() + f"alarm_webhook: {{url: {hook.url}, every: 1s}}\n")
+            with self.run_gateway() as program:
+                self.set_point(program, 20)
+                self.set_point(program, 50)
+                program.log.wait_for("warn webhook fails .*why=\"?500")
+                program.log.wait_for("info webhook answers")
+                self.assertEqual(hook.wait_for(lambda one: "endsAt" not in one)["labels"]["alertname"], "press-hot")
+                self.set_point(program, 20)
+                self.assertEqual(hook.wait_for(lambda one: "endsAt" in one)["annotations"]["summary"],
+                                 "The press is too hot")
+
+
+class Alertmanager:
+    """Takes alerts as Alertmanager does; `answers`: the first statuses, then 200."""
+
+    def __init__(self, answers):
+        self.alerts = queue.Queue()
+        alerts = self.alerts
+
+        class Handler(http.server.BaseHTTPRequestHandler):
+            def do_POST(self):
+                body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+                status = answers.pop(0) if answers else 200
+                if status == 200:
+                    for one in body:
+                        alerts.put(one)
+                self.send_response(status)
+                self.end_headers()
+
+            def log_message(self, *_):
+                pass
+
+        self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self.url = f"http://127.0.0.1:{self.server.server_address[1]}/api/v2/alerts"
+        threading.Thread(target=self.server.serve_forever, daemon=True).start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.server.shutdown()
+        self.server.server_close()
+
+    def wait_for(self, wanted):
+        while True:
+            one = self.alerts.get(timeout=harness.PATIENCE)
+            if wanted(one):
+                return one
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "panelgate/base/time.hpp"
 
@@ -31,5 +32,27 @@ struct Settings {
 
     friend bool operator==(const Settings&, const Settings&) = default;
 };
+
+/// Where changes of alarms are sent to.
+struct WebhookSettings {
+    enum class Format : std::uint8_t {
+        alertmanager,  ///< all that is active, again and again, and each end
+        json           ///< each change once
+    };
+    std::string url{};  ///< parse_url() takes it
+    Format format = Format::alertmanager;
+    Duration every = 60s;  ///< between two reports of what stays active
+
+    friend bool operator==(const WebhookSettings&, const WebhookSettings&) = default;
+};
+
+/// The parts of "http://alerts.plant:9093/api/v2/alerts".
+struct Url {
+    std::string host{};  ///< without brackets
+    std::uint16_t port = 80;
+    std::string path{};  ///< with its query; begins with '/'
+};
+/// Nothing if the text is no URL of plain HTTP, or names a user.
+std::optional<Url> parse_url(std::string_view text);
 
 }  // namespace panelgate::alarms

@@ -51,4 +51,7 @@ std::string_view trimmed(std::string_view text);
 /// edits, or more than a third of the longer word).
 std::string nearest(std::string_view typed, std::span<const std::string_view> candidates);
 
+/// Text of another program for a terminal: UTF-8, control characters as '?'.
+std::string printable(std::string_view text);
+
 }  // namespace panelgate

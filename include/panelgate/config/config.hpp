@@ -93,6 +93,7 @@ struct Config {
     rt::RealtimeSettings realtime;
     std::optional<audit::Settings> audit{};  ///< empty: nothing is recorded
     std::vector<alarms::Settings> alarms{};
+    std::optional<alarms::WebhookSettings> webhook{};  ///< of alarms
     store::Settings store{};  ///< events and history
     /// Where each line's name stands, by that name.
     std::map<std::string, yaml::Mark> line_marks;

@@ -14,6 +14,7 @@
 #include "panelgate/config/config.hpp"
 #include "panelgate/explain/doors.hpp"
 #include "panelgate/gateway/alarm_desk.hpp"
+#include "panelgate/gateway/alarm_hook.hpp"
 #include "panelgate/gateway/audit_book.hpp"
 #include "panelgate/gateway/certificates.hpp"
 #include "panelgate/gateway/discoveries.hpp"
@@ -98,6 +99,7 @@ class Gateway {
     rt::LoopLag lag_{clock_};
     AuditBook audit_{loops_.plant, clock_};  ///< lines record in it until they are destroyed
     Journal journal_{loops_.plant, clock_};  ///< lines tell it until they are destroyed
+    AlarmHook hook_{loops_.plant, clock_};
     AlarmDesk alarms_{clock_, journal_, [this](const alarms::Change& change) { on_alarm(change); }};
     explain::Doors doors_;  ///< lines ask it until they are destroyed
     bool simulate_;

@@ -1,17 +1,14 @@
-#include <boost/json/object.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "answer.hpp"
-#include "panelgate/web/api/render.hpp"
+#include "panelgate/alarms/webhook.hpp"
 #include "panelgate/web/api/sources.hpp"
 #include "routes.hpp"
 #include "sight.hpp"
 
 namespace panelgate::web {
-
-namespace json = boost::json;
 
 namespace {
 
@@ -30,28 +27,11 @@ std::vector<AlarmView> seen_alarms(const HttpRequest& request, const Api* api) {
 
 }  // namespace
 
-json::object describe_alarm(const alarms::Settings& alarm, const alarms::Status& status) {
-    json::object object;
-    object["name"] = alarm.name;
-    object["state"] = alarms::label(status.state);
-    object["severity"] = alarm.severity;
-    object["since"] = nullptr;
-    if (status.since != WallTime()) object["since"] = rfc3339(status.since);
-    object["value"] = nullptr;
-    if (status.value) object["value"] = *status.value;
-    object["text"] = alarm.text.empty() ? alarm.name : alarm.text;
-    object["acknowledged_by"] = nullptr;
-    if (!status.by.empty()) object["acknowledged_by"] = status.by;
-    object["station"] = alarm.station;
-    object["point"] = alarm.point;
-    return object;
-}
-
 Handling get_alarms(HttpRequest request, const Api* api) {
     std::vector<AlarmView> seen = seen_alarms(request, api);
     Table table{.name = "alarms", .count = seen.size()};
     table.entry = [seen = std::move(seen)](std::size_t i) {
-        return describe_alarm(seen[i].settings, seen[i].status);
+        return alarms::describe(seen[i].settings, seen[i].status);
     };
     co_return table_answer(request, std::move(table));
 }
@@ -68,7 +48,7 @@ Handling post_acknowledge(HttpRequest request, const Api* api) {
     log_client(*request.caller, "alarm acknowledged", {{"alarm", name}});
     for (const AlarmView& alarm : seen_alarms(request, api))
         if (alarm.settings.name == name)
-            co_return json_response(200, describe_alarm(alarm.settings, alarm.status));
+            co_return json_response(200, alarms::describe(alarm.settings, alarm.status));
     refuse(404, "there is no alarm '" + excerpt(name) + '\'');
 }
 

@@ -38,7 +38,8 @@ namespace {
 
 /// Only content from this server, and no inline scripts or styles.
 constexpr const char* kPolicy =
-    "default-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'self'; frame-ancestors 'none'; "
+    "default-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'self'; "
+    "frame-ancestors 'none'; "
     "object-src 'none'";
 
 HttpResponse answer(const HttpRequest& request, const PageFile& file) {

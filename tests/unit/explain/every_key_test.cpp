@@ -143,6 +143,7 @@ realtime: {priority: 20, lock_memory: true}
 audit: {file: /var/log/audit.jsonl, rotate: 10MiB, keep: 5, on_failure: refuse_writes}
 alarms: [{name: wiring, finding: any}, {name: lost, line: a, down: true}]
 store: {days: 90}
+alarm_webhook: {url: "http://10.0.0.1/x"}
 )";
 
 /// Keys that the values of their neighbours there rule out.
@@ -161,7 +162,7 @@ constexpr const char* kWords =
     "a-1/400209 panasonic-gt b 127.0.0.1:99 10.0.0.0/8 /dev/ttyS9 press/UW140 oven/GDT300 "
     "a/2 floor1/20 /run/secrets/other /profiles /tls/b.crt /tls/b.key /tls/b-ca.crt /tls/b.crl "
     "optional TLSv1.3 read two mqtt coils 127.0.0.1:503 allow 20MiB continue 2028-01-31 "
-    "press/setpoint oven ";
+    "press/setpoint oven http://10.0.0.1:9093/api ";
 
 struct Leaf {
     std::string key;  ///< "lines/stations/id": without list indices

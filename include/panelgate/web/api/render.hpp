@@ -7,7 +7,6 @@
 #include <string>
 #include <string_view>
 
-#include "panelgate/alarms/alarms.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/time.hpp"
@@ -77,8 +76,6 @@ std::string upper_hex(ByteView bytes, std::string_view separator = " ");
 std::string point_event(const bus::StationRef& station, const points::Point& point,
                         const points::PointReading& reading);
 std::string line_event(std::string_view line, std::string_view state, std::string_view why);
-/// An alarm as /api/v1/alarms, events and MQTT tell it.
-boost::json::object describe_alarm(const alarms::Settings& alarm, const alarms::Status& status);
 std::string station_event(std::string_view line, std::string_view station, std::string_view what);
 /// Progress of a discovery; `state` is "running" or how it ended.
 std::string discovery_event(std::string_view line, std::string_view state, std::size_t asked,
