@@ -23,7 +23,7 @@ const VIEWS = {'': overviewView, alarms: alarmsView, journal: journalView, histo
 const NAMED = {'': 'overview', alarms: 'alarms', journal: 'journal', history: 'history', scope: 'scope', latency: 'latency', points: 'points', relays: 'relays', clients: 'clients',
     request: 'request', discovery: 'discovery', settings: 'settings'};
 /** Sections of the manual's page on this page: what the view is called in English. */
-const EXPLAINED = {...NAMED, '': 'overview', scope: 'bus-scope', settings: 'configuration', station: 'a-station'};
+const EXPLAINED = {...NAMED, '': 'overview', journal: 'events', scope: 'bus-scope', settings: 'configuration', station: 'a-station'};
 /** Views that a gateway may not have the paths for. */
 const NEEDS = {alarms: 'GET /api/v1/alarms', journal: 'GET /api/v1/journal', history: 'GET /api/v1/journal',
     discovery: 'POST /api/v1/lines/{}/discover'};
