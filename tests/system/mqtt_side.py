@@ -109,10 +109,6 @@ class Listener:
     def publish(self, topic, payload, retain=False):
         self._client.publish(topic, payload, qos=1, retain=retain).wait_for_publish(harness.PATIENCE)
 
-    def send(self, topic, payload):
-        """The same, and nobody says whether it comes."""
-        self._client.publish(topic, payload)
-
     def of(self, topic):
         """Payloads of a topic, as JSON."""
         with self._changed:
@@ -131,6 +127,22 @@ class Listener:
 
     def of_locked(self, topic):
         return [json.loads(payload) for name, payload, _ in self.received if name == topic]
+
+
+def flood(broker, topic, payload, count):
+    """Publishes so many messages at once, of which the broker acknowledges none."""
+    def text(part):
+        return len(part).to_bytes(2, "big") + part
+
+    def packet(kind, body):
+        assert len(body) < 128
+        return bytes([kind, len(body)]) + body
+
+    with socket.create_connection(("127.0.0.1", broker.port), harness.PATIENCE) as peer:
+        peer.sendall(packet(0x10, text(b"MQTT") + b"\x04\x02\x00\x3c" + text(b"flood")))
+        assert peer.recv(4) == b"\x20\x02\x00\x00"
+        peer.sendall(packet(0x30, text(topic.encode()) + payload) * count + b"\xe0\x00")
+        assert not peer.recv(1)
 
 
 def take_in(peer, newest=5):

@@ -135,6 +135,7 @@ class Reload(unittest.TestCase):
             running.file.unlink()
             os.mkfifo(running.file)
             idle = os.open(running.file, os.O_RDWR)
+            os.write(idle, b"lines:")
             problem = running.reload()[1]
             os.close(idle)
             self.assertEqual(problem["outcome"], "invalid")
