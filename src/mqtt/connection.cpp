@@ -176,6 +176,7 @@ std::string Connection::read(TimePoint now) {
         errno = 0;
         const int code = mosquitto_loop_read(session_.get(), 1);
         if (code != MOSQ_ERR_SUCCESS) return reason(code);
+        if (socket() < 0) return reason(MOSQ_ERR_CONN_LOST);  // a DISCONNECT is a success
         if (errno == EAGAIN || errno == EWOULDBLOCK) break;
     }
     return "";
