@@ -41,6 +41,11 @@ std::optional<Sealed> parse_line(std::string_view line) {
     return record;
 }
 
+bool is_beginning(std::string_view line) {
+    const auto size = std::min(line.size(), kBegin.size());
+    return line.substr(0, size) == kBegin.substr(0, size);
+}
+
 std::string_view member_of(std::string_view body, std::string_view key) {
     const std::string sought = '"' + std::string(key) + "\":";
     auto at = body.find(sought);

@@ -84,6 +84,7 @@ class Verifier {
             line_ = 0;
             check_begin();
             if (!report_.fault) check_end();
+            if (!report_.fault) check_gone();
         }
         if (anchors_.lost > 0)
             note("the log says that " + std::to_string(anchors_.lost) +
@@ -151,6 +152,9 @@ class Verifier {
         report_.chain = chain;
         has_chain_ = true;
         kept_from_ = number_in(member_of(record.body, "from"));
+        const std::uint64_t gone = number_in(member_of(record.body, "gone"));
+        if (gone > 0 && (gone_ == 0 || gone < gone_)) gone_ = gone;
+        if (gone > 0) gone_before_ = record.number;
     }
 
     void compare(const Sealed& record) {
@@ -216,6 +220,13 @@ class Verifier {
                      "', so nothing was compared: it is another log, or the chain was made anew");
     }
 
+    /// Records of a file that went while it was written, unless that file is among those read.
+    void check_gone() {
+        if (gone_ == 0 || report_.first <= gone_) return;
+        fail("removed", records_text(gone_, gone_before_ - 1) +
+                            " removed, moved away, or changed by others while the gateway ran");
+    }
+
     /// The files of another chain that was written to the same file were removed, or moved away.
     void check_other_chain(const std::string& chain, std::uint64_t last) {
         const auto file = anchors_.files.find(chain);
@@ -230,8 +241,10 @@ class Verifier {
 
     const Anchors& anchors_;
     const std::string& all_of_;
-    bool has_chain_ = false;       ///< report_.chain is known
-    std::uint64_t kept_from_ = 0;  ///< the first record that was not dropped by rotation
+    bool has_chain_ = false;         ///< report_.chain is known
+    std::uint64_t kept_from_ = 0;    ///< the first record that was not dropped by rotation
+    std::uint64_t gone_ = 0;         ///< the first record of a file that went; 0: none
+    std::uint64_t gone_before_ = 0;  ///< the record that says so
     Sha256 digest_;
     Report report_;
     std::string file_;

@@ -144,13 +144,14 @@ bool Writer::resume() {
 }
 
 /// Looks for the last record in the file that is there, or in the newest full one. A torn line is
-/// cut off, and told in the record `start`.
+/// cut off, and told in the record `start`; a file that is all another text is set aside.
 bool Writer::find_position() {
     const auto older = rotated_files(settings_.file);
     const std::string& newest = size_ == 0 && !older.empty() ? older.back() : settings_.file;
     const std::string end = end_of(newest);
     const Tail tail = parse_tail(end);
-    if (size_ > 0 && tail.last.number == 0 && tail.torn.size() < size_)
+    const bool is_torn_only = tail.torn.size() == size_ && is_beginning(tail.torn);
+    if (size_ > 0 && tail.last.number == 0 && !is_torn_only)
         return set_aside("its last line is no record") && find_position();
     if (size_ > 0 && !tail.torn.empty()) {
         torn_ = tail.torn;

@@ -220,6 +220,7 @@ void Bus::start() {
 void Bus::stop() {
     state_->leave();
     close();
+    state_->book.clear();
 }
 
 /// Nothing is observed any more: the observer may be gone.

@@ -339,6 +339,7 @@ void ListeningBus::start() { state_->line->start(*state_); }
 void ListeningBus::stop() {
     state_->leave();
     close();
+    state_->book.clear();
 }
 
 /// Nothing is observed any more: the observer may be gone.

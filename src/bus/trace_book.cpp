@@ -305,6 +305,11 @@ bool begins(FrameKind kind) {
 TraceBook::TraceBook(const Settings& settings, Wall& wall)
     : settings_(settings), wall_(wall), store_(settings.trace), incidents_(settings.incidents) {}
 
+void TraceBook::clear() {
+    store_ = TraceStore(settings_.trace);
+    incidents_ = IncidentBook(settings_.incidents);
+}
+
 void TraceBook::note(arbiter::Note note, ClientName client) {
     log_frame(settings_.name, note, client);
     RecordedFrame frame;

@@ -181,6 +181,8 @@ class TraceBook {
     /// A request was answered by this transaction; only the first answer is recorded.
     void answered(arbiter::Transaction transaction, TimePoint at);
     void on_line_down(TimePoint at);
+    /// Gives back the memory of what was recorded; numbers go on.
+    void clear();
 
     const TraceStore& store() const { return store_; }
     IncidentBook& incidents() { return incidents_; }

@@ -41,7 +41,11 @@ struct CertificateOptions {
         return *text;
     }
     tls::Issued ca() const try {
-        return {read(path("ca.crt")), read(path("ca.key"))};
+        const std::string key = path("ca.key");
+        if (config::RealFiles().is_readable_by_all(key))
+            std::cerr << "panelgate: cert: every user of this machine can read " << key
+                      << ", and so sign certificates; `chmod 600 " << key << "`\n";
+        return {read(path("ca.crt")), read(key)};
     } catch (const tls::CannotIssue& why) {
         throw tls::CannotIssue(std::string(why.what()) +
                                "; `panelgate cert new-ca` makes a CA, --dir says where it is");

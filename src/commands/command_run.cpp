@@ -3,7 +3,9 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <functional>
 #include <iostream>
 #include <memory>
@@ -11,6 +13,8 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -200,6 +204,24 @@ std::unique_ptr<gateway::FileWatch> watch_of(const Service& service,
     });
 }
 
+/// Ends the process soon, though a thread should wait for a disk or a share that does not answer.
+void end_at_the_latest() try {
+    constexpr std::chrono::seconds kForDisks(5);
+    std::thread([kForDisks] {
+        std::this_thread::sleep_for(kForDisks);
+        rt::log(
+            rt::LogLevel::error, "stopped without waiting",
+            {{"why", "a disk or a share does not answer: a file is still being read or written"}});
+        std::_Exit(kFine);
+    }).detach();
+} catch (const std::system_error&) {  // no more threads: the process waits
+}
+
+void stop(gateway::Gateway& gateway) {
+    end_at_the_latest();
+    gateway.stop();
+}
+
 /// Runs the gateway until a signal ends it. `started` is called once it serves.
 ExitCode serve(config::Config config, const Service& service,
                const std::function<void(const gateway::Gateway&)>& started) {
@@ -210,7 +232,7 @@ ExitCode serve(config::Config config, const Service& service,
     const rt::LogDrain drain(clock, io.get_executor());
     rt::ServiceManager manager(clock);
     SignalLoop loop(io);
-    gateway::Reloader reloader(io.get_executor(), service.file);
+    gateway::Reloader reloader(io.get_executor(), clock, service.file);
     const rt::Loop faces(kFacesNice);
     gateway::Gateway gateway({faces.get_executor(), io.get_executor()}, shared, service.simulate,
                              &reloader);
@@ -224,15 +246,14 @@ ExitCode serve(config::Config config, const Service& service,
     reloader.on_step([&](bool begins) { begins ? manager.reloading() : manager.ready(); });
     started(gateway);
     manager.ready([&gateway] { return gateway.status(); });
-    auto watch = watch_of(service, io.get_executor(), clock, reloader);
+    const auto watch = watch_of(service, io.get_executor(), clock, reloader);
     Ending ending{.begin = {},
                   .done = [&] { return gateway.drained(); },
-                  .finish = [&] { gateway.stop(); },
+                  .finish = [&] { stop(gateway); },
                   .open = [&] { return gateway.pending_connections(); },
                   .longest_answer = {},
                   .reload = [&] { reload_file(reloader, "SIGHUP"); }};
     ending.begin = [&] {
-        watch.reset();
         reloader.stop();
         ending.longest_answer = gateway.longest_answer();
         manager.stopping(ending.patience());

@@ -5,11 +5,13 @@
 #include <poll.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
+#include <sys/timerfd.h>
 #include <sys/vfs.h>
 #include <unistd.h>
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <system_error>
@@ -43,17 +45,43 @@ bool has_writer(int file) {
     return ready > 0;
 }
 
-/// Reads an open file without a time limit; 16 MiB at most.
-std::optional<std::string> read_all(int file) {
+/// A timer that poll(2) finds readable when time is up.
+class Patience {
+  public:
+    /// Zero: it never is.
+    explicit Patience(Duration most) {
+        itimerspec once{};
+        once.it_value.tv_sec = std::chrono::ceil<std::chrono::seconds>(most).count();
+        ::timerfd_settime(timer_, 0, &once, nullptr);
+    }
+    ~Patience() { ::close(timer_); }
+    Patience(const Patience&) = delete;
+    Patience& operator=(const Patience&) = delete;
+
+    /// Waits until the file has more bytes, or its end; false, with ETIMEDOUT, when time is up.
+    bool await_bytes(int file) const {
+        std::array<pollfd, 2> either{pollfd{file, POLLIN, 0}, pollfd{timer_, POLLIN, 0}};
+        ::poll(either.data(), either.size(), -1);
+        if (either[1].revents == 0) return true;
+        errno = ETIMEDOUT;
+        return false;
+    }
+
+  private:
+    int timer_ = ::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC);
+};
+
+/// Reads an open file, 16 MiB at most, which is in non-blocking mode.
+std::optional<std::string> read_all(int file, Duration most) {
     constexpr std::size_t kMost = std::size_t{16} * 1024 * 1024;
-    const int flags = ::fcntl(file, F_GETFL);
-    if (flags < 0 || ::fcntl(file, F_SETFL, flags & ~O_NONBLOCK) != 0) return std::nullopt;
     std::string text;
     std::array<char, 16384> piece{};
+    const Patience patience(most);
     for (;;) {
         const ssize_t n = ::read(file, piece.data(), piece.size());
         if (n == 0) return text;
         if (n < 0 && errno == EINTR) continue;
+        if (n < 0 && errno == EAGAIN && patience.await_bytes(file)) continue;
         if (n < 0) return std::nullopt;
         text.append(piece.data(), static_cast<std::size_t>(n));
         if (text.size() <= kMost) continue;
@@ -88,10 +116,12 @@ std::optional<std::string> RealFiles::read_any(const std::string& path) {
         errno = EISDIR;
         return std::nullopt;
     }
-    // Opening a pipe without a writer would block.
+    // Opening a pipe without a writer would block, as would reading where its writer is idle.
     const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
     if (file < 0) return std::nullopt;
-    auto text = has_writer(file) ? read_all(file) : std::nullopt;
+    const bool is_typed = path == "/dev/stdin";  // perhaps by somebody who thinks
+    const Duration most = is_typed ? Duration::zero() : kReadPatience;
+    auto text = has_writer(file) ? read_all(file, most) : std::nullopt;
     const int why = errno;
     ::close(file);
     errno = why;

@@ -25,7 +25,15 @@ std::optional<profile::Catalogue> load_catalogue(const std::string& dir) {
 
 namespace {
 
-constexpr std::string_view kCannotRead = "cannot be read: ";
+const std::string kCannotRead = "cannot be read: ";
+
+std::string why_unread(int error) {
+    constexpr auto kPatience = config::RealFiles::kReadPatience / 1s;
+    if (error == EPIPE) return "no program writes to this pipe";
+    if (error != ETIMEDOUT) return std::strerror(error);
+    return "its end did not come within " + std::to_string(kPatience) +
+           " s; it is a pipe or a device, whose writer waits";
+}
 
 std::optional<std::string> environment(const std::string& name) {
     const char* value = std::getenv(name.c_str());
@@ -40,9 +48,7 @@ std::string path_of(const std::string& typed) { return typed == "-" ? "/dev/stdi
 Loaded read_file(const std::string& path) {
     const auto text = config::RealFiles::read_any(path);
     if (!text) {
-        const std::string why =
-            errno == EPIPE ? "no program writes to this pipe" : std::strerror(errno);
-        return {std::nullopt, kNoInput, {{path, {0, 0}, std::string(kCannotRead) + why}}, {}};
+        return {std::nullopt, kNoInput, {{path, {0, 0}, kCannotRead + why_unread(errno)}}, {}};
     }
     return read_text(*text, path);
 }

@@ -98,7 +98,7 @@ mqtt::Counters BrokerDesk::counters() const {
     all.results_dropped += counters_.results_dropped;
     all.reconnects += counters_.reconnects;
     all.writes_ok = counters_.writes_ok;
-    all.writes_refused = counters_.writes_refused;
+    all.writes_refused += counters_.writes_refused;
     all.writes_failed = counters_.writes_failed;
     all.broker = settings_.broker();
     return all;

@@ -45,7 +45,7 @@ std::string read_again(const tls::Settings& settings, tls::Material& files) {
     std::string missing;
     const auto read = [&](const std::string& path, std::string& into) {
         if (path.empty()) return;
-        if (auto text = config::RealFiles::read_any(path))
+        if (auto text = config::RealFiles().read(path))
             into = std::move(*text);
         else if (missing.empty())
             missing = path;

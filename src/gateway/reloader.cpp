@@ -3,6 +3,7 @@
 #include <malloc.h>
 #include <sys/stat.h>
 #include <algorithm>
+#include <atomic>
 #include <ranges>
 #include <utility>
 
@@ -120,6 +121,7 @@ struct Reloader::Job {
     std::shared_ptr<const config::Config> next;      ///< null: there is none
     web::SharedText shown;
     web::ReloadVerdict verdict;
+    std::atomic<bool> is_late = false;  ///< nobody waits for it any more
 
     void read();
     void compare();
@@ -210,8 +212,11 @@ void Reloader::Job::compare() {
     shown = shown_text(*next);
 }
 
-Reloader::Reloader(boost::asio::any_io_executor executor, std::string file)
-    : file_(std::move(file)), worker_(std::move(executor)) {
+Reloader::Reloader(boost::asio::any_io_executor executor, rt::Clock& clock, std::string file)
+    : clock_(clock),
+      late_(clock.make_alarm()),
+      file_(std::move(file)),
+      worker_(std::move(executor)) {
     counters_.last_success_unix = unix_now();
 }
 
@@ -249,7 +254,27 @@ void Reloader::begin() {
     job->certificates = gateway_->certificates();
     job->verdict.rollback = wish.rollback;
     job->verdict.cause = served_.front().cause;
-    worker_.run([job] { job->read(); }, [this, job] { apply(job); });
+    job_ = job;
+    late_->arm(clock_.now() + kLongest, [this] { give_up(); });
+    worker_.run(
+        [job] {
+            if (!job->is_late) job->read();
+        },
+        [this, job] {
+            if (job == job_) apply(job);
+        });
+}
+
+/// The worker may wait for the file for ever; what it reads in the end does not count.
+void Reloader::give_up() {
+    job_->is_late = true;
+    web::ReloadVerdict verdict;
+    verdict.rollback = served_.front().wish.rollback;
+    verdict.cause = served_.front().cause;
+    verdict.outcome = ReloadOutcome::failed;
+    verdict.why = "it takes longer than " + std::to_string(kLongest / 1s) +
+                  " s to read and check the files; is one of them on a share that does not answer?";
+    end(verdict);
 }
 
 /// Runs in one turn of the loop.
@@ -267,11 +292,12 @@ void Reloader::apply(const std::shared_ptr<Job>& job) {
             job->verdict.why = error.what();
         }
     }
-    end(job);
+    end(job->verdict);
 }
 
-void Reloader::end(const std::shared_ptr<Job>& job) {
-    web::ReloadVerdict& verdict = job->verdict;
+void Reloader::end(web::ReloadVerdict& verdict) {
+    late_->cancel();
+    job_.reset();
     verdict.at = rt::wall_now();
     const bool good =
         verdict.outcome == ReloadOutcome::applied || verdict.outcome == ReloadOutcome::unchanged;

@@ -157,6 +157,7 @@ void RunningLine::stop() {
     if (poller_) poller_->stop();
     bus_->stop();
     if (simulated_) simulated_->stop();
+    simulated_.reset();
 }
 
 void RunningLine::dispose() {

@@ -4,6 +4,7 @@
 #include <unistd.h>
 #include <algorithm>
 #include <array>
+#include <boost/asio/error.hpp>
 #include <cerrno>
 #include <cstring>
 #include <utility>
@@ -45,6 +46,12 @@ void Readiness::forget() {
     ::epoll_ctl(epoll_.native_handle(), EPOLL_CTL_DEL, std::exchange(fd_, -1), nullptr);
 }
 
+void Readiness::end() {
+    forget();
+    error_code ignored;
+    epoll_.close(ignored);
+}
+
 void Readiness::want_input(bool wanted) {
     want(wanted ? events_ | EPOLLIN : events_ & ~std::uint32_t{EPOLLIN});
 }
@@ -70,7 +77,9 @@ void Readiness::wait() {
                       [this, alive = alive_](error_code error) {
                           if (!*alive) return;
                           waiting_ = false;
-                          if (error || fd_ < 0) return;
+                          // A set that was closed meanwhile, and another one is watched.
+                          const bool is_other = error == asio::error::operation_aborted;
+                          if ((error && !is_other) || fd_ < 0) return;
                           ready_();
                           if (*alive && fd_ >= 0 && events_ != 0) wait();
                       });
@@ -109,6 +118,7 @@ void DescriptorLine::stop() {
     next_reading_->cancel();
     cancel_open();
     close();
+    readiness_.end();
 }
 
 void DescriptorLine::poll_input() {

@@ -59,6 +59,8 @@ class Readiness {
     std::string watch(int fd);
     /// Stops watching; called before the descriptor is closed.
     void forget();
+    /// The same, and gives back what watch() needs.
+    void end();
     /// No effect while nothing is watched.
     void want_input(bool wanted);
     void want_output(bool wanted);

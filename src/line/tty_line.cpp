@@ -16,6 +16,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -44,9 +46,10 @@ class DeviceWatch {
     /// Watches the device's directory, or the nearest existing parent: by-id folders vanish with
     /// their last device. Called again after each failed attempt; harmless if nothing is new.
     void look();
-    /// Stops notifications until look(). Cheap: the inotify descriptor, whose closing can block for
-    /// tens of milliseconds, stays open to the end.
+    /// Stops notifications until look(). Cheap: the inotify descriptor stays open.
     void stop();
+    /// The same, and gives the descriptor back.
+    void end();
 
   private:
     bool prepare();
@@ -114,6 +117,18 @@ void DeviceWatch::stop() {
     inotify_.cancel(ignored);
     for (const int watch : std::exchange(watched_, {})) {
         ::inotify_rm_watch(inotify_.native_handle(), watch);
+    }
+}
+
+/// Closing can block for tens of milliseconds, so a thread does it.
+void DeviceWatch::end() {
+    stop();
+    if (!inotify_.is_open()) return;
+    const int descriptor = inotify_.release();
+    try {
+        std::thread([descriptor] { ::close(descriptor); }).detach();
+    } catch (const std::system_error&) {
+        ::close(descriptor);
     }
 }
 
@@ -201,7 +216,7 @@ class TtyLine final : public DescriptorLine {
   private:
     void begin_open() override;
     void waiting() override { watch_.look(); }
-    void cancel_open() override { watch_.stop(); }
+    void cancel_open() override { watch_.end(); }
     void close_device(bool discard) override;
     bool may_have_returned() const override { return true; }
     bool is_drained() { return unsent().value_or(Duration::zero()) == Duration::zero(); }

@@ -136,8 +136,9 @@ class Dialling : public std::enable_shared_from_this<Dialling> {
 };
 
 namespace {
+using Protocol = Connection::Protocol;
 constexpr Duration kLook = 1s;  // interval for libmosquitto's housekeeping
-}
+}  // namespace
 
 struct Client::State : std::enable_shared_from_this<Client::State> {
     State(asio::any_io_executor e, rt::Clock& c, const Settings& s, Publisher& p, OnCommand o)
@@ -186,6 +187,8 @@ struct Client::State : std::enable_shared_from_this<Client::State> {
     std::optional<stream_descriptor> descriptor;
     OpenMessages open;
     std::uint64_t attempt = 0;
+    Protocol protocol = Protocol::mqtt5;   ///< of this connection, or the next one
+    bool is_too_new = false;               ///< the protocol, for the broker
     std::optional<TimePoint> connack_due;  ///< CONNACK deadline, while it is awaited
     bool running = false;
     bool accepted_once = false;
@@ -194,12 +197,14 @@ struct Client::State : std::enable_shared_from_this<Client::State> {
     bool writing = false;
     std::uint64_t published = 0;
     std::uint64_t reconnects = 0;
+    std::uint64_t left_out = 0;
 };
 
 void Client::State::dial() {
     if (dialling->under_way()) return retry();
     ++attempt;
-    dialling->connect(std::make_shared<Connection>(settings, settings.client_id), publisher.will(),
+    dialling->connect(std::make_shared<Connection>(settings, settings.client_id, protocol),
+                      publisher.will(),
                       [this, is_current = current()](std::shared_ptr<Connection> made,
                                                      const std::string& failed) {
                           if (is_current()) dialled(std::move(made), failed);
@@ -228,7 +233,7 @@ void Client::State::await_readable() {
 }
 
 void Client::State::read() {
-    const std::string why = connection->read();
+    const std::string why = connection->read(clock.now());
     digest();
     if (!connection) return;  // the broker refused the connection
     if (!why.empty()) return lost(why);
@@ -262,11 +267,25 @@ void Client::State::housekeep() {
 /// Processes the events libmosquitto reported while reading.
 void Client::State::digest() {
     const Connection::Happened happened = connection->take();
-    if (!happened.refused.empty()) return lost("the broker refuses: " + happened.refused);
+    if (!happened.refused.empty()) {
+        connack_due.reset();
+        is_too_new = happened.is_too_new;
+        return lost("the broker refuses: " + happened.refused);
+    }
     if (happened.accepted) accepted();
     if (!happened.delivered.empty()) pauses.succeeded();  // a stable session that accepts messages
     for (const int id : happened.delivered)
         for (const std::uint64_t change : open.delivered(id)) publisher.delivered(change);
+    for (const std::string& filter : happened.unsubscribed)
+        rt::log(rt::LogLevel::warn, "mqtt subscription refused",
+                {{"broker", settings.broker()},
+                 {"topic", filter},
+                 {"why", "the broker does not let this user read it: writes do not arrive"}});
+    if (happened.left_out > 0)
+        rt::log(rt::LogLevel::warn, "mqtt messages left out",
+                {{"broker", settings.broker()},
+                 {"why", "more than " + std::to_string(settings.messages) + " a second"}});
+    left_out += happened.left_out;
     take_commands(happened.received);
 }
 
@@ -276,8 +295,17 @@ void Client::State::accepted() {
     if (accepted_once) ++reconnects;
     accepted_once = true;
     rt::log(rt::LogLevel::info, "mqtt connected",
-            {{"broker", settings.broker()}, {"client_id", settings.client_id}});
-    for (const std::string& filter : publisher.subscriptions()) connection->subscribe(filter);
+            {{"broker", settings.broker()},
+             {"client_id", settings.client_id},
+             {"protocol", protocol == Protocol::mqtt5 ? "5" : "3.1.1"}});
+    const std::vector<std::string> filters = publisher.subscriptions();
+    for (const std::string& filter : filters) connection->subscribe(filter);
+    if (protocol == Protocol::mqtt311 && !filters.empty())
+        rt::log(rt::LogLevel::warn, "mqtt messages of any size",
+                {{"broker", settings.broker()},
+                 {"why",
+                  "the broker knows no MQTT 5, by which it would keep what is too long for a "
+                  "write; give the broker a limit, as message_size_limit of Mosquitto"}});
     publisher.connected();
     wake();
 }
@@ -293,6 +321,9 @@ void Client::State::lost(const std::string& why) {
     rt::log(rt::LogLevel::warn, "mqtt not connected",
             {{"broker", settings.broker()}, {"why", why}});
     ++attempt;
+    // A broker that knows MQTT 3.1.1 alone may refuse a later one, or close without a word.
+    const bool falls_back = connack_due.has_value() || std::exchange(is_too_new, false);
+    protocol = falls_back && protocol == Protocol::mqtt5 ? Protocol::mqtt311 : Protocol::mqtt5;
     connected = false;
     writing = false;
     connack_due.reset();
@@ -327,7 +358,9 @@ void Client::State::pump() {
         const auto outgoing = publisher.next(rt::wall_now());
         if (!outgoing) break;
         const int id = connection->publish(outgoing->message);
-        if (id == 0) return lost("the connection takes nothing");
+        if (id == 0)
+            return lost("it takes no message to " + outgoing->message.topic + ": " +
+                        connection->failed());
         ++published;
         open.sent(id, outgoing->message.qos > 0, outgoing->change);
     }
@@ -376,6 +409,7 @@ Counters Client::counters() const {
     counters.dropped = state_->publisher.store().dropped();
     counters.results_dropped = state_->publisher.results_dropped();
     counters.reconnects = state_->reconnects;
+    counters.writes_refused = state_->left_out;
     return counters;
 }
 

@@ -1,6 +1,7 @@
 #include "connection.hpp"
 
 #include <mosquitto.h>
+#include <mqtt_protocol.h>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -36,7 +37,8 @@ mosquitto* new_session(const std::string& client_id, void* owner) {
     return session;
 }
 
-constexpr int kReads = 64;  // per wake-up
+constexpr int kReads = 64;         // per wake-up
+constexpr int kFirstFault = 0x80;  // of MQTT's reason codes
 constexpr const char* kNothing = "panelgate/barrier";
 
 }  // namespace
@@ -46,12 +48,23 @@ struct Connection::Callbacks {
     static Connection& of(void* owner) { return *static_cast<Connection*>(owner); }
 
     static void connected(mosquitto*, void* owner, int code) {
+        const bool is_new = of(owner).protocol_ == Protocol::mqtt5;
         Happened& happened = of(owner).happened_;
-        if (code == 0) {
-            happened.accepted = true;
-        } else {
-            happened.refused = mosquitto_connack_string(code);
-        }
+        happened.accepted = code == 0;
+        happened.is_too_new = is_new && code == MQTT_RC_UNSUPPORTED_PROTOCOL_VERSION;
+        if (code != 0)
+            happened.refused =
+                is_new ? mosquitto_reason_string(code) : mosquitto_connack_string(code);
+    }
+    static void disconnected(mosquitto*, void* owner, int code) {
+        if (code >= kFirstFault) of(owner).ended_ = mosquitto_reason_string(code);
+    }
+    static void subscribed(mosquitto*, void* owner, int id, int, const int* granted) {
+        Connection& own = of(owner);
+        const auto asked = own.asked_.find(id);
+        if (asked == own.asked_.end()) return;
+        if (*granted >= kFirstFault) own.happened_.unsubscribed.push_back(asked->second);
+        own.asked_.erase(asked);
     }
     static void delivered(mosquitto*, void* owner, int id) {
         of(owner).happened_.delivered.push_back(id);
@@ -63,6 +76,7 @@ struct Connection::Callbacks {
             of(owner).tls_error_ = line.substr(line.rfind(':') + 1);
     }
     static void received(mosquitto*, void* owner, const mosquitto_message* message) {
+        if (!of(owner).has_turn()) return;
         const Settings& settings = of(owner).settings_;
         const auto size = static_cast<std::size_t>(message->payloadlen);
         // One byte more marks an oversized payload.
@@ -73,8 +87,10 @@ struct Connection::Callbacks {
     }
 };
 
-Connection::Connection(const Settings& settings, const std::string& client_id)
-    : settings_(settings), session_(new_session(client_id, this), mosquitto_destroy) {}
+Connection::Connection(const Settings& settings, const std::string& client_id, Protocol protocol)
+    : settings_(settings),
+      protocol_(protocol),
+      session_(new_session(client_id, this), mosquitto_destroy) {}
 
 Connection::~Connection() = default;
 
@@ -88,7 +104,22 @@ std::string Connection::set_up_tls() try {
     return unusable.what();
 }
 
+/// Counts a message; false beyond the rate, which holds for all who publish.
+bool Connection::has_turn() {
+    if (now_ - second_ >= 1s) {
+        second_ = now_;
+        in_second_ = 0;
+    }
+    if (in_second_ == settings_.messages) {
+        ++happened_.left_out;
+        return false;
+    }
+    ++in_second_;
+    return true;
+}
+
 std::string Connection::reason(int code) const {
+    if (code != MOSQ_ERR_SUCCESS && !ended_.empty()) return "the broker ends it: " + ended_;
     if (code == MOSQ_ERR_SUCCESS || !client_) return why(code);
     if (!client_->refusal().empty())
         return "TLS: " + client_->refusal() + " (`tls: ca` names who may sign it)";
@@ -98,10 +129,14 @@ std::string Connection::reason(int code) const {
 std::string Connection::set_up(const Message& will) {
     mosquitto* session = session_.get();
     mosquitto_connect_callback_set(session, Callbacks::connected);
+    mosquitto_disconnect_callback_set(session, Callbacks::disconnected);
+    mosquitto_subscribe_callback_set(session, Callbacks::subscribed);
     mosquitto_publish_callback_set(session, Callbacks::delivered);
     mosquitto_unsubscribe_callback_set(session, Callbacks::delivered);
     mosquitto_message_callback_set(session, Callbacks::received);
     mosquitto_int_option(session, MOSQ_OPT_TCP_NODELAY, 1);
+    mosquitto_int_option(session, MOSQ_OPT_PROTOCOL_VERSION,
+                         protocol_ == Protocol::mqtt5 ? MQTT_PROTOCOL_V5 : MQTT_PROTOCOL_V311);
     // The publisher enforces the limit; one more is for the farewell.
     mosquitto_max_inflight_messages_set(session, static_cast<unsigned>(settings_.in_flight) + 1);
     int code =
@@ -118,8 +153,16 @@ std::string Connection::connect(const Message& will) {
     std::string failed = set_up(will);
     if (!failed.empty()) return failed;
     const auto keep_alive = std::chrono::floor<std::chrono::seconds>(settings_.keep_alive).count();
-    return reason(mosquitto_connect(session_.get(), settings_.host.c_str(), settings_.port,
-                                    static_cast<int>(keep_alive)));
+    mosquitto_property* limit = nullptr;
+    if (protocol_ == Protocol::mqtt5)
+        mosquitto_property_add_int32(&limit, MQTT_PROP_MAXIMUM_PACKET_SIZE,
+                                     static_cast<std::uint32_t>(settings_.packet));
+    const int code =
+        mosquitto_connect_bind_v5(session_.get(), settings_.host.c_str(), settings_.port,
+                                  static_cast<int>(keep_alive), nullptr, limit);
+    std::string why = reason(code);  // while errno is that of the call
+    mosquitto_property_free_all(&limit);
+    return why;
 }
 
 int Connection::socket() const { return mosquitto_socket(session_.get()); }
@@ -127,11 +170,13 @@ int Connection::socket() const { return mosquitto_socket(session_.get()); }
 bool Connection::wants_write() const { return mosquitto_want_write(session_.get()); }
 
 /// Reads until nothing is left: TLS may buffer data that the socket no longer signals.
-std::string Connection::read() {
+std::string Connection::read(TimePoint now) {
+    now_ = now;
     for (int i = 0; i < kReads; ++i) {
         errno = 0;
         const int code = mosquitto_loop_read(session_.get(), 1);
         if (code != MOSQ_ERR_SUCCESS) return reason(code);
+        if (socket() < 0) return reason(MOSQ_ERR_CONN_LOST);  // a DISCONNECT is a success
         if (errno == EAGAIN || errno == EWOULDBLOCK) break;
     }
     return "";
@@ -146,11 +191,14 @@ int Connection::publish(const Message& message) {
     const int code = mosquitto_publish(session_.get(), &id, message.topic.c_str(),
                                        static_cast<int>(message.payload.size()),
                                        message.payload.data(), message.qos, message.retain);
+    failed_ = why(code);
     return code == MOSQ_ERR_SUCCESS ? id : 0;
 }
 
-bool Connection::subscribe(const std::string& filter) {
-    return mosquitto_subscribe(session_.get(), nullptr, filter.c_str(), 0) == MOSQ_ERR_SUCCESS;
+void Connection::subscribe(const std::string& filter) {
+    int id = 0;
+    if (mosquitto_subscribe(session_.get(), &id, filter.c_str(), 0) == MOSQ_ERR_SUCCESS)
+        asked_[id] = filter;
 }
 
 int Connection::barrier() {

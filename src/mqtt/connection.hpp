@@ -65,7 +65,11 @@ class OpenMessages {
 /// connection is over.
 class Connection {
   public:
-    Connection(const Settings& settings, const std::string& client_id);
+    enum class Protocol : std::uint8_t { mqtt5, mqtt311 };
+
+    /// By MQTT 5 the broker knows the largest message that is taken, and keeps larger ones to
+    /// itself. With mqtt311 libmosquitto would hold whatever comes.
+    Connection(const Settings& settings, const std::string& client_id, Protocol protocol);
     ~Connection();
     Connection(const Connection&) = delete;
     Connection& operator=(const Connection&) = delete;
@@ -75,14 +79,15 @@ class Connection {
     /// Returns the socket, -1 if there is none.
     int socket() const;
     bool wants_write() const;
-    std::string read();
+    std::string read(TimePoint now);
     std::string write();
     /// Must be called once per second.
     std::string housekeep();
 
-    /// Returns the id used in Happened::delivered; 0: not sent.
+    /// Returns the id used in Happened::delivered; 0: not sent, failed() says why.
     int publish(const Message& message);
-    bool subscribe(const std::string& filter);
+    const std::string& failed() const { return failed_; }
+    void subscribe(const std::string& filter);
     /// Sends a barrier for QoS 0 messages, which have no acknowledgement: its own arrives after all
     /// published before. An UNSUBSCRIBE from nothing (MQTT 3.1.1, 3.10.4). 0: not sent.
     int barrier();
@@ -97,9 +102,12 @@ class Connection {
     /// Events since the last take().
     struct Happened {
         bool accepted = false;
-        std::string refused;         ///< reason given by the broker
-        std::vector<int> delivered;  ///< of publish() and barrier()
+        std::string refused;                      ///< reason given by the broker
+        bool is_too_new = false;                  ///< the broker does not know the protocol
+        std::vector<std::string> unsubscribed{};  ///< filters that the broker refuses
+        std::vector<int> delivered;               ///< of publish() and barrier()
         std::vector<Received> received;
+        std::uint64_t left_out = 0;  ///< messages beyond Settings::messages a second
     };
     Happened take();
 
@@ -109,10 +117,18 @@ class Connection {
     std::string reason(int code) const;
     std::string set_up(const Message& will);
     std::string set_up_tls();
+    bool has_turn();
 
     const Settings settings_;
+    const Protocol protocol_;
     Happened happened_;
-    std::string tls_error_;                       ///< OpenSSL's word for it, by libmosquitto
+    std::map<int, std::string> asked_;  ///< filters by the id of their SUBSCRIBE
+    TimePoint now_{};                   ///< of the last read()
+    TimePoint second_{};                ///< beginning of the one that is counted in
+    std::size_t in_second_ = 0;         ///< messages
+    std::string failed_;
+    std::string ended_;      ///< why the broker has ended it, in words of MQTT 5
+    std::string tls_error_;  ///< OpenSSL's word for it, by libmosquitto
     std::unique_ptr<tls::ClientContext> client_;  ///< null: plain; outlives the session
     std::unique_ptr<mosquitto, void (*)(mosquitto*)> session_;
 };

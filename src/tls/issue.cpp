@@ -193,6 +193,19 @@ Owned<X509_CRL> former_list(const Signer& signer, std::string_view list) {
     return made;
 }
 
+/// RFC 5280 5.2.3: a later list has a higher number, of up to 20 bytes.
+void count_up(X509_CRL* list) {
+    using Integer = std::unique_ptr<ASN1_INTEGER, decltype(&ASN1_INTEGER_free)>;
+    const Integer former(
+        static_cast<ASN1_INTEGER*>(X509_CRL_get_ext_d2i(list, NID_crl_number, nullptr, nullptr)),
+        ASN1_INTEGER_free);
+    const std::unique_ptr<BIGNUM, decltype(&BN_free)> number(
+        former ? ASN1_INTEGER_to_BN(former.get(), nullptr) : BN_new(), BN_free);
+    BN_add_word(number.get(), 1);
+    const Integer next(BN_to_ASN1_INTEGER(number.get(), nullptr), ASN1_INTEGER_free);
+    X509_CRL_add1_ext_i2d(list, NID_crl_number, next.get(), 0, X509V3_ADD_REPLACE);
+}
+
 void add_revoked(X509_CRL* list, const Signer& signer, std::string_view certificate,
                  ASN1_TIME* time) {
     const auto given = certificates_of(certificate);
@@ -224,6 +237,7 @@ std::string revoke(const Issued& ca, std::string_view list,
     ASN1_TIME_set(time.get(), validity.now + validity.days * kDay);
     X509_CRL_set1_nextUpdate(made.get(), time.get());
     X509_CRL_sort(made.get());
+    count_up(made.get());
     if (X509_CRL_sign(made.get(), signer.key.get(), EVP_sha256()) <= 0)
         throw CannotIssue("the CA's key cannot sign");
     return pem_of([&](BIO* out) { return PEM_write_bio_X509_CRL(out, made.get()); });

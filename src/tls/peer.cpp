@@ -1,11 +1,9 @@
 #include "panelgate/tls/peer.hpp"
 
 #include <openssl/asn1.h>
-#include <openssl/err.h>
 #include <openssl/objects.h>
 #include <openssl/x509.h>
 #include <algorithm>
-#include <memory>
 
 #include "native.hpp"
 #include "panelgate/base/text.hpp"
@@ -24,23 +22,19 @@ int nid_of_role() {
     return kNid;
 }
 
-struct FreeText {
-    void operator()(ASN1_UTF8STRING* text) const { ASN1_UTF8STRING_free(text); }
-};
-
-/// The text of an extension; a fault in `peer` where it is no role.
+/// The text of an extension; a fault in `peer` where it is no role. In DER a UTF8String of less
+/// than 128 bytes is its tag, its length and the text, and X.509 has no other encoding.
 void read_role(const ASN1_OCTET_STRING* value, Peer& peer) {
-    const unsigned char* at = ASN1_STRING_get0_data(value);
-    const unsigned char* const end = at + ASN1_STRING_length(value);
-    const std::unique_ptr<ASN1_UTF8STRING, FreeText> text(
-        d2i_ASN1_UTF8STRING(nullptr, &at, ASN1_STRING_length(value)));
-    ERR_clear_error();
-    if (!text || at != end) {
+    constexpr char kTag = 0x0c;
+    constexpr std::size_t kHead = 2;
+    const auto* const begin = reinterpret_cast<const char*>(ASN1_STRING_get0_data(value));
+    std::string role(begin, static_cast<std::size_t>(ASN1_STRING_length(value)));
+    if (role.size() < kHead || role.size() >= kHead + 128 || role[0] != kTag ||
+        static_cast<std::size_t>(role[1]) != role.size() - kHead) {
         peer.role_fault = "its role is not one UTF8String";
         return;
     }
-    const auto* const begin = reinterpret_cast<const char*>(ASN1_STRING_get0_data(text.get()));
-    std::string role(begin, static_cast<std::size_t>(ASN1_STRING_length(text.get())));
+    role.erase(0, kHead);
     if (!is_role_word(role)) {
         peer.role_fault = "its role is not a word of 1 to 64 bytes of UTF-8";
         return;

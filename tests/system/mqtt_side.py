@@ -129,10 +129,63 @@ class Listener:
         return [json.loads(payload) for name, payload, _ in self.received if name == topic]
 
 
-def take_in(peer):
-    """The broker accepts a connection of the gateway."""
-    peer.recv(4096)
-    peer.sendall(b"\x20\x02\x00\x00")  # CONNACK
+def flood(broker, topic, payload, count):
+    """Publishes so many messages at once, of which the broker acknowledges none."""
+    def text(part):
+        return len(part).to_bytes(2, "big") + part
+
+    def packet(kind, body):
+        assert len(body) < 128
+        return bytes([kind, len(body)]) + body
+
+    with socket.create_connection(("127.0.0.1", broker.port), harness.PATIENCE) as peer:
+        peer.sendall(packet(0x10, text(b"MQTT") + b"\x04\x02\x00\x3c" + text(b"flood")))
+        assert peer.recv(4) == b"\x20\x02\x00\x00"
+        peer.sendall(packet(0x30, text(topic.encode()) + payload) * count + b"\xe0\x00")
+        assert not peer.recv(1)
+
+
+def take_in(peer, newest=5):
+    """The broker accepts a connection of the gateway, if it knows the version of MQTT."""
+    asked = peer.recv(4096)
+    version = asked[asked.index(b"MQTT") + 4]
+    if version > newest:
+        peer.sendall(b"\x20\x02\x00\x01")
+        return False
+    peer.sendall(b"\x20\x03\x00\x00\x00" if version == 5 else b"\x20\x02\x00\x00")  # CONNACK
+    return True
+
+
+class Strict:
+    """A broker that knows no later version of MQTT and lets nobody read; a context manager."""
+
+    def __init__(self, newest=5):
+        self._newest = newest
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.port = self._server.getsockname()[1]
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._server.close()
+
+    def _serve(self):
+        with contextlib.suppress(OSError):
+            while True:
+                with self._server.accept()[0] as peer:
+                    if take_in(peer, self._newest):
+                        self._answer(peer)
+
+    def _answer(self, peer):
+        """To the SUBSCRIBE, with which the gateway begins."""
+        said = peer.recv(65536)
+        assert said[0] == 0x82, said
+        middle = b"\x00" if self._newest == 5 else b""
+        peer.sendall(bytes([0x90, 3 + len(middle)]) + said[2:4] + middle + b"\x80")
+        while peer.recv(65536):
+            pass
 
 
 class Rude:

@@ -1,6 +1,7 @@
 """Values at a real broker, and writes by way of it: mosquitto, listened to by paho."""
 import json
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -10,8 +11,13 @@ import unittest
 import config
 import harness
 from mqtt_side import (BROKER, Broker, Chatty, COUNTER, Listener, LOCKED, PRESS, Rude, TOPIC, Truth, changes,
-                       first_told, metric, paho, plant)
+                       first_told, flood, metric, paho, plant, Strict)
 from test_points import until
+
+
+def refused_writes(program):
+    said = program.get("/metrics")[1]
+    return float(re.search(r'panelgate_mqtt_writes_total{outcome="refused"} (\S+)', said).group(1))
 
 
 @unittest.skipUnless(BROKER and paho, "needs Debian's mosquitto and python3-paho-mqtt "
@@ -130,6 +136,46 @@ class Mqtt(unittest.TestCase):
         body = listener.wait_for(result, after=before)
         self.assertEqual({name: body.get(name) for name in expected}, expected, body)
         return body
+
+    def test_a_retained_message_of_100_MB_is_never_held(self):
+        with Broker() as broker, Listener(broker, topic="nothing") as listener:
+            listener.publish(f"{TOPIC}/x/y/set", bytes(100_000_000), retain=True)
+            with harness.configured(plant(broker, more=", write: points")) as program:
+                broker.log.wait_for("too large outgoing PUBLISH for gateway")
+                with Listener(broker) as other:
+                    self.write(other, "press/level", b"21.5", {"ok": True, "value": 21.5})
+                    body = self.write(other, "press/level", b"1" * 5000, {"ok": False})
+                    self.assertIn("a write has at most 4096 bytes", body["detail"])
+                status = pathlib.Path(f"/proc/{program.process.pid}/status").read_text()
+            peak = int(re.search(r"VmHWM:\s+(\d+) kB", status).group(1))
+            if not harness.SANITIZED:
+                self.assertLess(peak, 64_000, "kB")
+
+    def test_messages_for_writes_have_a_rate_for_all(self):
+        with Broker() as broker, Listener(broker) as listener, \
+                harness.configured(plant(broker, more=", write: points")) as program:
+            broker.log.wait_for(r"gateway 0 plant/hall/\+/\+/set")
+            flood(broker, f"{TOPIC}/x/y/set", b"1", 5000)
+            program.log.wait_for('warn mqtt messages left out .*why="more than 1000 a second"')
+            until(lambda: refused_writes(program) >= 5000)
+            results = f"{TOPIC}/x/y/set/result"
+            self.assertLess(len(listener.of(results)), 4000)
+            self.write(listener, "press/level", b"21.5", {"ok": True, "value": 21.5})
+
+    def test_a_subscription_that_the_broker_refuses_is_told(self):
+        for newest, version in ((5, "5"), (4, "3.1.1")):
+            with Strict(newest) as broker, \
+                    harness.configured(plant(broker, more=", write: points")) as program:
+                program.log.wait_for(f"mqtt connected .*protocol={version}$")
+                program.log.wait_for(r"warn mqtt subscription refused .*topic=plant/hall/\+/\+/set why=")
+                if newest < 5:
+                    program.log.wait_for("warn mqtt messages of any size .*message_size_limit")
+
+    def test_a_client_id_that_another_client_takes_is_named(self):
+        with Broker() as broker, harness.configured(plant(broker)) as program:
+            program.log.wait_for("mqtt connected")
+            with Listener(broker, name="gateway"):
+                program.log.wait_for("mqtt not connected .*the broker ends it: Session taken over")
 
     def test_nobody_writes_unless_the_configuration_says_so(self):
         with Broker() as broker, harness.configured(plant(broker)) as program:

@@ -130,6 +130,32 @@ class Reload(unittest.TestCase):
             self.assertEqual(running.reload(plant(other()))[1]["outcome"], "unchanged")
             self.assertEqual(running.metric("panelgate_config_last_reload_successful"), ["1"])
 
+    def test_a_pipe_whose_writer_is_idle_is_told_and_a_good_file_follows(self):
+        with Running(plant(other())) as running:
+            running.file.unlink()
+            os.mkfifo(running.file)
+            idle = os.open(running.file, os.O_RDWR)
+            os.write(idle, b"lines:")
+            problem = running.reload()[1]
+            os.close(idle)
+            self.assertEqual(problem["outcome"], "invalid")
+            self.assertIn("its end did not come within 8 s", json.dumps(problem))
+            running.file.unlink()
+            self.assertEqual(running.reload(plant(other(IO)))[1]["outcome"], "applied")
+
+    def test_lines_that_go_give_back_what_they_held(self):
+        def named(number):
+            return plant(config.line(f"far{number}", "tcp://127.0.0.1:1", "{id: 2}"),
+                         config.line(f"near{number}", "/dev/nothing", "{id: 3}"),
+                         config.line(f"played{number}", stations=IO))
+
+        with Running(named(0)) as running:
+            held = pathlib.Path(f"/proc/{running.program.process.pid}/fd")
+            first = len(list(held.iterdir()))
+            for number in range(1, 6):
+                self.assertEqual(running.reload(named(number))[1]["outcome"], "applied")
+            until(lambda: running.program.get("/healthz") and len(list(held.iterdir())) <= first)
+
     def test_the_way_back_leads_to_what_ran_before(self):
         with Running(plant(other())) as running:
             self.assertEqual(running.reload(path="/api/v1/reload?rollback=true")[0], 409)

@@ -98,6 +98,16 @@ class Cert(unittest.TestCase):
                               capture_output=True, text=True, check=True).stdout
         self.assertEqual(text.count("Serial Number"), 1)
         self.assertIn("X509v3 Authority Key Identifier", text)
+        self.assertRegex(text, r"X509v3 CRL Number:\s+2\n")
+
+    def test_a_key_of_the_ca_that_all_may_read_is_told(self):
+        said = f"every user of this machine can read {self.folder}/ca.key"
+        self.assertNotIn(said, self.cert("new-client", "one").stderr)
+        (self.folder / "ca.key").chmod(0o644)
+        done = self.cert("new-client", "two")
+        self.assertEqual(done.returncode, 0)
+        self.assertIn(said, done.stderr)
+        self.assertIn(f"`chmod 600 {self.folder}/ca.key`", done.stderr)
 
     def test_revoke_refuses_another_cas_certificate_and_list(self):
         with plant() as other:

@@ -59,9 +59,9 @@ class Roles(unittest.TestCase):
         self.made.cert("new-client", "odd", "--role-word", "janitor")
         self.tls = self.made.tls("optional", role_from="certificate")
 
-    def put(self, program, name):
+    def put(self, program, name, **more):
         return get(program.http_port(), PLACE, self.made.context(name), "PUT", '{"values": [5]}',
-                   {"Content-Type": "application/json"})[:2]
+                   {"Content-Type": "application/json", **more})[:2]
 
     def test_it_counts_more_than_anonymous_over_https(self):
         with served(self.made, self.tls, self.tls, anonymous="operator") as program:
@@ -74,6 +74,16 @@ class Roles(unittest.TestCase):
                 self.assertIn(why, refusal[1])
                 self.assertEqual(get(program.http_port(), PLACE, self.made.context(name))[0], 200)
             self.assertEqual(self.put(program, None)[0], 200, "nobody in particular is an operator")
+
+    def test_an_idempotency_key_is_that_of_one_certificate(self):
+        key = {"Idempotency-Key": "one"}
+        with served(self.made, self.tls, self.tls, anonymous="viewer") as program:
+            self.assertEqual(self.put(program, "scada", **key)[0], 200)
+            self.assertEqual(self.put(program, "panel", **key)[0], 403, "scada's answer is for scada")
+            self.made.cert("new-client", "scada-2", "--role", "operator")
+            self.assertNotIn("Replayed", str(get(
+                program.http_port(), PLACE, self.made.context("scada-2"), "PUT", '{"values": [5]}',
+                {"Content-Type": "application/json", **key})))
 
     def test_without_a_role_and_a_token_it_is_a_refusal_and_no_login(self):
         audit = self.made.path("audit.jsonl")

@@ -42,6 +42,8 @@ struct Sealed {
 };
 /// Takes a line, without its newline, apart. nullopt if it is no record.
 std::optional<Sealed> parse_line(std::string_view line);
+/// True for the beginning of a record, however short, as a crash leaves it. Pure.
+bool is_beginning(std::string_view line);
 /// The value of a member of a body that is a number, a flag or a text without escapes; "" if there
 /// is none. What is inside of texts is no member: quotes are escaped there.
 std::string_view member_of(std::string_view body, std::string_view key);

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "panelgate/base/time.hpp"
 #include "panelgate/config/config.hpp"
 
 namespace panelgate::config {
@@ -17,8 +18,11 @@ class RealFiles final : public Files {
     bool is_special(const std::string& path) const override;
     std::string real_path(const std::string& path) const override;
 
-    /// Like read(), but also reads a pipe or a device, without a time limit: for paths of the
-    /// command line. A named pipe without a writer within a second is not read (EPIPE).
+    /// How long the writer of a pipe, or a device, may take to the end of what is read.
+    static constexpr Duration kReadPatience = 8s;
+    /// Like read(), but also reads a pipe or a device: for paths of the command line. A named pipe
+    /// without a writer within a second is not read (EPIPE), nor what does not end within
+    /// kReadPatience (ETIMEDOUT); /dev/stdin has no limit.
     static std::optional<std::string> read_any(const std::string& path);
 };
 

@@ -51,12 +51,16 @@ class FileWatch {
 class Gateway;
 
 /// Reloads the file: reads, checks and compares it in a worker, applies it in one turn of the loop.
-/// A configuration that cannot be applied changes nothing. One reload at a time; requests that come
-/// meanwhile get the result of the next one. One thread.
+/// A configuration that cannot be applied changes nothing; nor one that is not read within
+/// kLongest, as where a share does not answer. One reload at a time; requests that come meanwhile
+/// get the result of the next one. One thread.
 class Reloader final : public web::ReloadSource {
   public:
-    /// `file`: the file read at the start; empty or `-`: it cannot be read again.
-    Reloader(boost::asio::any_io_executor executor, std::string file);
+    static constexpr Duration kLongest = 10s;
+
+    /// `file`: the file read at the start; empty or `-`: it cannot be read again. The clock
+    /// outlives this.
+    Reloader(boost::asio::any_io_executor executor, rt::Clock& clock, std::string file);
     /// Call before any other function. The gateway lives as long as the loop runs.
     void serve(Gateway& gateway);
     /// `step` is called at the beginning of each reload, and at its end.
@@ -81,10 +85,14 @@ class Reloader final : public web::ReloadSource {
 
     void begin();
     void apply(const std::shared_ptr<Job>& job);
-    void end(const std::shared_ptr<Job>& job);
+    void give_up();
+    void end(web::ReloadVerdict& verdict);
 
+    rt::Clock& clock_;
+    std::unique_ptr<rt::Alarm> late_;
     std::string file_;
     Gateway* gateway_ = nullptr;
+    std::shared_ptr<Job> job_;                      ///< the running reload; null: none
     std::shared_ptr<const config::Config> before_;  ///< the previous one; null: none
     std::vector<Waiting> waiting_;
     std::vector<Waiting> served_;  ///< by the running reload

@@ -67,6 +67,7 @@ class RunningLine {
     RunningLine& operator=(const RunningLine&) = delete;
 
     void start();
+    /// Closes the line, and gives back its descriptors, its simulated panels and its trace.
     void stop();
     /// Destroys bus, poller and panels of the line. No other function may be called afterwards.
     void dispose();

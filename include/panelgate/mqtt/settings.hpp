@@ -47,6 +47,8 @@ struct Settings {
     std::size_t results = 1024;        ///< write results queued for the broker
     std::size_t batch = 64;            ///< messages sent before yielding to the loop
     std::size_t payload = 4096;        ///< maximum payload accepted from the broker, bytes
+    std::size_t packet = 16'384;       ///< a longer packet is kept by a broker of MQTT 5, bytes
+    std::size_t messages = 1000;       ///< taken from the broker in a second
     std::size_t metrics = 64;          ///< per command of a Sparkplug host
     std::size_t writes = 32;           ///< writes from the broker under way
     Duration disconnect_timeout = 1s;  ///< wait for the broker to close after the farewell

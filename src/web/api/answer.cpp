@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdio>
 
+#include "panelgate/base/text.hpp"
 #include "panelgate/profile/notation.hpp"
 #include "panelgate/web/api/render.hpp"
 #include "panelgate/web/http/gzip.hpp"
@@ -79,10 +80,18 @@ std::string quoted(std::string_view field) {
     return text + '"';
 }
 
+/// A panel writes some texts: none may be a formula for a spreadsheet, or steer a terminal.
+std::string harmless(std::string text) {
+    std::ranges::replace_if(text, is_control, '?');
+    const bool is_formula = text.find_first_of("=+-@") == 0;
+    return is_formula ? '\'' + text : text;
+}
+
 std::string field_of(const json::object& object, std::string_view column) {
     const json::value* value = object.if_contains(column);
     if (value == nullptr || value->is_null()) return {};
-    if (value->is_string() && !exact_digits(*value)) return std::string(value->get_string());
+    if (value->is_string() && !exact_digits(*value))
+        return harmless(std::string(value->get_string()));
     return json_text(*value);
 }
 
@@ -192,15 +201,19 @@ HttpResponse KeptAnswer::give(const std::shared_ptr<KeptAnswer>& self, const Htt
 
 namespace {
 
-/// The end of the value of a member that ends in _ms, or of `time`; `at` if neither begins there.
+/// The end of the value of an age, or of `time`; `at` if neither begins there. Other members that
+/// end in _ms are configured or measured, and count.
 std::size_t end_of_age(std::string_view body, std::size_t at) {
-    constexpr std::string_view kAge = "_ms\":";
     constexpr std::string_view kTime = "\"time\":\"";
-    if (body.substr(at).starts_with(kTime))
+    constexpr std::string_view kAges[] = {"\"age_ms\":", "\"gone_ms\":", "\"last_error_ms\":",
+                                          "\"last_success_ms\":", "\"last_write_ms\":"};
+    const std::string_view rest = body.substr(at);
+    if (!rest.starts_with('"')) return at;
+    if (rest.starts_with(kTime))
         return std::min(body.find('"', at + kTime.size()), body.size() - 1) + 1;
-    if (!body.substr(at).starts_with(kAge)) return at;
-    at += kAge.size();
-    while (at < body.size() && body[at] != ',' && body[at] != '}') ++at;
+    for (const std::string_view age : kAges)
+        if (rest.starts_with(age))
+            return std::min(body.find_first_of(",}", at + age.size()), body.size());
     return at;
 }
 

@@ -6,11 +6,29 @@
 
 namespace panelgate::web {
 
-bool KeyBook::has_room_for(const std::string& client) const {
-    const auto is_of_client = [&](const auto& entry) { return entry.first.first == client; };
-    const auto own = std::ranges::count_if(entries_, is_of_client);
-    return entries_.size() < settings_.max_keys && bytes_ < settings_.max_kept &&
-           static_cast<std::size_t>(own) < settings_.max_keys_of_client;
+namespace {
+
+/// A token and a certificate are clients of their own, from wherever they ask.
+bool is_same_client(const Who& one, const Who& other) {
+    const bool is_named = !one.token.empty() || !one.certificate.empty();
+    return one.token == other.token && one.certificate == other.certificate &&
+           (is_named || one.host == other.host);
+}
+
+}  // namespace
+
+/// What a client has leaves three times as much free, so that no few clients fill the book.
+bool KeyBook::has_room_for(const Who& client) const {
+    constexpr std::size_t kLeft = 3;
+    std::size_t own = 0;
+    std::size_t own_bytes = 0;
+    for (const auto& [key, entry] : entries_) {
+        if (!is_same_client(*entry.who, client)) continue;
+        ++own;
+        own_bytes += entry.answer.body.size();
+    }
+    return kLeft * own + entries_.size() < settings_.max_keys &&
+           kLeft * own_bytes + bytes_ < settings_.max_kept;
 }
 
 std::optional<HttpResponse> KeyBook::begin(TimePoint now, const Key& key, std::uint64_t request,
@@ -31,12 +49,13 @@ std::optional<HttpResponse> KeyBook::begin(TimePoint now, const Key& key, std::u
         again.headers.emplace_back("Idempotency-Replayed", "true");
         return again;
     }
-    if (!has_room_for(key.first))
+    const WhoRef who = worker->who();
+    if (!has_room_for(*who))
         return to_response(passing_problem(503,
                                            "too many writes with an Idempotency-Key are "
                                            "remembered; send this one later, or without a key",
                                            60));
-    entries_[key] = {request, std::move(worker)};
+    entries_[key] = {request, who, std::move(worker)};
     return std::nullopt;
 }
 
@@ -76,6 +95,13 @@ Parsed<std::string> key_of(std::string_view text) {
     if (!text.empty() && text.size() <= kMost && printable) return std::string(text);
     return problem(400, "an Idempotency-Key has 1 to " + std::to_string(kMost) +
                             " printable characters, no blanks");
+}
+
+/// The client that a key belongs to.
+std::string name_of(const Who& client) {
+    if (!client.token.empty()) return "token " + client.token;
+    if (!client.certificate.empty()) return "certificate " + client.certificate;
+    return "address " + client.address;
 }
 
 /// A hash of the request; two requests have the same with a probability of 1 in 2^64.
@@ -122,9 +148,7 @@ Handling once(std::shared_ptr<KeyBook> book, HttpRequest request, std::function<
     }
     const auto text = key_of(header->second);
     if (!text) co_return to_response(text.error());
-    const Caller& client = *request.caller;
-    const KeyBook::Key key{
-        client.token().empty() ? "address " + client.address() : "token " + client.token(), *text};
+    const KeyBook::Key key{name_of(*request.caller->who()), *text};
     const WorkerScope scope(request.caller);
     const auto known = book->begin(now(), key, number_of(request), scope.worker);
     if (known) co_return *known;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/who.hpp"
 #include "panelgate/web/api/server.hpp"
 #include "panelgate/web/http/message.hpp"
 
@@ -18,8 +19,8 @@ namespace panelgate::web {
 
 /// Writes with an Idempotency-Key, by client and key: the running ones, and for a time the answers
 /// of finished ones that may have changed something, so that a repeated request does not write
-/// again (P2). No entry is dropped before its time: a new request is refused when there is no room.
-/// One thread.
+/// again (P2). No entry is dropped before its time: a new request is refused when its client has
+/// used up its share. One thread.
 class KeyBook {
   public:
     using Key = std::pair<std::string, std::string>;  ///< client and key
@@ -28,8 +29,8 @@ class KeyBook {
 
     /// Registers a request, of which `request` is a hash: then it is to be carried out, and end()
     /// called. Or returns what is answered instead: the first request's answer, 422 for a different
-    /// request with this key, 409 while the first one is running, 503 if there is no room. `worker`
-    /// asks the lines for the request.
+    /// request with this key, 409 while the first one is running, 503 if its client has no room.
+    /// `worker` asks the lines for the request.
     std::optional<HttpResponse> begin(TimePoint now, const Key& key, std::uint64_t request,
                                       std::shared_ptr<Caller> worker);
     /// Remembers the answer if the request may have had an effect; else the key may be used again.
@@ -40,11 +41,12 @@ class KeyBook {
   private:
     struct Entry {
         std::uint64_t request = 0;
+        WhoRef who{};
         std::shared_ptr<Caller> worker;  ///< null: finished
         HttpResponse answer{};
     };
 
-    bool has_room_for(const std::string& client) const;
+    bool has_room_for(const Who& client) const;
 
     ApiSettings settings_;
     std::map<Key, Entry> entries_;

@@ -1,5 +1,6 @@
 #include "panelgate/web/http/crossing.hpp"
 
+#include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/redirect_error.hpp>
@@ -58,9 +59,9 @@ Handling Crossing::ask(HttpRequest request, Handler handler, bool probe) {
     });
     request.caller = caller;
     const auto asked = std::make_shared<HttpRequest>(std::move(request));
-    queue(probe ? "" : client->address(),
-          [this, asked, handler = std::make_shared<const Handler>(std::move(handler)),
-           waiting = std::weak_ptr(question)] { begin(std::move(*asked), handler, waiting); });
+    turns_.add(probe ? "" : client->address(),
+               [this, asked, handler = std::make_shared<const Handler>(std::move(handler)),
+                waiting = std::weak_ptr(question)] { begin(std::move(*asked), handler, waiting); });
     pass_next();
     Handling waiting = wait_for(question, client);
     HttpResponse response = co_await std::move(waiting);
@@ -68,43 +69,47 @@ Handling Crossing::ask(HttpRequest request, Handler handler, bool probe) {
     co_return response;
 }
 
-void Crossing::queue(const std::string& address, std::function<void()> beginning) {
-    Beginnings& own = waiting_[address];
-    if (own.empty() && address.empty()) turns_.push_front(address);
-    if (own.empty() && !address.empty()) turns_.push_back(address);
-    own.push_back(std::move(beginning));
+std::optional<Turns::Turn> Turns::take() {
+    auto next = askers_.end();
+    for (auto one = askers_.begin(); one != askers_.end(); ++one) {
+        const Asker& asker = one->second;
+        if (asker.waiting.empty() || asker.holds > 0) continue;
+        if (next == askers_.end() || asker.paid < next->second.paid) next = one;
+    }
+    if (next == askers_.end()) return std::nullopt;
+    Turn turn{next->first, std::move(next->second.waiting.front())};
+    next->second.waiting.pop_front();
+    return turn;
 }
 
-std::function<void()> Crossing::take_next() {
-    const std::string address = std::move(turns_.front());
-    turns_.pop_front();
-    Beginnings& own = waiting_[address];
-    std::function<void()> next = std::move(own.front());
-    own.pop_front();
-    if (own.empty())
-        waiting_.erase(address);
-    else if (address.empty())
-        turns_.push_front(address);
-    else
-        turns_.push_back(address);
-    return next;
+/// Who owes nothing and asks nothing is forgotten.
+void Turns::charge(TimePoint now, const std::string& address, Duration cost) {
+    TimePoint& paid = askers_[address].paid;
+    if (!address.empty()) paid = std::max(paid, now) + cost;
+    std::erase_if(askers_, [&](const auto& one) {
+        return one.second.waiting.empty() && one.second.holds == 0 && one.second.paid <= now;
+    });
 }
 
 /// Gives the plant the next request, unless the plant has not begun the last one yet.
 void Crossing::pass_next() {
-    if (passing_ || turns_.empty()) return;
+    if (passing_) return;
+    auto next = turns_.take();
+    if (!next) return;
     passing_ = true;
-    tell([self = shared_from_this(), begin_next = take_next()] {
+    tell([self = shared_from_this(), next = std::move(*next)] {
         const TimePoint began = rt::AsioClock::read();
-        begin_next();
+        next.work();
         const Duration took = rt::AsioClock::read() - began;
-        asio::post(self->loops_.faces, [self, took] { self->rest(took); });
+        asio::post(self->loops_.faces,
+                   [self, address = next.address, took] { self->rest(address, took); });
     });
 }
 
 /// Leaves the plant to its lines for a multiple of what the last request took.
-void Crossing::rest(Duration took) {
+void Crossing::rest(const std::string& address, Duration took) {
     constexpr int kRest = 9;  // so that requests have a tenth of the plant's time at most
+    turns_.charge(rt::AsioClock::read(), address, (1 + kRest) * took);
     const auto pause = std::make_shared<asio::steady_timer>(loops_.faces, kRest * took);
     pause->async_wait([self = shared_from_this(), pause](const boost::system::error_code&) {
         self->passing_ = false;
@@ -168,14 +173,24 @@ Handling Crossing::made_by_worker(HttpResponse response, std::function<void(Http
                                   std::shared_ptr<Caller> caller, rt::Worker* worker) {
     const auto awaited = std::make_shared<Awaited>(co_await asio::this_coro::executor);
     const auto making = std::make_shared<HttpResponse>(std::move(response));
-    const auto work = [making, finish = std::move(finish)] {
+    const auto took = std::make_shared<Duration>();
+    const auto work = [making, finish = std::move(finish), took] {
+        const TimePoint began = rt::AsioClock::read();
         try {
             finish(*making);
         } catch (const std::exception&) {  // no memory
             *making = to_response(problem(500, "the gateway failed to make this text"));
         }
+        *took = rt::AsioClock::read() - began;
     };
-    worker->run(work, [making, awaited] { awaited->give(std::move(*making)); });
+    const std::string address = caller->address();
+    turns_.hold(address);
+    worker->run(work, [self = shared_from_this(), making, awaited, took, address] {
+        awaited->give(std::move(*making));
+        self->turns_.release(address);
+        self->turns_.charge(rt::AsioClock::read(), address, *took);
+        self->pass_next();
+    });
     Handling waiting = wait_for(awaited, std::move(caller));
     co_return co_await std::move(waiting);
 }

@@ -463,12 +463,12 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     Handling handling = carry_out(std::move(request), found.route, shared);
     HttpResponse response = co_await std::move(handling);
     const auto finish = std::exchange(response.finish, nullptr);
-    if (finish && response.is_long) {
+    if (finish && response.is_long && shared->site->crossing) {
         if (!shared->worker)
             shared->worker =
                 std::make_unique<rt::Worker>(co_await boost::asio::this_coro::executor);
-        Handling making =
-            Crossing::made_by_worker(std::move(response), finish, caller, shared->worker.get());
+        Handling making = shared->site->crossing->made_by_worker(std::move(response), finish,
+                                                                 caller, shared->worker.get());
         co_return co_await std::move(making);
     }
     if (finish) finish(response);

@@ -228,12 +228,24 @@ TEST(AuditVerify, FilesThatTheChainSaysAreKeptMustBeThere) {
         EXPECT_EQ(
             said(report),
             all ? "removed: records 4 to 9 removed: rotation has dropped only what stood before"
-                : "right");
+                : "removed: records 7 to 9 removed, moved away, or changed by others while the "
+                  "gateway ran");
         ASSERT_EQ(report.remarks.size(), all ? 1U : 2U);
         EXPECT_EQ(report.remarks[0],
                   "record 10 (T): the file before was removed, moved away, or changed by others; "
                   "first record: 7");
     }
+}
+
+TEST(AuditVerify, AFileThatWentIsNotMissedWhereItIsRead) {
+    Chain chain;
+    Lines lines = chain_of(3, chain);
+    std::string line;
+    chain.append(line, R"("time":"T","kind":"file","previous":")" + chain.last().hash +
+                           R"(","from":1,"gone":1)");
+    line.pop_back();
+    lines.push_back(line);
+    EXPECT_EQ(said(verdict(lines)), "right");
 }
 
 TEST(AuditVerify, ATornEndIsNoWholeRecord) {

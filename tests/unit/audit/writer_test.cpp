@@ -243,6 +243,19 @@ TEST_F(AuditWriter, WhatCannotBeContinuedIsKeptUnderAnotherName) {
     EXPECT_FALSE(verify({file}).fault);
 }
 
+TEST_F(AuditWriter, ATextWithoutANewlineIsKeptTooAndOnlyATornRecordIsCutOff) {
+    std::ofstream(file) << "a token";
+    ASSERT_TRUE(write(*make(settings()), 1, 2));
+    EXPECT_EQ(read(file + ".aside"), "a token");
+    for (const char* torn : {R"({"n":1,"time":"T","ki)", "{\"n"}) {
+        std::ofstream(file) << torn;
+        const auto writer = make(settings());
+        ASSERT_TRUE(write(*writer, 1, 2));
+        EXPECT_EQ(writer->remark(), "") << torn;
+        EXPECT_FALSE(verify({file}).fault);
+    }
+}
+
 /// Limits what files of this process may become, as a full disk would.
 class FullDisk {
   public:

@@ -1,5 +1,6 @@
 #include "panelgate/config/real_files.hpp"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -74,6 +75,15 @@ TEST_F(RealFilesTest, DoesNotWaitForeverForAPipeWriter) {
     const std::string pipe = put_pipe();
     EXPECT_EQ(RealFiles::read_any(pipe), std::nullopt);
     EXPECT_EQ(errno, EPIPE);
+}
+
+TEST_F(RealFilesTest, DoesNotWaitForeverForAPipeWriterThatIsIdle) {
+    const std::string pipe = put_pipe();
+    const int idle = ::open(pipe.c_str(), O_RDWR | O_CLOEXEC);
+    EXPECT_EQ(::write(idle, "lines", 5), 5);
+    EXPECT_EQ(RealFiles::read_any(pipe), std::nullopt);
+    EXPECT_EQ(errno, ETIMEDOUT);
+    ::close(idle);
 }
 
 TEST_F(RealFilesTest, ReadsWhatAnotherThreadWritesToAPipe) {

@@ -61,12 +61,19 @@ TEST(Peer, WhatIsNoSingleRoleDoesNotCount) {
     const std::string empty("\x0c\x00", 2);
     const std::string control("\x0c\x02o\n", 4);
     const std::string cut("\x0c\x40oper", 6);
+    const std::string constructed("\x2c\x0a\x0c\x08operator",
+                                  12);  // BER, not DER, as the next ones
+    const std::string indefinite("\x2c\x80\x0c\x08operator\x00\x00", 14);
+    const std::string long_form("\x0c\x81\x08operator", 11);
     const std::string huge = std::string("\x0c\x81\xc8", 3) + std::string(200, 'x');
     for (const auto& ders : {std::vector{printable},
                              {trailing},
                              {empty},
                              {control},
                              {cut},
+                             {constructed},
+                             {indefinite},
+                             {long_form},
                              {huge},
                              {std::string(kUtf8), std::string(kUtf8)},
                              {std::string()}}) {

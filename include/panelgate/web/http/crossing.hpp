@@ -6,10 +6,12 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
 
+#include "panelgate/base/time.hpp"
 #include "panelgate/rt/loop.hpp"
 #include "panelgate/web/http/message.hpp"
 
@@ -32,6 +34,36 @@ struct Loops {
         : faces(std::move(of_faces)), plant(std::move(of_plant)) {}
 };
 
+/// Work of several addresses for one thread. The address goes first that is least in debt: what its
+/// work has cost is a debt that time pays off. Pure.
+class Turns {
+  public:
+    using Work = std::function<void()>;
+    struct Turn {
+        std::string address;
+        Work work;
+    };
+
+    /// The address "" goes first.
+    void add(const std::string& address, Work work) {
+        askers_[address].waiting.push_back(std::move(work));
+    }
+    /// Returns nothing if no work waits but that of addresses on hold.
+    std::optional<Turn> take();
+    void charge(TimePoint now, const std::string& address, Duration cost);
+    /// Nothing of the address is taken until as many calls of release() have come.
+    void hold(const std::string& address) { ++askers_[address].holds; }
+    void release(const std::string& address) { --askers_[address].holds; }
+
+  private:
+    struct Asker {
+        std::deque<Work> waiting{};
+        TimePoint paid{};  ///< when its debt is paid
+        unsigned holds = 0;
+    };
+    std::map<std::string, Asker> askers_;
+};
+
 /// What crosses between the loops of a server, as messages: a request to the plant, its response
 /// back, that a client has left, a deed for the audit. (Events cross by an EventOutlet, counters by
 /// Server::counters().) The loops share nothing but immutable objects. The number of requests under
@@ -50,12 +82,13 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
     /// which leaves when the session's leaves; then the response is empty. An exception of the
     /// handler is logged, and answered with 500. The plant begins one request at a time, and
     /// then serves its lines for nine times as long: however many ask, requests have a tenth of
-    /// the plant's time. Addresses take turns; a probe goes first.
+    /// the plant's time. Addresses take turns by what their requests cost; a probe goes first.
     Handling ask(HttpRequest request, Handler handler, bool probe = false);
     /// Faces: makes the long text of a response in the worker, while the loop serves other clients.
-    /// The response is empty if the caller leaves meanwhile.
-    static Handling made_by_worker(HttpResponse response, std::function<void(HttpResponse&)> finish,
-                                   std::shared_ptr<Caller> caller, rt::Worker* worker);
+    /// The response is empty if the caller leaves meanwhile. One text of an address is made at a
+    /// time, and costs the address turns at the plant.
+    Handling made_by_worker(HttpResponse response, std::function<void(HttpResponse&)> finish,
+                            std::shared_ptr<Caller> caller, rt::Worker* worker);
     /// Faces: runs `work` on the plant's loop, perhaps before requests that wait for their turn.
     void tell(std::function<void()> work);
     /// Plant: runs `work` on the faces' loop; at once if there is one loop.
@@ -77,17 +110,13 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
     static Handling wait_for(std::shared_ptr<Awaited> awaited, std::shared_ptr<Caller> client);
     void begin(HttpRequest request, std::shared_ptr<const Handler> handler,
                std::weak_ptr<Awaited> waiting);
-    void queue(const std::string& address, std::function<void()> beginning);
-    std::function<void()> take_next();
     void pass_next();
-    void rest(Duration took);
+    void rest(const std::string& address, Duration took);
 
     Loops loops_;
     // Of the faces' loop:
-    using Beginnings = std::deque<std::function<void()>>;
-    std::map<std::string, Beginnings> waiting_;  ///< requests that the plant has not begun
-    std::deque<std::string> turns_;              ///< of addresses with such requests
-    bool passing_ = false;                       ///< the plant begins one, or has its rest
+    Turns turns_;           ///< of requests that the plant has not begun
+    bool passing_ = false;  ///< the plant begins one, or has its rest
     // Of the plant's loop:
     std::set<std::shared_ptr<Caller>> callers_;  ///< of the requests under way
     bool closed_ = false;

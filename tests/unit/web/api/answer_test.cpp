@@ -131,5 +131,16 @@ TEST(Csv, QuotesWhatHasCommasQuotesOrLines) {
     EXPECT_EQ(csv_line(object, columns), "\"x \"\"y\"\"\",1.5,,true,\r\n");
 }
 
+TEST(Csv, ATextOfAPanelIsNoFormulaAndSteersNoTerminal) {
+    constexpr std::string_view columns[] = {"a", "b", "c", "d"};
+    const auto line = [&](const char* object) {
+        return csv_line(boost::json::parse(object).as_object(), columns);
+    };
+    EXPECT_EQ(line(R"({"a":"=1+1","b":"+1","c":"-x","d":"@x"})"), "'=1+1,'+1,'-x,'@x\r\n");
+    EXPECT_EQ(line(R"({"a":"\u001b[2J","b":"\u0007","c":"a\nb\rc","d":"\t=1"})"),
+              "?[2J,?,a?b?c,?=1\r\n");
+    EXPECT_EQ(line(R"({"a":-1,"b":-1.5,"c":"a=1","d":null})"), "-1,-1.5,a=1,\r\n");
+}
+
 }  // namespace
 }  // namespace panelgate::web::answer_test

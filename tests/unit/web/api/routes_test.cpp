@@ -117,6 +117,8 @@ TEST(Tag, DoesNotCountWhatOnlyTimeChanges) {
     EXPECT_EQ(tag_of(R"({"a":1,"age_ms":5})"), tag_of(R"({"a":1,"age_ms":17})"));
     EXPECT_NE(tag_of(R"({"a":1,"age_ms":5})"), tag_of(R"({"a":2,"age_ms":5})"));
     EXPECT_NE(tag_of(R"({"a":1,"age_ms":5,"b":1})"), tag_of(R"({"a":1,"age_ms":5,"b":2})"));
+    EXPECT_NE(tag_of(R"({"every_ms":1000})"), tag_of(R"({"every_ms":7000})")) << "configured";
+    EXPECT_NE(tag_of(R"({"max_age_ms":1})"), tag_of(R"({"max_age_ms":7})")) << "configured";
     EXPECT_THAT(tag_of(""), StartsWith("W/\""));
     const auto is_known = [](const char* if_none_match) {
         HttpResponse response;

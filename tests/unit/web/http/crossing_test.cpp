@@ -134,7 +134,46 @@ TEST_F(CrossingTest, AddressesTakeTurnsAndAProbeGoesFirst) {
     begin("10.0.0.2", "b1", false);
     begin("10.0.0.1", "probe", true);
     both.run();
-    EXPECT_EQ(order, "a1 probe a2 b1 a3 ") << "a1 was alone when it came";
+    EXPECT_EQ(order, "a1 probe b1 a2 a3 ") << "a1 was alone when it came";
+}
+
+TEST(TurnsTest, WhoHasCostMoreWaitsForWhoHasCostLess) {
+    Turns turns;
+    const TimePoint now = TimePoint() + 1s;
+    const auto taken = [&] {
+        const auto turn = turns.take();
+        return turn ? turn->address : "nobody";
+    };
+    for (const char* address : {"a", "a", "b", "b", "b", ""}) turns.add(address, [] {});
+    EXPECT_EQ(taken(), "") << "a probe";
+    turns.charge(now, "", 1s);
+    EXPECT_EQ(taken(), "a");
+    turns.charge(now, "a", 100ms);
+    for (const Duration cost : {30ms, 40ms, 50ms}) {
+        EXPECT_EQ(taken(), "b") << "until it owes as much";
+        turns.charge(now, "b", cost);
+    }
+    turns.add("b", [] {});
+    EXPECT_EQ(taken(), "a");
+    EXPECT_EQ(taken(), "b");
+    EXPECT_EQ(taken(), "nobody");
+}
+
+TEST(TurnsTest, ADebtIsPaidByTimeAndWhoIsOnHoldWaits) {
+    Turns turns;
+    const TimePoint now = TimePoint() + 1s;
+    turns.charge(now, "a", 100ms);
+    turns.charge(now + 90ms, "b", 20ms);
+    turns.add("b", [] {});
+    turns.add("a", [] {});
+    turns.hold("a");
+    EXPECT_EQ(turns.take()->address, "b");
+    EXPECT_FALSE(turns.take());
+    turns.release("a");
+    EXPECT_EQ(turns.take()->address, "a");
+    turns.charge(now + 1s, "a", 0ms);  // both have paid long ago
+    for (const char* address : {"b", "a"}) turns.add(address, [] {});
+    EXPECT_EQ(turns.take()->address, "a");
 }
 
 TEST_F(CrossingTest, AnExceptionIsA500AndInTheLog) {
