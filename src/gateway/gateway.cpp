@@ -232,7 +232,7 @@ void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedTex
     judge_waiting();
     doors_.settle();
     watch_certificates();
-    watch_tokens();
+    watch_expiry();
 }
 
 /// Of all lines: what is new at a door is about requests to any.
@@ -240,12 +240,12 @@ void Gateway::judge_waiting() {
     for (const auto& line : snapshot_->lines) line->bus().judge_waiting();
 }
 
-/// Records tokens that have expired since the last look. The clock on the wall may be set, so it is
-/// looked at often.
-void Gateway::watch_tokens() {
+/// Closes connections whose certificate has expired, and records tokens that have expired since the
+/// last look. The clock on the wall may be set, so it is looked at often.
+void Gateway::watch_expiry() {
     using std::chrono::microseconds;  // Duration does not hold the years until some expire
     const WallTime now = rt::wall_now();
-    microseconds pause = 10s;
+    microseconds pause = 1s;
     bool some = false;
     for (const web::Token& token : tokens_of(*snapshot_->config)) {
         if (!token.expires) continue;
@@ -257,8 +257,9 @@ void Gateway::watch_tokens() {
         }
     }
     expired_until_ = now;
+    servers_.review();
     if (some) judge_waiting();
-    expiry_->arm(clock_.now() + pause, [this] { watch_tokens(); });
+    expiry_->arm(clock_.now() + pause, [this] { watch_expiry(); });
 }
 
 void Gateway::watch_certificates() {
@@ -331,7 +332,7 @@ void Gateway::start() {
     northbound_.start();
     watch_certificates();
     expired_until_ = rt::wall_now();
-    watch_tokens();
+    watch_expiry();
     ready_ = true;
 }
 

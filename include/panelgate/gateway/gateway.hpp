@@ -85,7 +85,7 @@ class Gateway {
     void show(const std::shared_ptr<Snapshot>& snapshot);
     web::Providers providers();
     void watch_certificates();
-    void watch_tokens();
+    void watch_expiry();
     void judge_waiting();
     metrics::Snapshot figures() const;
     std::function<std::string()> metrics_text() const;
@@ -114,7 +114,7 @@ class Gateway {
     Servers servers_;
     Northbound northbound_;
     std::unique_ptr<CertificateWatch> certificates_;           ///< null until a listener has `tls`
-    std::unique_ptr<rt::Alarm> expiry_ = clock_.make_alarm();  ///< of a token
+    std::unique_ptr<rt::Alarm> expiry_ = clock_.make_alarm();  ///< of tokens and clients' certificates
     WallTime expired_until_{};                                 ///< looked at for expiry so far
     bool ready_ = false;
 };

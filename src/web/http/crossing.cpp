@@ -57,7 +57,7 @@ Handling Crossing::ask(HttpRequest request, Handler handler, bool probe) {
     });
     request.caller = caller;
     const auto asked = std::make_shared<HttpRequest>(std::move(request));
-    queue(probe ? "" : client->address(),
+    queue(probe ? HostKey() : client->host(),
           [this, asked, handler = std::make_shared<const Handler>(std::move(handler)),
            waiting = std::weak_ptr(question)] { begin(std::move(*asked), handler, waiting); });
     pass_next();
@@ -67,25 +67,26 @@ Handling Crossing::ask(HttpRequest request, Handler handler, bool probe) {
     co_return response;
 }
 
-void Crossing::queue(const std::string& address, std::function<void()> beginning) {
-    Beginnings& own = waiting_[address];
-    if (own.empty() && address.empty()) turns_.push_front(address);
-    if (own.empty() && !address.empty()) turns_.push_back(address);
+void Crossing::queue(const HostKey& host, std::function<void()> beginning) {
+    Beginnings& own = waiting_[host];
+    const bool is_probe = host == HostKey();
+    if (own.empty() && is_probe) turns_.push_front(host);
+    if (own.empty() && !is_probe) turns_.push_back(host);
     own.push_back(std::move(beginning));
 }
 
 std::function<void()> Crossing::take_next() {
-    const std::string address = std::move(turns_.front());
+    const HostKey host = std::move(turns_.front());
     turns_.pop_front();
-    Beginnings& own = waiting_[address];
+    Beginnings& own = waiting_[host];
     std::function<void()> next = std::move(own.front());
     own.pop_front();
     if (own.empty())
-        waiting_.erase(address);
-    else if (address.empty())
-        turns_.push_front(address);
+        waiting_.erase(host);
+    else if (host == HostKey())
+        turns_.push_front(host);
     else
-        turns_.push_back(address);
+        turns_.push_back(host);
     return next;
 }
 

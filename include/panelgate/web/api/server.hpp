@@ -101,6 +101,8 @@ class Server {
     std::size_t connections() const;
     /// As HttpListener::renew().
     void renew(const tls::Settings& settings);
+    /// As HttpListener::review().
+    void review();
     /// The counters as they were when /metrics was asked for last.
     Counters counters() const;
 

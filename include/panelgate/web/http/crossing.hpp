@@ -77,7 +77,7 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
     static Handling wait_for(std::shared_ptr<Awaited> awaited, std::shared_ptr<Caller> client);
     void begin(HttpRequest request, std::shared_ptr<const Handler> handler,
                std::weak_ptr<Awaited> waiting);
-    void queue(const std::string& address, std::function<void()> beginning);
+    void queue(const HostKey& host, std::function<void()> beginning);
     std::function<void()> take_next();
     void pass_next();
     void rest(Duration took);
@@ -85,9 +85,9 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
     Loops loops_;
     // Of the faces' loop:
     using Beginnings = std::deque<std::function<void()>>;
-    std::map<std::string, Beginnings> waiting_;  ///< requests that the plant has not begun
-    std::deque<std::string> turns_;              ///< of addresses with such requests
-    bool passing_ = false;                       ///< the plant begins one, or has its rest
+    std::map<HostKey, Beginnings> waiting_;  ///< requests that the plant has not begun
+    std::deque<HostKey> turns_;              ///< of hosts with such requests; a probe has none
+    bool passing_ = false;                   ///< the plant begins one, or has its rest
     // Of the plant's loop:
     std::set<std::shared_ptr<Caller>> callers_;  ///< of the requests under way
     bool closed_ = false;
