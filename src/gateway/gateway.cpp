@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/asio/post.hpp>
 #include <charconv>
 #include <memory>
 #include <random>
@@ -18,6 +19,7 @@
 #include "panelgate/gateway/running_line.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/rt/loop.hpp"
+#include "panelgate/tls/judge.hpp"
 
 namespace panelgate::gateway {
 
@@ -258,8 +260,16 @@ void Gateway::watch_expiry() {
     }
     expired_until_ = now;
     servers_.review();
+    if (northbound_.counters()) ask_broker();
     if (some) judge_waiting();
     expiry_->arm(clock_.now() + pause, [this] { watch_expiry(); });
+}
+
+/// Brings the counters of the connection to the broker here, so that it is known whether it is there.
+void Gateway::ask_broker() {
+    boost::asio::post(loops_.faces, [collect = northbound_.collector(), plant = loops_.plant] {
+        if (auto keep = collect()) boost::asio::post(plant, std::move(keep));
+    });
 }
 
 void Gateway::watch_certificates() {
@@ -308,6 +318,8 @@ web::Providers Gateway::providers() {
     providers.now = rt::AsioClock::read;
     providers.events = events_.hub();
     providers.relays = [this] { return relays_->status(); };
+    providers.findings = [this] { return findings(); };
+    providers.usage = [this] { return usage(); };
     providers.wall = rt::wall_now;
     providers.collect = northbound_.collector();
     providers.discovery = discoveries_.get();
@@ -333,6 +345,7 @@ void Gateway::start() {
     watch_certificates();
     expired_until_ = rt::wall_now();
     watch_expiry();
+    look_for_findings();
     ready_ = true;
 }
 
@@ -363,6 +376,7 @@ std::string Gateway::status() const {
 void Gateway::stop() {
     lag_.stop();
     expiry_->cancel();
+    looking_->cancel();
     if (certificates_) certificates_->stop();
     servers_.close();
     northbound_.stop();
@@ -372,10 +386,53 @@ void Gateway::stop() {
     audit_.close();
 }
 
+/// Takes what the lines have counted, for the last minute.
+void Gateway::look_for_findings() {
+    for (const auto& line : snapshot_->lines) line->record_minute();
+    looked_ = {};
+    findings();
+    looking_->arm(clock_.now() + bus::LastMinute::kStep, [this] { look_for_findings(); });
+}
+
+std::vector<web::LineUsage> Gateway::usage() const {
+    std::vector<web::LineUsage> usage;
+    for (std::size_t i = 0; i < snapshot_->lines.size(); ++i)
+        usage.push_back({snapshot_->config->lines[i].name, snapshot_->lines[i]->last_minute()});
+    return usage;
+}
+
+Findings::State Gateway::state() const {
+    const config::Config& config = *snapshot_->config;
+    Findings::State state;
+    state.lines = usage();
+    const auto broker = northbound_.counters();
+    if (broker && !broker->connected && config.mqtt) state.broker_away = config.mqtt->broker();
+    if (audit_.is_kept() && audit_.counters().failing) state.audit_fails = config.audit->file;
+    state.writes_stop = audit_.refuses_writes();
+    if (!reloads_->counters().last_succeeded) state.refused = reloads_->last();
+    for (const ServedCertificate& one : certificates())
+        if (const std::int64_t end = tls::summary_of(one.settings.material.certificate).end;
+            end > 0)
+            state.certificates.push_back({one.listener, end});
+    return state;
+}
+
+/// As they are now, but for a second.
+const std::vector<web::Finding>& Gateway::findings() {
+    constexpr Duration kRest = 1s;
+    if (clock_.now() - looked_ >= kRest) {
+        looked_ = clock_.now();
+        findings_.judge(looked_, rt::wall_now(), state());
+    }
+    return findings_.list();
+}
+
 /// All figures but those of points, and of the process.
-metrics::Snapshot Gateway::figures() const {
+metrics::Snapshot Gateway::figures() {
     metrics::Snapshot figures;
     for (const auto& line : snapshot_->lines) figures.lines.push_back(line->bus().report());
+    for (const web::Finding& one : findings())
+        figures.findings.push_back({one.line, one.cause, one.name});
     figures.relays = relay_samples(relays_->status());
     servers_.copy_figures(figures);
     figures.mqtt = northbound_.counters();
@@ -390,7 +447,7 @@ metrics::Snapshot Gateway::figures() const {
     return figures;
 }
 
-std::function<std::string()> Gateway::metrics_text() const {
+std::function<std::string()> Gateway::metrics_text() {
     const auto copy = std::make_shared<metrics::Snapshot>(figures());
     return [copy, points = seen_points(snapshot_->plant, clock_.now()),
             snapshot = rt::lend(loops_.plant, std::shared_ptr<const Snapshot>(snapshot_))] {

@@ -295,11 +295,12 @@ std::string Handshakes::why_leave(const Stream& stream) const {
         return settings_.client == ClientCertificate::required
                    ? "the client has shown no certificate, and now must"
                    : "";
-    const Peer& peer = stream.peer();
-    if (context_->revokes(shown)) return "the client's certificate " + peer.subject + " is revoked";
-    return rt::wall_seconds() < static_cast<double>(peer.expiry)
-               ? ""
-               : "the client's certificate " + peer.subject + " has expired, or a CA's of it";
+    const std::string what = "the client's certificate " + stream.peer().subject;
+    if (context_->revokes(shown)) return what + " is revoked";
+    const auto now = static_cast<std::int64_t>(rt::wall_seconds());
+    if (now < stream.peer().expiry) return "";
+    const bool is_own = seconds_of(X509_get0_notAfter(shown)) <= now;
+    return (is_own ? what : "the CA of " + what) + " has expired";
 }
 
 void Handshakes::stop() {
