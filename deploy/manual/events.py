@@ -59,6 +59,8 @@ MEANINGS = {
     "discovery started": "a client asked for a search",
     "discovery stopped": "a client ended a search",
     "frame": "one frame on the line, in or out",
+    "gateway finding": "what is not well with the gateway itself, see [Findings](findings.md)",
+    "gateway finding gone": "that has ended",
     "http handler failed": "a defect of the program: please report it",
     "http request refused": "a client's role is not enough",
     "http requests refused": "all HTTP connections are busy",

@@ -1,5 +1,6 @@
-"""docs/reference/findings.md: what the line doctor finds. Its causes stand in an enumeration, and what is
-said of each stands in the dashboard's table of words; a cause that one of them lacks ends this."""
+"""docs/reference/findings.md: what the line doctor finds, and what is found of the gateway itself. The
+doctor's causes stand in an enumeration, and what is said of each stands in the dashboard's table of words; a
+cause that one of them lacks ends this. So does a cause of the gateway that the table below lacks."""
 import json
 import pathlib
 import re
@@ -10,6 +11,26 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 CAUSES = ROOT / "include/panelgate/doctor/finding.hpp"
 CODES = ROOT / "src/doctor/finding.cpp"
 WORDS = ROOT / "src/web/page/finding_words.js"
+OWN = ROOT / "src/gateway/findings.cpp"
+# cause: what it is, sign, remedy
+OF_THE_GATEWAY = {
+    "overload": ("more is asked of a line than it can carry",
+                 "a line is in use for more than 95 % of a minute, or requests find no turn in each ten seconds "
+                 "of a minute; `clients` has the addresses that asked, with their shares",
+                 "Ask less often or in blocks, give stations a `max_age`, raise the baud, or take stations to a "
+                 "second line."),
+    "broker-away": ("values do not reach the MQTT broker", "no connection for 10 s",
+                    "See whether the broker runs and can be reached; `mqtt not connected` in the log says why."),
+    "audit-fails": ("the audit cannot be written", "the file takes no record; with `on_failure: refuse_writes` "
+                    "every write is refused",
+                    "`audit fails` in the log says why: a full disk, a folder that is not there, or rights."),
+    "reload-refused": ("the running configuration is not that of the file",
+                       "the last reload was refused; `evidence` has the first fault",
+                       "Mend the file (`panelgate check`), and reload. A restart would fail with the file as it is."),
+    "certificate-expires": ("a certificate ends within 14 days, or has expired",
+                            "its last day; `name` is the listener or the broker",
+                            "Put a new certificate in its place; the gateway takes it over by itself."),
+}
 OF_LINE = 9  # so many come first in the enumeration
 
 
@@ -50,6 +71,19 @@ def entry(all_words, code, what):
             *table(("", ""), [("Cause", what), ("Sign", "; or: ".join(signs)), ("Remedy", " Or: ".join(advice))])]
 
 
+def of_the_gateway():
+    causes_there = re.findall(r'\.cause = "([\w-]+)"', OWN.read_text())
+    if sorted(causes_there) != sorted(OF_THE_GATEWAY):
+        raise SystemExit(f"{OWN} has other causes than {list(OF_THE_GATEWAY)}")
+    lines = ["## Of the gateway itself", "",
+             "They are in `/api/v1/findings`, in `panelgate status`, on the dashboard, in the log as `gateway "
+             "finding`,", "and as `panelgate_findings{cause=\"...\"}` in `/metrics`.", ""]
+    for cause, (what, sign, remedy) in OF_THE_GATEWAY.items():
+        lines += [f"### {cause}", "", what[0].upper() + what[1:] + ".", "",
+                  *table(("", ""), [("Sign", sign), ("Remedy", remedy)])]
+    return lines
+
+
 def text():
     all_words, found = words(), causes()
     lines = ["# Findings", "",
@@ -60,10 +94,11 @@ def text():
              "The gateway's own sentences may say more, with the settings and figures of the case.", "",
              "A finding needs some cases to appear, and half of that to stay. Where one cause explains damage,",
              "no other is named for it.", "",
-             *table(("cause", "what it is"), [(f"[`{code}`](#{code})", what) for code, what in found]),
+             *table(("cause", "what it is"), [(f"[`{code}`](#{code})", what) for code, what in found] +
+                    [(f"[`{code}`](#{code})", of[0]) for code, of in OF_THE_GATEWAY.items()]),
              "## Of the whole line", ""]
     for place, (code, what) in enumerate(found):
         if place == OF_LINE:
             lines += ["## Of one panel", ""]
         lines += entry(all_words, code, what)
-    return page(lines)
+    return page(lines + of_the_gateway())

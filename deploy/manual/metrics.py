@@ -20,14 +20,15 @@ access: {rules: [{name: no-writes, deny: [write]}]}
 alarms: [{name: panel-lost, station: panel, offline: true}]
 """
 # What neither has: its labels, and what it takes.
-OTHERS = {"panelgate_findings": "line, station, cause", "panelgate_framing_errors_total": "line",
+FINDING = "line, station, cause; of the gateway itself: cause, name"
+OTHERS = {"panelgate_findings": FINDING, "panelgate_framing_errors_total": "line",
           "panelgate_parity_errors_total": "line", "panelgate_overruns_total": "line",
           "panelgate_breaks_total": "line",
           "panelgate_token_last_use_timestamp_seconds": "token", "panelgate_tls_handshakes_total": "listener, outcome",
           "panelgate_certificate_expiry_timestamp_seconds": "listener",
           "panelgate_certificate_renewals_total": "listener, outcome"}
-# What a program that was built outside of a repository would not have.
-LABELS = {"panelgate_build_info": "version, commit, compiler"}
+# What not every scrape has.
+LABELS = {"panelgate_findings": FINDING, "panelgate_build_info": "version, commit, compiler"}
 GROUPS = [("Requests", ("requests", "translated", "request_duration", "queue"),
            "`requests_total` begins with `ok` for the functions that a panel has. Of a function `exception` and "
            "`timeout` are there from its first use, other outcomes once they happened."),

@@ -4,18 +4,9 @@
 #include <functional>
 #include <utility>
 
+#include "panelgate/base/network.hpp"
+
 namespace panelgate {
-
-namespace {
-
-/// An IPv4 client as a listener on [::] sees it (RFC 4291, 2.5.5.2).
-std::string_view without_mapping(std::string_view address) {
-    constexpr std::string_view kMapped = "::ffff:";
-    const bool mapped = address.starts_with(kMapped) && address.find('.') != address.npos;
-    return mapped ? address.substr(kMapped.size()) : address;
-}
-
-}  // namespace
 
 std::string_view label(Face face) {
     switch (face) {
@@ -36,7 +27,7 @@ std::string_view label(Face face) {
 }
 
 std::uint64_t host_number(std::string_view address) {
-    const auto number = std::hash<std::string_view>{}(without_mapping(address));
+    const auto number = std::hash<std::string>{}(HostKey(address).text());
     return number == 0 ? 1 : number;
 }
 

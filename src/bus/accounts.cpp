@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <boost/asio/ip/address.hpp>
-#include <boost/system/error_code.hpp>
 #include <cmath>
 #include <cstddef>
 #include <iterator>
@@ -150,7 +148,7 @@ void log_write(const Settings& settings, const WriteEnd& write) {
         write.station == 0 ? std::string("broadcast") : name_of(settings.stations, write.station);
     const std::string full_name = text_of(write.who);
     const std::string certificate = write.who ? write.who->certificate : "";
-    const std::string client = without_port(full_name) + ' ' + certificate;
+    const std::string client = name_of_host(full_name) + ' ' + certificate;
     const std::string at = place_of(write.items);
     const std::string pdu = hex_of(write.pdu);
     const std::string place = settings.name + '/' + name + ' ' + at;
@@ -171,14 +169,6 @@ void log_write(const Settings& settings, const WriteEnd& write) {
 
 namespace {
 
-/// Returns the host without port and brackets.
-std::string_view host_in(std::string_view word) {
-    if (word.starts_with('[')) return word.substr(1, word.find(']') - 1);
-    const auto colon = word.find(':');
-    const bool has_port = colon != word.npos && word.find(':', colon + 1) == word.npos;
-    return has_port ? word.substr(0, colon) : word;
-}
-
 void add(DepartedClients::Row& sum, const DepartedClients::Row& more) {
     sum.used.busy += more.used.busy;
     sum.used.transactions += more.used.transactions;
@@ -192,32 +182,14 @@ void add(DepartedClients::Row& sum, const DepartedClients::Row& more) {
 
 }  // namespace
 
-std::optional<std::string> address_in(const std::string& name) {
-    const auto blank = name.find(' ');
-    if (blank == name.npos) return std::nullopt;
-    const std::string_view rest = std::string_view(name).substr(blank + 1);
-    const std::string host(host_in(rest.substr(0, rest.find(' '))));
-    boost::system::error_code wrong;
-    boost::asio::ip::make_address(host, wrong);
-    return wrong ? std::nullopt : std::optional(host);
-}
-
-std::string without_port(const std::string& name) {
-    const auto address = address_in(name);
-    if (!address) return name;
-    const auto begin = name.find(' ') + 1;
-    const auto end = std::min(name.find(' ', begin), name.size());
-    return name.substr(0, begin) + *address + name.substr(end);
-}
-
 void DepartedClients::leave(TimePoint now, const std::string& name,
                             const arbiter::BusShares::Share& used,
                             const ClientAccounts::Totals& totals) {
     const Row row{used, totals, now};
     drop_old(now);
     // Internal tasks end when the configuration changes: they are not remembered.
-    if (!address_in(name) || settings_.remembered == 0) return add(forgotten_, row);
-    const std::string key = without_port(name);
+    if (address_in(name).empty() || settings_.remembered == 0) return add(forgotten_, row);
+    const std::string key = name_of_host(name);
     if (!rows_.contains(key)) make_room();
     add(rows_[key], row);
 }
@@ -312,7 +284,7 @@ std::vector<ClientShare> client_shares(const ClientUse& use, TimePoint now) {
     std::vector<ClientShare> list;
     for (auto& [name, entry] : rows_of(use, now)) {
         entry.name = name;
-        entry.address = address_in(name);
+        if (const auto address = address_in(name); !address.empty()) entry.address = address;
         list.push_back(std::move(entry));
     }
     std::ranges::sort(list, std::ranges::greater{}, &ClientShare::busy);

@@ -84,7 +84,7 @@ class ClientAccounts {
 };
 
 /// Line use by disconnected clients. A script that connects once per request counts as one client.
-/// Keeps only servers' clients, by name without port, within the settings' time and number. Pure.
+/// Keeps only servers' clients, by name_of_host(), within the settings' time and number. Pure.
 class DepartedClients {
   public:
     struct Row {
@@ -112,13 +112,6 @@ class DepartedClients {
     std::map<std::string, Row> rows_;
     Row forgotten_{};
 };
-
-/// Returns the address in a server client's name ("modbus_tcp 10.0.0.7:51234", "http ::1 token
-/// ops"); nullopt for other names.
-std::optional<std::string> address_in(const std::string& name);
-
-/// Returns "modbus_tcp 10.0.0.7" for the first of these; other names unchanged.
-std::string without_port(const std::string& name);
 
 /// The sources of client_shares().
 struct ClientUse {

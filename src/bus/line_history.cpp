@@ -75,13 +75,25 @@ LineHistory::LineHistory(Duration width)
       wire_(load_),
       queue_(load_) {}
 
-LineHistory::Counts LineHistory::counts_of(const StationReport& station) {
-    Counts counts;
+RequestCounts& RequestCounts::operator+=(const RequestCounts& more) {
+    requests += more.requests;
+    errors += more.errors;
+    no_turn += more.no_turn;
+    answers += more.answers;
+    latency += more.latency;
+    transactions += more.transactions;
+    wire += more.wire;
+    return *this;
+}
+
+RequestCounts counts_of(const StationReport& station) {
+    RequestCounts counts;
     for (const auto& [function, outcomes] : station.requests) {
         for (const Outcome outcome : kAllOutcomes) {
             counts.requests += outcomes[outcome];
             if (is_error(outcome)) counts.errors += outcomes[outcome];
         }
+        counts.no_turn += outcomes[Outcome::busy] + outcomes[Outcome::expired];
     }
     counts.answers = count_of(station.request_duration);
     counts.latency = station.request_duration.sum;
@@ -90,32 +102,30 @@ LineHistory::Counts LineHistory::counts_of(const StationReport& station) {
     return counts;
 }
 
-void LineHistory::add_difference(const Counts& now, const Counts& before, Counts& sum) {
+RequestCounts difference(const RequestCounts& now, const RequestCounts& before) {
     const bool is_new = now.requests < before.requests || now.errors < before.errors ||
                         now.answers < before.answers || now.transactions < before.transactions;
-    const Counts from = is_new ? Counts() : before;
-    sum.requests += now.requests - from.requests;
-    sum.errors += now.errors - from.errors;
-    sum.answers += now.answers - from.answers;
-    sum.latency += now.latency - from.latency;
-    sum.transactions += now.transactions - from.transactions;
-    sum.wire += now.wire - from.wire;
+    if (is_new) return now;
+    return {now.requests - before.requests, now.errors - before.errors,
+            now.no_turn - before.no_turn,   now.answers - before.answers,
+            now.latency - before.latency,   now.transactions - before.transactions,
+            now.wire - before.wire};
 }
 
-LineHistory::Counts LineHistory::take(const LineReport& report) {
-    Counts sum;
+RequestCounts LineHistory::take(const LineReport& report) {
+    RequestCounts sum;
     const auto before = std::exchange(stations_, {});
     for (const StationReport& station : report.stations) {
-        const Counts now = counts_of(station);
+        const RequestCounts now = counts_of(station);
         const auto known = before.find(station.station);
-        add_difference(now, known == before.end() ? Counts() : known->second, sum);
+        sum += difference(now, known == before.end() ? RequestCounts() : known->second);
         stations_.emplace(station.station, now);
     }
     return sum;
 }
 
 void LineHistory::record(TimePoint now, const LineReport& report) {
-    const Counts counts = take(report);
+    const RequestCounts counts = take(report);
     const Duration busy = report.wire.busy - std::exchange(busy_, report.wire.busy);
     const std::optional<TimePoint> before = std::exchange(at_, now);
     if (!before || now <= *before) return;

@@ -14,7 +14,6 @@
 #include "output.hpp"
 #include "overview.hpp"
 #include "panelgate/base/time.hpp"
-#include "panelgate/rt/clock.hpp"
 #include "table.hpp"
 
 namespace panelgate::commands {
@@ -34,7 +33,9 @@ std::optional<Overview> look(const GatewayClient& gateway, ExitCode& code) {
     boost::json::object lines;
     if (!ask_for(gateway, "/api/v1/lines", lines, code) ||
         !ask_for(gateway, "/api/v1/stations", overview.stations, code) ||
-        !ask_for(gateway, "/api/v1/relays", overview.relays, code))
+        !ask_for(gateway, "/api/v1/relays", overview.relays, code) ||
+        !ask_for(gateway, "/api/v1/findings", overview.findings, code) ||
+        !ask_for(gateway, "/api/v1/usage", overview.usage, code))
         return std::nullopt;
     for (const auto* line : objects_of(lines, "lines")) {
         boost::json::object all;
@@ -42,7 +43,6 @@ std::optional<Overview> look(const GatewayClient& gateway, ExitCode& code) {
             return std::nullopt;
         overview.lines.push_back(std::move(all));
     }
-    overview.figures = figures_of(gateway.get("/metrics").body);
     const GatewayAnswer ready = gateway.get("/readyz");
     if (ready.status != 200) overview.not_ready = first_line(ready.body + ready.failure);
     return overview;
@@ -58,15 +58,10 @@ std::string for_the_screen(const std::string& text) {
 }
 
 [[noreturn]] void draw_for_ever(const GatewayClient& gateway, Overview overview) {
-    AllFigures before;
-    double seconds = 0;
-    double asked = rt::wall_seconds();
     std::string trouble;
     for (;;) {
-        const AllFigures figures = overview.figures;
-        overview.figures = difference(figures, before);
         const std::string screen =
-            top_text(overview, seconds, is_coloured()) + trouble + "\nCtrl-C ends it.";
+            top_text(overview, is_coloured()) + trouble + "\nCtrl-C ends it.";
         std::cout << kHome + for_the_screen(screen) << std::flush;
         if (!std::cout) end_without_output();
         std::this_thread::sleep_for(1s);
@@ -74,15 +69,10 @@ std::string for_the_screen(const std::string& text) {
         const GatewayAnswer there = gateway.get("/readyz");
         ExitCode code = kFine;
         auto next = there.status != 0 ? look(gateway, code) : std::nullopt;
-        overview.figures = figures;
-        if (!next) {
+        if (next)
+            overview = std::move(*next);
+        else
             trouble = '\n' + gateway.reason(there) + '\n';
-            continue;
-        }
-        before = figures;
-        const double now = rt::wall_seconds();
-        seconds = now - std::exchange(asked, now);
-        overview = std::move(*next);
     }
 }
 
@@ -107,7 +97,7 @@ ExitCode top(const GatewayOptions& at, bool once) {
     const char* const kind = std::getenv("TERM");
     const bool is_dumb = kind != nullptr && std::string_view(kind) == "dumb";
     if (once || is_dumb || ::isatty(STDOUT_FILENO) != 1) {
-        std::cout << top_text(*overview, 0, is_coloured());
+        std::cout << top_text(*overview, is_coloured());
         return kFine;
     }
     end_with_signals();

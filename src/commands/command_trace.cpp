@@ -178,8 +178,8 @@ class Report {
         add("time", rfc3339(rt::wall_now()));
         add("gateway", gateway_.url());
         add("asked_by", gateway::build_text());
-        for (const char* name :
-             {"version", "configuration", "reload", "stations", "points", "relays"})
+        for (const char* name : {"version", "configuration", "reload", "stations", "points",
+                                 "relays", "findings", "usage"})
             ask(name, std::string("/api/v1/") + name);
         ask("ready", "/readyz");
         for (const std::string& line : *lines) add_line(line);

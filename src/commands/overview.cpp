@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <initializer_list>
+#include <tuple>
 #include <utility>
 
 #include "answers.hpp"
@@ -39,19 +41,47 @@ bool is_up(const json::object& line) {
     return up != nullptr && up->is_bool() && up->get_bool();
 }
 
-Figures figures_for(const AllFigures& all, const std::string& line, const std::string& station) {
-    const auto found = all.find({line, station});
-    return found == all.end() ? Figures{} : found->second;
+/// The object of a list whose member `key` has this text; null: there is none.
+const json::object* find(const json::object& answer, std::string_view list, std::string_view key,
+                         const std::string& text) {
+    for (const json::object* one : objects_of(answer, list))
+        if (text_of(*one, key) == text) return one;
+    return nullptr;
 }
 
-std::string mean(const Figures& figures) {
-    return figures.transactions > 0 ? latency_text(figures.seconds / figures.transactions) : "-";
+/// What was used of a line in the last minute; without anything before its first look.
+json::object line_use(const Overview& overview, const std::string& line) {
+    const json::object* found = find(overview.usage, "lines", "line", line);
+    return found != nullptr ? *found : json::object();
+}
+
+json::object station_use(const Overview& overview, const json::object& station) {
+    const json::object line = line_use(overview, text_of(station, "line"));
+    const json::object* found = find(line, "stations", "station", text_of(station, "name"));
+    return found != nullptr ? *found : json::object();
+}
+
+double count_of(const json::object& use, std::string_view name) {
+    return number_of(use, name).value_or(0);
+}
+
+/// "figures of the last minute", or of less where the gateway is younger.
+std::string span_of(const Overview& overview) {
+    double seconds = 0;
+    for (const json::object* line : objects_of(overview.usage, "lines"))
+        seconds = std::max(seconds, count_of(*line, "seconds"));
+    return "figures of the last " + (seconds >= 60 ? "minute" : span_text(seconds));
+}
+
+std::string mean(const json::object& use) {
+    const auto ms = number_of(use, "transaction_ms");
+    return ms ? latency_text(*ms / 1000) : "-";
 }
 
 /// "3 of 120"
-Cell errors_of(const Figures& figures) {
-    return {whole(figures.errors) + " of " + whole(figures.requests),
-            figures.errors > 0 ? Colour::warning : Colour::none};
+Cell errors_of(const json::object& use) {
+    return {whole(count_of(use, "errors")) + " of " + whole(count_of(use, "requests")),
+            count_of(use, "errors") > 0 ? Colour::warning : Colour::none};
 }
 
 /// Unknown: the station was not asked, or the line is down. Heard: the station answers another
@@ -106,6 +136,8 @@ std::vector<std::string> troubles(const Overview& overview) {
                        (last ? ", its last answer is " + span_text(*last / 1000) + " old"
                              : ", it has never answered"));
     }
+    for (const json::object* finding : objects_of(overview.findings, "findings"))
+        list.push_back(shown(*finding, "text"));
     for (const json::object& line : overview.lines) {
         for (const json::object* finding : objects_of(line, "findings"))
             list.push_back(finding_text(line, *finding));
@@ -121,14 +153,14 @@ std::string lines_table(const Overview& overview, bool coloured) {
     for (const json::object& line : overview.lines) {
         const std::string state = shown(line, "state");
         const bool listens = text_of(line, "mode") == "listen";
-        const Figures figures = figures_for(overview.figures, text_of(line, "name"), "");
+        const json::object use = line_use(overview, text_of(line, "name"));
         table.add(
             {shown(line, "name"),
              {state + (listens ? ", listening" : ""), is_up(line) ? Colour::good : Colour::bad},
-             percent(number_of(line, "load_percent").value_or(0)),
-             whole(number_of(line, "queue_depth").value_or(0)),
-             mean(figures),
-             errors_of(figures),
+             percent(count_of(use, "load_percent")),
+             whole(count_of(line, "queue_depth")),
+             mean(use),
+             errors_of(use),
              shown(line, "device")});
     }
     return table.text(coloured);
@@ -140,29 +172,37 @@ std::string stations_table(const Overview& overview, bool coloured) {
     for (const json::object* station : objects_of(overview.stations, "stations")) {
         const std::string state = shown(*station, "state");
         const auto last = number_of(*station, "last_success_ms");
-        const Figures figures =
-            figures_for(overview.figures, text_of(*station, "line"), text_of(*station, "name"));
+        const json::object use = station_use(overview, *station);
         table.add({shown(*station, "name"),
                    line_of(overview, *station),
                    shown(*station, "profile"),
                    {state, colour_of(state)},
                    last ? span_text(*last / 1000) + " ago" : "never",
-                   mean(figures),
-                   errors_of(figures)});
+                   mean(use),
+                   errors_of(use)});
     }
     return table.text(coloured);
 }
 
+/// What is found, what to do, and the numbers behind it.
+std::string note(std::string text, const json::object& finding,
+                 std::initializer_list<const char*> parts) {
+    text += '\n';
+    for (const char* part : parts) {
+        const std::string sentence = shown(finding, part);
+        if (!sentence.empty()) text += "  " + sentence + '\n';
+    }
+    return text;
+}
+
 std::string findings_text(const Overview& overview) {
     std::string text;
+    for (const json::object* finding : objects_of(overview.findings, "findings"))
+        text += note(shown(*finding, "name") + ": " + shown(*finding, "cause"), *finding,
+                     {"text", "evidence", "advice"});
     for (const json::object& line : overview.lines) {
-        for (const json::object* finding : objects_of(line, "findings")) {
-            text += finding_text(line, *finding) + '\n';
-            for (const char* part : {"text", "advice"}) {
-                const std::string sentence = shown(*finding, part);
-                if (!sentence.empty()) text += "  " + sentence + '\n';
-            }
-        }
+        for (const json::object* finding : objects_of(line, "findings"))
+            text += note(finding_text(line, *finding), *finding, {"text", "advice"});
     }
     return text.empty() ? "" : '\n' + text;
 }
@@ -170,7 +210,8 @@ std::string findings_text(const Overview& overview) {
 }  // namespace
 
 std::string status_text(const Overview& overview, bool coloured) {
-    std::string text = lines_table(overview, coloured) + '\n' + stations_table(overview, coloured) +
+    std::string text = overview.url + ", " + span_of(overview) + "\n\n" +
+                       lines_table(overview, coloured) + '\n' + stations_table(overview, coloured) +
                        findings_text(overview) + '\n';
     const std::vector<std::string> list = troubles(overview);
     if (list.empty()) return text + painted("all is well", Colour::good, coloured) + '\n';
@@ -190,7 +231,9 @@ std::string status_json(const Overview& overview) {
                            {"troubles", json::array(list.begin(), list.end())},
                            {"lines", json::array(overview.lines.begin(), overview.lines.end())},
                            {"stations", list_in(overview.stations, "stations")},
-                           {"relays", list_in(overview.relays, "relays")}};
+                           {"relays", list_in(overview.relays, "relays")},
+                           {"findings", list_in(overview.findings, "findings")},
+                           {"usage", list_in(overview.usage, "lines")}};
     return json::serialize(all) + '\n';
 }
 
@@ -209,35 +252,36 @@ std::string rate(double count, double seconds) {
     return text;
 }
 
-std::string utilisation(const Overview& overview, double seconds, bool coloured) {
+std::string utilisation(const Overview& overview, bool coloured) {
     TextTable table(
         {"LINE", "STATE", ">LOAD", "", ">QUEUE", ">REQUESTS/S", ">ERRORS/S", ">LATENCY"});
     for (const json::object& line : overview.lines) {
-        const double load = number_of(line, "load_percent").value_or(0);
-        const Figures figures = figures_for(overview.figures, text_of(line, "name"), "");
+        const json::object use = line_use(overview, text_of(line, "name"));
+        const double load = count_of(use, "load_percent");
+        const double seconds = count_of(use, "seconds");
         const Colour colour = load > 80 ? Colour::bad : load > 50 ? Colour::warning : Colour::good;
         table.add({shown(line, "name"),
                    {shown(line, "state"), is_up(line) ? Colour::good : Colour::bad},
                    percent(load),
                    {bar(load), colour},
-                   whole(number_of(line, "queue_depth").value_or(0)),
-                   rate(figures.requests, seconds),
-                   {rate(figures.errors, seconds),
-                    figures.errors > 0 && seconds > 0 ? Colour::warning : Colour::none},
-                   mean(figures)});
+                   whole(count_of(line, "queue_depth")),
+                   rate(count_of(use, "requests"), seconds),
+                   {rate(count_of(use, "errors"), seconds),
+                    count_of(use, "errors") > 0 ? Colour::warning : Colour::none},
+                   mean(use)});
     }
     return table.text(coloured);
 }
 
 using Client = std::pair<const json::object*, const json::object*>;  // its line, and it
 
-double share_of(const Client& client) { return number_of(*client.second, "percent").value_or(0); }
+double share_of(const Client& client) { return count_of(*client.second, "percent"); }
 
 std::string clients_table(const Overview& overview, bool coloured) {
     std::vector<Client> clients;
-    for (const json::object& line : overview.lines) {
-        for (const json::object* client : objects_of(line, "clients"))
-            clients.emplace_back(&line, client);
+    for (const json::object* line : objects_of(overview.usage, "lines")) {
+        for (const json::object* client : objects_of(*line, "clients"))
+            clients.emplace_back(line, client);
     }
     std::ranges::sort(clients, std::ranges::greater(), share_of);
     TextTable table({"CLIENT", "LINE", ">SHARE", ">REQUESTS", ">FAILED", "LAST ERROR"});
@@ -247,7 +291,7 @@ std::string clients_table(const Overview& overview, bool coloured) {
         const auto ago = number_of(*client, "last_error_ms");
         table.add(
             {shown(*client, "name"),
-             shown(*line, "name"),
+             shown(*line, "line"),
              percent(share_of(clients[i])),
              whole(number_of(*client, "requests").value_or(0)),
              {whole(failed), failed > 0 ? Colour::warning : Colour::none},
@@ -257,37 +301,33 @@ std::string clients_table(const Overview& overview, bool coloured) {
 }
 
 std::string slowest_table(const Overview& overview, bool coloured) {
-    std::vector<std::pair<double, const json::object*>> stations;
+    std::vector<std::tuple<double, const json::object*, json::object>> stations;
     for (const json::object* station : objects_of(overview.stations, "stations")) {
-        const Figures figures =
-            figures_for(overview.figures, text_of(*station, "line"), text_of(*station, "name"));
-        const bool silent = text_of(*station, "state") == "offline";
-        if (figures.transactions > 0 || silent)
-            stations.emplace_back(
-                figures.transactions > 0 ? figures.seconds / figures.transactions : 0, station);
+        json::object use = station_use(overview, *station);
+        const auto ms = number_of(use, "transaction_ms");
+        if (ms || text_of(*station, "state") == "offline")
+            stations.emplace_back(ms.value_or(0), station, std::move(use));
     }
-    std::ranges::sort(stations, std::ranges::greater(), [](const auto& one) { return one.first; });
+    std::ranges::sort(stations, std::ranges::greater(),
+                      [](const auto& one) { return std::get<0>(one); });
     TextTable table({"SLOWEST", "LINE/ID", "STATE", ">LATENCY", ">ERRORS"});
     for (std::size_t i = 0; i < std::min(stations.size(), kRows); ++i) {
-        const auto& [latency, station] = stations[i];
+        const auto& [latency, station, use] = stations[i];
         const std::string state = shown(*station, "state");
         table.add({shown(*station, "name"),
                    line_of(overview, *station),
                    {state, colour_of(state)},
-                   latency > 0 ? latency_text(latency) : "-",
-                   errors_of(figures_for(overview.figures, text_of(*station, "line"),
-                                         text_of(*station, "name")))});
+                   mean(use),
+                   errors_of(use)});
     }
     return table.text(coloured);
 }
 
 }  // namespace
 
-std::string top_text(const Overview& overview, double seconds, bool coloured) {
-    const std::string of =
-        seconds > 0 ? "figures of the last " + span_text(seconds) : "figures since its start";
-    return overview.url + ", " + of + "\n\n" + utilisation(overview, seconds, coloured) + '\n' +
-           clients_table(overview, coloured) + '\n' + slowest_table(overview, coloured);
+std::string top_text(const Overview& overview, bool coloured) {
+    return overview.url + ", " + span_of(overview) + "\n\n" + utilisation(overview, coloured) +
+           '\n' + clients_table(overview, coloured) + '\n' + slowest_table(overview, coloured);
 }
 
 }  // namespace panelgate::commands

@@ -324,7 +324,8 @@ const Keys<web::Settings>& http_keys() {
             .change_needs(kTlsCloses)
             .integer("max_connections_per_address", &Settings::max_connections_per_address, 1,
                      static_cast<std::int64_t>(Settings().max_connections),
-                     "Most connections of one address, event streams apart; then its longest "
+                     "Most connections of one address (of IPv6 a /64), event streams apart; then "
+                     "its longest "
                      "idle one is closed.");
     return kKeys;
 }

@@ -348,7 +348,9 @@ const Keys<Settings>& listener_keys() {
             .integer("max_connections", &Settings::max_connections, 1, 65535,
                      "Most connections of all clients.")
             .integer("max_connections_per_address", &Settings::max_connections_per_address, 1,
-                     65535, "Most connections of one address; then its longest idle one is closed.")
+                     65535,
+                     "Most connections of one address (of IPv6 a /64); then its longest idle one "
+                     "is closed.")
             .below(
                 tls_shape(
                     "Modbus/TCP Security: only clients that speak TLS are served. `listen` may be "

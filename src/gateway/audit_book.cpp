@@ -1,11 +1,10 @@
 #include "panelgate/gateway/audit_book.hpp"
 
-#include <arpa/inet.h>
 #include <algorithm>
-#include <array>
 #include <boost/asio/post.hpp>
 #include <boost/json/array.hpp>
 
+#include "panelgate/base/network.hpp"
 #include "panelgate/gateway/asked_place.hpp"
 #include "panelgate/gateway/build_info.hpp"
 #include "panelgate/gateway/snapshot.hpp"
@@ -106,22 +105,11 @@ void add_items(Members& record, const Station* station, const bus::WriteEnd& end
     }
 }
 
-/// An IPv6 network of 64 bits is one client: its addresses cost nothing (docs/operate/audit.md).
-std::string network_of(const std::string& address) {
-    in6_addr bytes{};
-    if (::inet_pton(AF_INET6, address.substr(0, address.find('%')).c_str(), &bytes) != 1)
-        return address;
-    std::fill(std::begin(bytes.s6_addr) + 8, std::end(bytes.s6_addr), std::uint8_t{0});
-    std::array<char, INET6_ADDRSTRLEN> text{};
-    ::inet_ntop(AF_INET6, &bytes, text.data(), text.size());
-    return std::string(text.data()) + "/64";
-}
-
 /// A client without the port, which each of its connections has anew.
 Members client_of(const WhoRef& who) {
     Members members;
     if (!who) return members;
-    add_text(members, "address", network_of(who->address));
+    add_text(members, "address", HostKey(who->address).text());
     members["face"] = label(who->face);
     if (who->address.empty()) add_text(members, "client", who->name);
     add_text(members, "token", who->token);

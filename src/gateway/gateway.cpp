@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/asio/post.hpp>
 #include <charconv>
 #include <memory>
 #include <random>
@@ -18,6 +19,7 @@
 #include "panelgate/gateway/running_line.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/rt/loop.hpp"
+#include "panelgate/tls/judge.hpp"
 #include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::gateway {
@@ -256,7 +258,7 @@ void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedTex
     judge_waiting();
     doors_.settle();
     watch_certificates();
-    watch_tokens();
+    watch_expiry();
 }
 
 /// Of all lines: what is new at a door is about requests to any.
@@ -264,12 +266,12 @@ void Gateway::judge_waiting() {
     for (const auto& line : snapshot_->lines) line->bus().judge_waiting();
 }
 
-/// Records tokens that have expired since the last look. The clock on the wall may be set, so it is
-/// looked at often.
-void Gateway::watch_tokens() {
+/// Closes connections whose certificate has expired, and records tokens that have expired since the
+/// last look. The clock on the wall may be set, so it is looked at often.
+void Gateway::watch_expiry() {
     using std::chrono::microseconds;  // Duration does not hold the years until some expire
     const WallTime now = rt::wall_now();
-    microseconds pause = 10s;
+    microseconds pause = 1s;
     bool some = false;
     for (const web::Token& token : tokens_of(*snapshot_->config)) {
         if (!token.expires) continue;
@@ -281,8 +283,18 @@ void Gateway::watch_tokens() {
         }
     }
     expired_until_ = now;
+    servers_.review();
+    if (northbound_.counters()) ask_broker();
     if (some) judge_waiting();
-    expiry_->arm(clock_.now() + pause, [this] { watch_tokens(); });
+    expiry_->arm(clock_.now() + pause, [this] { watch_expiry(); });
+}
+
+/// Brings the counters of the connection to the broker here, so that it is known whether it is
+/// there.
+void Gateway::ask_broker() {
+    boost::asio::post(loops_.faces, [collect = northbound_.collector(), plant = loops_.plant] {
+        if (auto keep = collect()) boost::asio::post(plant, std::move(keep));
+    });
 }
 
 void Gateway::watch_certificates() {
@@ -334,6 +346,8 @@ web::Providers Gateway::providers() {
     providers.now = rt::AsioClock::read;
     providers.events = events_.hub();
     providers.relays = [this] { return relays_->status(); };
+    providers.findings = [this] { return findings(); };
+    providers.usage = [this] { return usage(); };
     providers.wall = rt::wall_now;
     providers.collect = northbound_.collector();
     providers.discovery = discoveries_.get();
@@ -370,7 +384,8 @@ void Gateway::start() {
     northbound_.start();
     watch_certificates();
     expired_until_ = rt::wall_now();
-    watch_tokens();
+    watch_expiry();
+    look_for_findings();
     ready_ = true;
 }
 
@@ -401,6 +416,7 @@ std::string Gateway::status() const {
 void Gateway::stop() {
     lag_.stop();
     expiry_->cancel();
+    looking_->cancel();
     if (certificates_) certificates_->stop();
     servers_.close();
     northbound_.stop();
@@ -414,10 +430,53 @@ void Gateway::stop() {
     journal_.close();
 }
 
+/// Takes what the lines have counted, for the last minute.
+void Gateway::look_for_findings() {
+    for (const auto& line : snapshot_->lines) line->record_minute();
+    looked_ = {};
+    findings();
+    looking_->arm(clock_.now() + bus::LastMinute::kStep, [this] { look_for_findings(); });
+}
+
+std::vector<web::LineUsage> Gateway::usage() const {
+    std::vector<web::LineUsage> usage;
+    for (std::size_t i = 0; i < snapshot_->lines.size(); ++i)
+        usage.push_back({snapshot_->config->lines[i].name, snapshot_->lines[i]->last_minute()});
+    return usage;
+}
+
+Findings::State Gateway::state() const {
+    const config::Config& config = *snapshot_->config;
+    Findings::State state;
+    state.lines = usage();
+    const auto broker = northbound_.counters();
+    if (broker && !broker->connected && config.mqtt) state.broker_away = config.mqtt->broker();
+    if (audit_.is_kept() && audit_.counters().failing) state.audit_fails = config.audit->file;
+    state.writes_stop = audit_.refuses_writes();
+    if (!reloads_->counters().last_succeeded) state.refused = reloads_->last();
+    for (const ServedCertificate& one : certificates())
+        if (const std::int64_t end = tls::summary_of(one.settings.material.certificate).end;
+            end > 0)
+            state.certificates.push_back({one.listener, end});
+    return state;
+}
+
+/// As they are now, but for a second.
+const std::vector<web::Finding>& Gateway::findings() {
+    constexpr Duration kRest = 1s;
+    if (clock_.now() - looked_ >= kRest) {
+        looked_ = clock_.now();
+        findings_.judge(looked_, rt::wall_now(), state());
+    }
+    return findings_.list();
+}
+
 /// All figures but those of points, and of the process.
-metrics::Snapshot Gateway::figures() const {
+metrics::Snapshot Gateway::figures() {
     metrics::Snapshot figures;
     for (const auto& line : snapshot_->lines) figures.lines.push_back(line->bus().report());
+    for (const web::Finding& one : findings())
+        figures.findings.push_back({one.line, one.cause, one.name});
     figures.relays = relay_samples(relays_->status());
     servers_.copy_figures(figures);
     figures.mqtt = northbound_.counters();
@@ -436,7 +495,7 @@ metrics::Snapshot Gateway::figures() const {
     return figures;
 }
 
-std::function<std::string()> Gateway::metrics_text() const {
+std::function<std::string()> Gateway::metrics_text() {
     const auto copy = std::make_shared<metrics::Snapshot>(figures());
     return [copy, points = seen_points(snapshot_->plant, clock_.now()),
             snapshot = rt::lend(loops_.plant, std::shared_ptr<const Snapshot>(snapshot_))] {

@@ -305,6 +305,11 @@ void Servers::renew(const std::string& listener, const tls::Settings& settings) 
     if (http_ && "http " + http_->settings.name() == listener) http_->server->renew(settings);
 }
 
+void Servers::review() {
+    for (const Modbus& one : listeners_) one.listener->review();
+    if (http_ && http_->settings.tls) http_->server->review();
+}
+
 void Servers::stop_accepting(Duration longest) {
     openings_.stop();
     open_listeners_ = listeners_.size();

@@ -229,13 +229,19 @@ void add_line_state(Families& out, const Snapshot& snapshot) {
 
 void add_findings(Families& out, const Snapshot& snapshot) {
     Family found = make_gauge("panelgate_findings",
-                              "1 while the line doctor takes this for a cause of errors; absent "
-                              "otherwise. Station all: the whole line.");
+                              "1 while this is found, by the line doctor or of the gateway itself; "
+                              "absent otherwise. Station all: the whole line.");
     for (const LineReport& line : snapshot.lines) {
         for (const bus::FindingReport& finding : line.findings)
             found.gauge(
                 with(with(of_line(line), "station", finding.station), "cause", finding.cause), 1);
     }
+    for (const FindingSample& one : snapshot.findings)
+        found.gauge(one.line.empty() ? Labels{{"cause", one.cause}, {"name", one.name}}
+                                     : Labels{{"line", one.line},
+                                              {"station", std::string(kAllStations)},
+                                              {"cause", one.cause}},
+                    1);
     out.push_back(found.take());
 }
 

@@ -139,7 +139,7 @@ std::string subject_of(std::span<const LogField> fields) {
     std::size_t taken = 0;
     for (const auto& [key, value] : fields) {
         if (++taken > 2) break;
-        subject += key == "client" ? without_port(value) : value;
+        subject += key == "client" ? name_of_host(value) : value;
         subject += '\0';
     }
     return subject;
@@ -147,7 +147,7 @@ std::string subject_of(std::span<const LogField> fields) {
 
 std::string client_of(std::span<const LogField> fields) {
     const auto client = std::ranges::find(fields, "client", &LogField::first);
-    return client == fields.end() ? "" : without_port(client->second);
+    return client == fields.end() ? "" : name_of_host(client->second);
 }
 
 void append(LogLine& line, std::string_view key, const std::string& value) {

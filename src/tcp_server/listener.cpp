@@ -92,6 +92,7 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
     void start();
     void apply(Settings settings, UnitMap units);
     void renew(const tls::Settings& settings);
+    void review();
     std::uint16_t port() const { return acceptor_.port(); }
     Counters counters() const;
     void stop(std::function<void()> done);
@@ -106,7 +107,6 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
     void count_refused(const tcp::endpoint& peer, const Place& place);
     void on_closed(const std::shared_ptr<Session>& session);
     void apply_roles(const Settings& before);
-    void dismiss_revoked();
     void notify_when_empty();
 
     std::shared_ptr<Shared> shared_;
@@ -140,16 +140,15 @@ void Listener::Core::apply(Settings settings, UnitMap units) {
     for (const auto& session : sessions) {
         if (!allowed_.allows(session->peer())) session->close();
     }
-    if (!shared_->handshakes) return;
-    apply_roles(before);
-    dismiss_revoked();
+    if (shared_->handshakes) apply_roles(before);
+    review();
 }
 
 void Listener::Core::renew(const tls::Settings& settings) {
     if (!shared_->handshakes) return;
     shared_->handshakes->apply(settings);
     shared_->settings.tls = settings;
-    dismiss_revoked();
+    review();
 }
 
 /// Without roles from certificates everybody writes.
@@ -163,7 +162,8 @@ void Listener::Core::apply_roles(const Settings& before) {
     }
 }
 
-void Listener::Core::dismiss_revoked() {
+void Listener::Core::review() {
+    if (!shared_->handshakes) return;
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // dismiss() erases
     for (const auto& session : sessions) {
         const std::string why = shared_->handshakes->why_leave(session->stream());
@@ -310,6 +310,7 @@ void Listener::apply(Settings settings, UnitMap units) {
     core_->apply(std::move(settings), std::move(units));
 }
 void Listener::renew(const tls::Settings& settings) { core_->renew(settings); }
+void Listener::review() { core_->review(); }
 std::uint16_t Listener::port() const { return core_->port(); }
 Counters Listener::counters() const { return core_->counters(); }
 void Listener::stop(std::function<void()> done) { core_->stop(std::move(done)); }

@@ -16,6 +16,7 @@
 
 #include "native.hpp"
 #include "panelgate/base/network.hpp"
+#include "panelgate/rt/clock.hpp"
 #include "panelgate/rt/log.hpp"
 
 namespace panelgate::tls {
@@ -25,7 +26,6 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-constexpr Duration kBetween = 20ms;    ///< two handshakes that begin
 constexpr char kHandshakeRecord = 22;  // RFC 8446 5.1
 
 std::string spoken(std::string_view first) {
@@ -126,13 +126,13 @@ std::shared_ptr<const Context> context_of(const Settings& settings) {
 /// One handshake. Its pending operations keep it.
 struct Handshakes::Conversation {
     Conversation(tcp::socket socket, const tcp::endpoint& peer, Done done)
-        : address(peer.address().to_string()),
-          client(endpoint_text(address, peer.port())),
+        : host(peer.address().to_string()),
+          client(endpoint_text(peer.address().to_string(), peer.port())),
           done(std::move(done)),
           plain(std::move(socket)),
           deadline(plain.get_executor()) {}
 
-    const std::string address;
+    const HostKey host;
     const std::string client;
     Done done;  ///< null: the handshake has ended
     tcp::socket plain;
@@ -164,7 +164,7 @@ void Handshakes::begin(tcp::socket socket, Done done) {
     const tcp::endpoint peer = socket.remote_endpoint(gone);
     if (gone) return;
     const auto one = std::make_shared<Conversation>(std::move(socket), peer, std::move(done));
-    make_room(one->address);
+    make_room(one->host);
     running_.push_back(one);
     one->deadline.expires_after(settings_.handshake_timeout);
     one->deadline.async_wait(
@@ -177,21 +177,24 @@ void Handshakes::begin(tcp::socket socket, Done done) {
     listen(one);
 }
 
-void Handshakes::make_room(const std::string& address) {
-    std::map<std::string, std::size_t> counts;
-    for (const Ref& one : running_) ++counts[one->address];
-    std::string from = address;
-    if (counts[address] < settings_.max_handshakes_per_address) {
-        if (running_.size() < settings_.max_handshakes) return;
-        std::size_t most = 0;
-        for (const auto& [_, count] : counts) most = std::max(most, count);
-        from = (*std::ranges::find_if(running_, [&](const Ref& one) {
-                   return counts[one->address] == most;
-               }))->address;
-    }
-    const Ref oldest =
-        *std::ranges::find_if(running_, [&](const Ref& one) { return one->address == from; });
-    fail(oldest, Outcome::displaced, "too many handshakes at the same time; the oldest gives way");
+/// Who waits for the client's bytes gives way before who waits for a turn: half handshakes of many
+/// addresses would else take the place of a newcomer.
+void Handshakes::make_room(const HostKey& host) {
+    std::map<HostKey, std::size_t> counts;
+    for (const Ref& one : running_) ++counts[one->host];
+    std::size_t crowd = counts[host];
+    const bool share_used = crowd >= settings_.max_handshakes_per_address;
+    if (!share_used && running_.size() < settings_.max_handshakes) return;
+    if (!share_used)
+        for (const auto& [_, count] : counts) crowd = std::max(crowd, count);
+    const auto may_go = [&](const Ref& one) {
+        return share_used ? one->host == host : counts[one->host] == crowd;
+    };
+    auto first = std::ranges::find_if(
+        running_, [&](const Ref& one) { return may_go(one) && !one->waits_for_turn; });
+    if (first == running_.end()) first = std::ranges::find_if(running_, may_go);
+    fail(Ref(*first), Outcome::displaced,
+         "too many handshakes at the same time; the oldest gives way");
 }
 
 void Handshakes::listen(const Ref& one) {
@@ -224,7 +227,7 @@ void Handshakes::take_turns() {
     const Ref one = *next;
     one->waits_for_turn = false;
     turn_is_armed_ = true;
-    turn_.expires_after(kBetween);
+    turn_.expires_after(settings_.between_handshakes);
     turn_.async_wait([weak = weak_from_this()](const error_code&) {
         const auto self = weak.lock();
         if (!self) return;
@@ -264,7 +267,7 @@ void Handshakes::judge(const Ref& one, const error_code& error) {
 void Handshakes::fail(const Ref& one, Outcome outcome, const std::string& why) {
     if (!end(one, outcome)) return;
     const std::string& client = one->client;
-    const std::string subject = name_ + ' ' + one->address + ' ' + why;
+    const std::string subject = name_ + ' ' + one->host.text() + ' ' + why;
     rt::log_about(subject, level_of(outcome), "tls handshake failed",
                   {{"listener", name_},
                    {"client", client},
@@ -292,8 +295,12 @@ std::string Handshakes::why_leave(const Stream& stream) const {
         return settings_.client == ClientCertificate::required
                    ? "the client has shown no certificate, and now must"
                    : "";
-    if (!context_->revokes(shown)) return "";
-    return "the client's certificate " + stream.peer().subject + " is revoked";
+    const std::string what = "the client's certificate " + stream.peer().subject;
+    if (context_->revokes(shown)) return what + " is revoked";
+    const auto now = static_cast<std::int64_t>(rt::wall_seconds());
+    if (now < stream.peer().expiry) return "";
+    const bool is_own = seconds_of(X509_get0_notAfter(shown)) <= now;
+    return (is_own ? what : "the CA of " + what) + " has expired";
 }
 
 void Handshakes::stop() {

@@ -8,6 +8,8 @@
 #include <boost/asio/ssl/error.hpp>
 #include <cerrno>
 
+#include "native.hpp"
+
 namespace panelgate::tls {
 namespace asio = boost::asio;
 using asio::ip::tcp;
@@ -18,11 +20,28 @@ Stream::Stream(tcp::socket socket) : plain_(std::move(socket)), timer_(plain_.ge
     plain_.non_blocking(true, ignored);
 }
 
+namespace {
+
+/// The first end of validity of the certificates that were verified; 0 without one.
+std::int64_t expiry_of(SSL* ssl) {
+    const STACK_OF(X509)* const chain = SSL_get0_verified_chain(ssl);
+    std::int64_t first = 0;
+    for (int i = 0; i < sk_X509_num(chain); ++i) {
+        const std::int64_t end = seconds_of(X509_get0_notAfter(sk_X509_value(chain, i)));
+        if (i == 0 || end < first) first = end;
+    }
+    return first;
+}
+
+}  // namespace
+
 Stream::Stream(std::unique_ptr<Secure> secure)
     : plain_(secure->get_executor()),
       secure_(std::move(secure)),
       peer_(peer_of(certificate())),
-      timer_(plain_.get_executor()) {}
+      timer_(plain_.get_executor()) {
+    peer_.expiry = expiry_of(secure_->native_handle());
+}
 
 x509_st* Stream::certificate() const {
     return secure_ ? SSL_get0_peer_certificate(secure_->native_handle()) : nullptr;

@@ -2,7 +2,9 @@
 
 Addresses are added to a machine of the test's own (a network namespace), in which this file runs
 again."""
+import contextlib
 import ctypes
+import http.client
 import os
 import pathlib
 import shutil
@@ -91,6 +93,49 @@ class BothKinds(unittest.TestCase):
         with harness.configured(config.gateway(config.line(), modbus='listen: "[::]:0"')) as program:
             for address in ("127.0.0.1", "::1"):
                 connected(address, program.modbus_port())
+
+
+class OneNetwork(unittest.TestCase):
+    """A host has as many addresses of its /64 as it likes: they count as one."""
+    NETWORK, OTHER = "2001:db8:1:2::", "2001:db8:1:3::"
+
+    def setUp(self):
+        for network in (self.NETWORK, self.OTHER):
+            ip("-6", "route", "add", "local", f"{network}/64", "dev", "lo")
+            self.addCleanup(ip, "-6", "route", "del", "local", f"{network}/64", "dev", "lo")
+
+    def test_wrong_tokens_of_a_network_bar_it_alone(self):
+        with tempfile.TemporaryDirectory() as folder:
+            token = pathlib.Path(folder) / "token"
+            token.write_text("0123456789abcdef\n")
+            token.chmod(0o600)
+            http_ = f'listen: "[::]:0", anonymous: none, tokens: [{{name: ops, role: admin, file: {token}}}]'
+            with harness.configured(config.gateway(config.line(), http=http_)) as program:
+                def status(source, text):
+                    connection = http.client.HTTPConnection("::1", program.http_port(), harness.PATIENCE, (source, 0))
+                    with contextlib.closing(connection):
+                        connection.request("GET", "/api/v1/lines", headers={"Authorization": f"Bearer {text}"})
+                        return connection.getresponse().status
+                tried = [status(f"{self.NETWORK}{host:x}", "wrong") for host in range(1, 13)]
+                self.assertEqual(tried, [401] * 10 + [429] * 2)
+                self.assertEqual(status(f"{self.NETWORK}ffff", "0123456789abcdef"), 429)
+                self.assertEqual(status(f"{self.OTHER}1", "0123456789abcdef"), 200)
+
+    def test_places_are_a_networks(self):
+        modbus = 'listen: "[::]:0", max_connections_per_address: 2'
+        with harness.configured(config.gateway(config.line(), modbus=modbus)) as program:
+            def client(source):
+                one = socket.create_connection(("::1", program.modbus_port()), harness.PATIENCE, (source, 0))
+                self.addCleanup(one.close)
+                one.sendall(harness.adu(1, 31, read_registers(0)))
+                self.assertNotEqual(one.recv(64), b"")
+                return one
+            first, second = client(f"{self.NETWORK}1"), client(f"{self.NETWORK}2")
+            client(f"{self.OTHER}1")
+            client(f"{self.NETWORK}3")
+            self.assertEqual(first.recv(1), b"", "the longest idle one of its network gives way")
+            second.sendall(harness.adu(2, 31, read_registers(0)))
+            self.assertNotEqual(second.recv(64), b"")
 
 
 class Refusals(unittest.TestCase):

@@ -13,8 +13,10 @@ import unittest
 
 import config
 import harness
+import mqtt_side
+from tls_plant import plant
 
-REFUSED, USAGE, UNAVAILABLE, INTERNAL = 1, 64, 69, 70
+REFUSED, USAGE, UNAVAILABLE, INTERNAL, BAD_CONFIGURATION = 1, 64, 69, 70, 78
 
 
 class State(unittest.TestCase):
@@ -84,8 +86,7 @@ class State(unittest.TestCase):
         code, drawn = self.on_a_terminal("top", NO_COLOR="1")
         self.assertEqual(code, 0, drawn)
         screens = drawn.split("\x1b[H\x1b[2J")[1:]
-        self.assertIn("figures since its start", screens[0])
-        self.assertRegex(screens[1], r"figures of the last [12]\.\d s(.|\r|\n)*floor1 +up +[\d.]+ % .* [\d.]+ ms")
+        self.assertRegex(screens[1], r"figures of the last (minute|[\d.]+ s)(.|\r|\n)*floor1 +up +[\d.]+ % .* [\d.]+ ms")
 
     def test_top_fits_the_terminal(self):
         screen = self.on_a_terminal("top", NO_COLOR="1", size=(12, 40))[1].split("\x1b[H\x1b[2J")[1]
@@ -140,7 +141,7 @@ class State(unittest.TestCase):
         self.assertIn(f"wrote {file}", written.stderr)
         self.assertEqual(stat.S_IMODE(file.stat().st_mode), 0o600)
         report = json.loads(file.read_text())
-        self.assertLessEqual({"version", "configuration", "lines", "stations", "points", "relays", "history",
+        self.assertLessEqual({"version", "configuration", "lines", "stations", "points", "relays", "findings", "usage", "history",
                               "trace", "metrics", "ready", "time"}, set(report))
         self.assertNotIn("missing", report)
         self.assertIn("findings", report["lines"]["floor1"])
@@ -167,6 +168,48 @@ class State(unittest.TestCase):
         self.assertEqual(self.ask("names").stdout.split(), ["press", "mixer", "io", "oven", "filler"])
         self.assertEqual(self.ask("names", "oven").stdout.split(), ["temperature", "mode"])
         self.assertEqual(self.ask("names", "nobody").stderr, "")
+
+
+class Troubles(unittest.TestCase):
+    """What is not well with the gateway itself, one after the other."""
+
+    def test_each_is_a_finding_and_ends_status_with_1(self):
+        with mqtt_side.Broker() as broker, plant() as made:
+            made.cert("new-server", "127.0.0.1", "--days", "2", "--force")
+            file = made.folder / "panelgate.yaml"
+            text = config.gateway(
+                config.line(), modbus=config.FREE_PORT + ", " + made.tls().replace("localhost.", "127.0.0.1."),
+                http=config.ADMIN, audit=f"{{file: {made.folder}/none/audit.jsonl, on_failure: refuse_writes}}",
+                mqtt=f"{{broker: 'mqtt://127.0.0.1:{broker.port}'}}")
+            file.write_text(text)
+            with harness.Program("run", "-c", str(file)) as program:
+                at = ("--http", f"127.0.0.1:{program.http_port()}")
+                program.log.wait_for("mqtt connected")
+                broker.stop()
+                file.write_text(text + "baudd: 7\n")
+                self.assertEqual(harness.run("reload", *at).returncode, BAD_CONFIGURATION)
+                program.log.wait_for("gateway finding .*cause=broker-away")
+                told = harness.run("status", *at)
+                self.assertEqual(told.returncode, REFUSED, told.stdout + told.stderr)
+                for sentence in ("The MQTT broker mqtt://127.0.0.1:[0-9]+ is not connected", "The audit cannot be written "
+                                 "to .*/none/audit.jsonl, so every write is refused", "The last reload was refused",
+                                 "The certificate of modbus_tcp 127.0.0.1:[0-9]+ expires on .*, in [12] days"):
+                    self.assertRegex(told.stdout, "not all is well:(.|\n)*\n  " + sentence)
+                listed = program.get("/api/v1/findings")[1]
+                self.assertEqual({one["cause"] for one in listed["findings"]},
+                                 {"broker-away", "audit-fails", "reload-refused", "certificate-expires"})
+                self.assertIn("unknown key 'baudd'", json.dumps(listed))
+                for cause in ("broker-away", "audit-fails"):
+                    self.assertRegex(program.get("/metrics")[1], rf'panelgate_findings{{cause="{cause}",name=".*"}} 1')
+                made.cert("new-server", "127.0.0.1", "--force")
+                (made.folder / "none").mkdir()
+                broker.start()
+                file.write_text(text)
+                self.assertEqual(harness.run("reload", *at).returncode, 0)
+                for cause in ("broker-away", "audit-fails", "certificate-expires", "reload-refused"):
+                    program.log.wait_for(f"gateway finding gone cause={cause}")
+                well = harness.run("status", *at)
+                self.assertEqual((well.returncode, well.stdout[-12:]), (0, "all is well\n"), well.stdout)
 
 
 class Secrets(unittest.TestCase):

@@ -23,6 +23,7 @@ PASSING = {"age_ms", "last_success_ms", "last_write_ms", "load_percent", "queue_
            "bus_ms", "took_ms"}
 OF_A_CLIENT = {"name", "gone_ms", "requests", "failed", "last_error", "last_error_ms", "busy_seconds", "percent",
                "transactions"}
+OF_A_USE = {"seconds", "requests", "errors", "transactions", "transaction_ms", "stations", "clients"}
 OF_A_FRAME = {"sequence", "time", "at", "bytes", "why", "transaction"}
 OF_A_TRANSACTION = {"id", "sequence", "ended", "time", "client", "arrived", "granted", "first_bit_out", "last_bit_out",
                     "first_byte_in", "last_byte_in", "answered", "request", "reply"}
@@ -84,7 +85,7 @@ def settled(value):
     if not isinstance(value, dict):
         return value
     passing = set(PASSING)
-    for mark, names in (("busy_seconds", OF_A_CLIENT), ("direction", OF_A_FRAME), ("repairs", OF_A_RELAY),
+    for mark, names in (("busy_seconds", OF_A_CLIENT), ("direction", OF_A_FRAME), ("repairs", OF_A_RELAY), ("no_turn", OF_A_USE),
                         ("first_bit_out", OF_A_TRANSACTION), ("errors", OF_AN_INCIDENT),
                         ("rollback", OF_A_RELOAD), ("libraries", OF_A_BUILD), ("every_ms", OF_A_POINT),
                         ("who", OF_AN_ENTRY)):

@@ -1,5 +1,6 @@
 """Certificates that live: what new files replace, what they must not, and who has to go."""
 import contextlib
+import http.client
 import json
 import os
 import shutil
@@ -10,7 +11,7 @@ import unittest
 import harness
 from harness import read_registers, write_register
 from test_tls import get, metric
-from tls_plant import SecureClient, plant, served
+from tls_plant import SecureClient, plant, refused, served
 
 READ = read_registers(0)
 WRITE = write_register(0x64, 7)
@@ -225,6 +226,23 @@ class Tightened(unittest.TestCase):
                     self.assertTrue(lost.is_closed_by_peer())
                     self.assertEqual(scada.ask(31, WRITE), WRITE)
                     self.assertEqual(program.log.text().count("connection closed"), 1)
+
+    def test_a_certificate_that_expires_ends_its_connections(self):
+        with plant() as made, served(made, *[made.tls("required", role_from="certificate")] * 2) as program:
+            context = made.context("scada")
+            with SecureClient(program.modbus_port(), context) as scada:
+                made.expired("brief", 4)
+                with SecureClient(program.modbus_port(), made.context("brief")) as brief, \
+                        contextlib.closing(http.client.HTTPSConnection(
+                            "localhost", program.http_port(), context=made.context("brief"))) as web:
+                    self.assertEqual(brief.ask(31, READ)[0], 3)
+                    web.request("GET", "/api/v1/events")
+                    stream = web.getresponse()
+                    program.log.wait_for("connection closed .*CN=brief has expired", 2)
+                    self.assertTrue(brief.is_closed_by_peer())
+                    stream.read()  # until its end
+                    self.assertTrue(refused(program.modbus_port(), made.context("brief")))
+                self.assertEqual(scada.ask(31, WRITE), WRITE)
 
     def test_client_required_and_role_from_by_reload(self):
         with plant() as made, \

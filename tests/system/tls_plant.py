@@ -52,8 +52,8 @@ class Plant:
             context.load_cert_chain(self.path(f"{name}.crt"), self.path(f"{name}.key"))
         return context
 
-    def expired(self, name):
-        """A client's certificate of the past, by another program."""
+    def expired(self, name, seconds=-24 * 3600):
+        """A client's certificate that ends so many seconds from now, by another program."""
         # pylint: disable=import-outside-toplevel
         from cryptography import x509
         from cryptography.hazmat.primitives import hashes, serialization
@@ -61,7 +61,7 @@ class Plant:
         ca = x509.load_pem_x509_certificate((self.folder / "ca.crt").read_bytes())
         ca_key = serialization.load_pem_private_key((self.folder / "ca.key").read_bytes(), None)
         key = ec.generate_private_key(ec.SECP256R1())
-        end = datetime.datetime.utcnow() - datetime.timedelta(days=1)
+        end = datetime.datetime.utcnow() + datetime.timedelta(seconds=seconds)
         made = (x509.CertificateBuilder()
                 .subject_name(x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)]))
                 .issuer_name(ca.subject).public_key(key.public_key())

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -25,18 +26,32 @@ inline std::string endpoint_text(const std::string& address, std::uint16_t port)
     return (six ? '[' + address + ']' : address) + ':' + std::to_string(port);
 }
 
-/// Returns a client's name for the log without its port, which differs for each connection:
-/// "modbus_tcp [::1]:50000" -> "modbus_tcp [::1]". A bare address ("http ::1") and a token ("http
-/// ::1 token bob") identify the client and are kept.
-inline std::string without_port(std::string_view client) {
-    constexpr auto kNone = std::string_view::npos;
-    const auto colon = client.rfind(':');
-    if (colon == kNone || client.find(" token ") != kNone) return std::string(client);
-    const std::string_view host = client.substr(client.rfind(' ') + 1, kNone);
-    const bool is_number = client.find_first_not_of("0123456789", colon + 1) == kNone;
-    const bool has_brackets = colon > 0 && client[colon - 1] == ']';
-    const bool is_port = has_brackets || host.find(':') == host.rfind(':');
-    return std::string(is_number && is_port ? client.substr(0, colon) : client);
-}
+/// What counts as one address wherever places, turns or tries are counted by address: an IPv4
+/// address, or the 64 first bits of an IPv6 address, because a host takes as many addresses of its
+/// network as it likes (RFC 4291 2.5.4, RFC 8981).
+class HostKey {
+  public:
+    HostKey() = default;
+    /// `address`: without port; IPv4 also as ::ffff:10.0.0.7. Another text is a key of its own.
+    explicit HostKey(std::string_view address);
+
+    /// "10.0.0.7", "2001:db8:1:2::/64", "::1"; empty without an address.
+    const std::string& text() const { return text_; }
+    friend auto operator<=>(const HostKey&, const HostKey&) = default;
+
+  private:
+    std::string text_;
+};
+
+/// An IPv4 address as a listener on [::] sees it, ::ffff:10.0.0.7 (RFC 4291 2.5.5.2), becomes
+/// 10.0.0.7; other texts are returned as they are.
+std::string_view without_mapping(std::string_view address);
+
+/// The address in a client's name ("modbus_tcp 10.0.0.7:51234", "[::1]:51234", "http ::1 token
+/// ops"), which is its first or second word; empty for other names.
+std::string_view address_in(std::string_view client);
+/// A client's name with HostKey::text() in place of address and port: the same for all connections
+/// of one host. Other names are returned as they are.
+std::string name_of_host(std::string_view client);
 
 }  // namespace panelgate

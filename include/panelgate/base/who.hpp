@@ -49,7 +49,7 @@ WhoRef make_who(Who who);
 /// The gateway's own tasks, by the name that the trace shows.
 WhoRef own_task(std::string name);
 
-/// A number for fair turns between addresses, or other names of one client; never 0.
+/// A number for fair turns between hosts (HostKey), or other names of one client; never 0.
 std::uint64_t host_number(std::string_view address);
 
 /// Returns its name; "a client without a name" for null.

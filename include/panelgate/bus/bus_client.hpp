@@ -88,7 +88,8 @@ using AnswerHandler = InlineFunction<void(Answer), 48>;
 
 /// What a client has requested of a line, and how much of its time it used (P9).
 struct ClientShare {
-    std::string name;  ///< "modbus_tcp 10.0.0.7:51234"; without the port once the client has left
+    /// "modbus_tcp 10.0.0.7:51234"; once the client has left without the port, and of IPv6 the /64.
+    std::string name;
     Duration busy{};
     double percent = 0;  ///< of the line's total busy time
     std::uint64_t transactions = 0;
@@ -100,7 +101,7 @@ struct ClientShare {
     std::optional<Duration> gone{};  ///< time since the client left; nullopt: connected
 };
 
-/// Disconnected clients remain listed by their names without ports.
+/// Disconnected clients remain listed by their hosts (name_of_host()).
 struct ClientSettings {
     Duration remembered_for = 10min;
     std::size_t remembered =

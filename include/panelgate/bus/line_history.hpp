@@ -41,6 +41,22 @@ class LoadMeter {
     std::array<Duration, kSeconds + 1> seconds_{};  ///< busy time per second
 };
 
+/// What came of the requests to a station or a line: so far, or between two times.
+struct RequestCounts {
+    std::uint64_t requests = 0;  ///< answered, by a panel or not
+    std::uint64_t errors = 0;    ///< of these: exceptions, faults, refusals
+    std::uint64_t no_turn = 0;   ///< of the errors: the queue was full, or its deadline came first
+    std::uint64_t answers = 0;   ///< with a latency
+    double latency = 0;          ///< from arrival to answer, their sum in seconds
+    std::uint64_t transactions = 0;
+    double wire = 0;  ///< from first bit out to last bit in, their sum in seconds
+
+    RequestCounts& operator+=(const RequestCounts& more);
+};
+RequestCounts counts_of(const StationReport& station);
+/// Counters that have begun anew, so that one is smaller than before, count from zero.
+RequestCounts difference(const RequestCounts& now, const RequestCounts& before);
+
 /// A line's figures for one time slot.
 struct LineSample {
     TimePoint at;                        ///< start of the slot
@@ -71,23 +87,12 @@ class LineHistory {
     Duration width() const { return width_; }
 
   private:
-    /// Counted so far, or between two times.
-    struct Counts {
-        std::uint64_t requests = 0;
-        std::uint64_t errors = 0;
-        std::uint64_t answers = 0;  ///< with a latency
-        double latency = 0;         ///< their sum, in seconds
-        std::uint64_t transactions = 0;
-        double wire = 0;  ///< their sum, in seconds
-    };
-    static Counts counts_of(const StationReport& station);
-    static void add_difference(const Counts& now, const Counts& before, Counts& sum);
     /// The counts of all stations since the last call.
-    Counts take(const LineReport& report);
+    RequestCounts take(const LineReport& report);
 
     std::optional<TimePoint> at_;  ///< of the last call
     Duration busy_{};
-    std::map<std::string, Counts, std::less<>> stations_;
+    std::map<std::string, RequestCounts, std::less<>> stations_;
     Duration width_;
     SlotRing load_, requests_, errors_, latency_, wire_, queue_;
 };

@@ -18,6 +18,7 @@
 #include "panelgate/gateway/audit_book.hpp"
 #include "panelgate/gateway/certificates.hpp"
 #include "panelgate/gateway/discoveries.hpp"
+#include "panelgate/gateway/findings.hpp"
 #include "panelgate/gateway/journal.hpp"
 #include "panelgate/gateway/northbound.hpp"
 #include "panelgate/gateway/running_line.hpp"
@@ -89,10 +90,15 @@ class Gateway {
     void show(const std::shared_ptr<Snapshot>& snapshot);
     web::Providers providers();
     void watch_certificates();
-    void watch_tokens();
+    void watch_expiry();
+    void ask_broker();
     void judge_waiting();
-    metrics::Snapshot figures() const;
-    std::function<std::string()> metrics_text() const;
+    void look_for_findings();
+    Findings::State state() const;
+    std::vector<web::LineUsage> usage() const;
+    const std::vector<web::Finding>& findings();
+    metrics::Snapshot figures();
+    std::function<std::string()> metrics_text();
 
     web::Loops loops_;
     rt::AsioClock clock_;
@@ -120,9 +126,13 @@ class Gateway {
     std::unique_ptr<points::Relays> relays_;
     Servers servers_;
     Northbound northbound_;
-    std::unique_ptr<CertificateWatch> certificates_;           ///< null until a listener has `tls`
-    std::unique_ptr<rt::Alarm> expiry_ = clock_.make_alarm();  ///< of a token
-    WallTime expired_until_{};                                 ///< looked at for expiry so far
+    std::unique_ptr<CertificateWatch> certificates_;  ///< null until a listener has `tls`
+    std::unique_ptr<rt::Alarm> expiry_ =
+        clock_.make_alarm();    ///< of tokens and clients' certificates
+    WallTime expired_until_{};  ///< looked at for expiry so far
+    Findings findings_;
+    std::unique_ptr<rt::Alarm> looking_ = clock_.make_alarm();  ///< for findings
+    TimePoint looked_{};                                        ///< for them
     bool ready_ = false;
 };
 

@@ -13,6 +13,7 @@
 
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/bus/bus_client.hpp"
+#include "panelgate/bus/last_minute.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/explain/translations.hpp"
 #include "panelgate/gateway/plant.hpp"
@@ -74,6 +75,12 @@ class RunningLine {
     /// Applies a new configuration; `before` is the running one. Opens the line again after stop().
     void apply(const config::Line& before, const config::Line& now);
 
+    /// Call each bus::LastMinute::kStep.
+    void record_minute() { minute_.record(clock_.now(), bus_->report(), bus_->clients()); }
+    bus::MinuteUse last_minute() const {
+        return minute_.use(clock_.now(), bus_->report(), bus_->clients());
+    }
+
     bus::LineBus& bus() { return *bus_; }
     const bus::LineBus& bus() const { return *bus_; }
     const std::shared_ptr<sim::SimulatedBus>& simulated() const { return simulated_; }
@@ -104,6 +111,7 @@ class RunningLine {
     std::unique_ptr<bus::LineBus> bus_;       ///< calls the members above until it is destroyed
     std::unique_ptr<points::Poller> poller_;  ///< null if nothing was ever polled
     std::set<std::string> wires_;
+    bus::LastMinute minute_;
     bool running_ = false;
 };
 

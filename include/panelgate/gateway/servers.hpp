@@ -104,6 +104,8 @@ class Servers {
 
     /// The files of the `tls` of a listener ("http 127.0.0.1:8443") have changed.
     void renew(const std::string& listener, const tls::Settings& settings);
+    /// Closes the connections whose client's certificate has expired.
+    void review();
     void stop_accepting(Duration longest);
     bool drained();
     std::size_t pending_connections() const;

@@ -23,9 +23,17 @@
 
 namespace panelgate::metrics {
 
+/// A finding of the gateway itself; `line`: of an overload, else empty.
+struct FindingSample {
+    std::string line;
+    std::string cause;
+    std::string name;
+};
+
 /// The data of one scrape, copied when it was requested. Each line's data is consistent.
 struct Snapshot {
     std::vector<bus::LineReport> lines;
+    std::vector<FindingSample> findings{};
     std::vector<tcp_server::Counters> listeners;
     std::vector<serial_server::Counters> serial_masters;
     std::deque<points::PointSample> points;  ///< deque: many points, never moved

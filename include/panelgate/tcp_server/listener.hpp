@@ -40,6 +40,8 @@ class Listener {
     /// Takes the same `tls` with changed files, for connections to come; closes those whose
     /// certificate is revoked now. Ignored without TLS.
     void renew(const tls::Settings& settings);
+    /// Closes connections whose certificate is revoked or has expired. Ignored without TLS.
+    void review();
     /// Returns the bound port; 0 before start().
     std::uint16_t port() const;
     Counters counters() const;

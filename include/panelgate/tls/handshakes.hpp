@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "panelgate/base/network.hpp"
 #include "panelgate/tls/context.hpp"
 #include "panelgate/tls/counters.hpp"
 #include "panelgate/tls/settings.hpp"
@@ -15,11 +16,12 @@
 
 namespace panelgate::tls {
 
-/// The handshakes of a listener. Their number is bounded: beyond the limit of an address its oldest
-/// handshake gives way, beyond the limit of all the oldest handshake of the address with most. A
-/// handshake has `handshake_timeout`, costs no OpenSSL object before the client's first bytes, and
-/// then waits for its turn: one begins each 20 ms, so that a flood leaves the loop to the lines.
-/// One thread.
+/// The handshakes of a listener. Their number is bounded: beyond the limit of an address (HostKey)
+/// its oldest handshake gives way, beyond the limit of all the oldest handshake of the addresses
+/// with most; a handshake that waits for its turn gives way after those that wait for their client.
+/// A handshake has `handshake_timeout`, costs no OpenSSL object before the client's first bytes,
+/// and then waits for its turn: one begins each 20 ms, so that a flood leaves the loop to the
+/// lines. One thread.
 class Handshakes : public std::enable_shared_from_this<Handshakes> {
   public:
     /// Takes a connection whose handshake is done.
@@ -35,8 +37,8 @@ class Handshakes : public std::enable_shared_from_this<Handshakes> {
     /// Calls `done` later, at most once: not if the handshake fails, and then the reason is logged
     /// and the socket closed.
     void begin(boost::asio::ip::tcp::socket socket, Done done);
-    /// Returns why a connection that was let in before must end by the present settings: its
-    /// certificate is revoked, or it has shown none; "" if it may stay.
+    /// Returns why a connection that was let in before must end by now: its certificate is revoked
+    /// or has expired, or it has shown none; "" if it may stay.
     std::string why_leave(const Stream& stream) const;
     /// Ends all handshakes.
     void stop();
@@ -46,7 +48,7 @@ class Handshakes : public std::enable_shared_from_this<Handshakes> {
     struct Conversation;
     using Ref = std::shared_ptr<Conversation>;
 
-    void make_room(const std::string& address);
+    void make_room(const HostKey& host);
     void listen(const Ref& one);
     void look(const Ref& one);
     void take_turns();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -21,6 +22,9 @@ struct Peer {
     std::optional<std::string> role;  ///< none: no such extension, or none that counts
     std::string role_fault;           ///< why an extension does not count; "" if it does
     bool shown = false;               ///< there is a certificate; its subject may be empty
+    /// The first end of validity in its chain up to the CA, in seconds since 1970; 0: none is
+    /// shown.
+    std::int64_t expiry = 0;
 };
 
 /// Reads a certificate; null: nobody. Long names are cut off, control characters replaced.

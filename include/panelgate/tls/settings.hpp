@@ -40,6 +40,7 @@ struct Settings {
     Duration handshake_timeout = 10s;
     std::size_t max_handshakes = 128;  ///< at the same time; the oldest gives way to the next
     std::size_t max_handshakes_per_address = 16;
+    Duration between_handshakes = 20ms;  ///< two that begin
     Material material{};
     std::vector<OwnRole> own_roles{};       ///< that a client's certificate may name
     std::vector<std::string> rule_roles{};  ///< words besides that rules of `access` go by
@@ -50,8 +51,8 @@ struct Settings {
         const auto all = [](const Settings& of) {
             return std::tie(of.certificate, of.key, of.ca, of.crl, of.client,
                             of.role_from_certificate, of.lowest, of.handshake_timeout,
-                            of.max_handshakes, of.max_handshakes_per_address, of.material,
-                            of.own_roles, of.rule_roles);
+                            of.max_handshakes, of.max_handshakes_per_address, of.between_handshakes,
+                            of.material, of.own_roles, of.rule_roles);
         };
         return all(one) == all(other);
     }

@@ -90,6 +90,8 @@ constexpr Row kRows[] = {
     {"PUT", "/api/v1/simulator/{}", put_simulated, kEngineer, kShowsStation},
     {"GET", "/api/v1/events", get_events, kSee, kShowsNone, kPlain, "types line station point"},
     {"GET", "/api/v1/relays", get_relays, kSee, kShowsNone, kTagged},
+    {"GET", "/api/v1/findings", get_findings, kSee, kShowsNone, kTagged},
+    {"GET", "/api/v1/usage", get_usage, kSee},
     {"GET", "/api/v1/points", get_all_points, kSee, kShowsNone, kTagged},
     {"GET", "/api/v1/stations/{}/points", get_points, kSee, kShowsStation, kTagged, "raw"},
     {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee, kShowsPoint, kMayAsk, "raw"},

@@ -76,6 +76,8 @@ Handling get_device_plan(HttpRequest request, const Api* api);
 Handling get_interpretations(HttpRequest request, const Api* api);
 Handling get_events(HttpRequest request, const Api* api);
 Handling get_relays(HttpRequest request, const Api* api);
+Handling get_findings(HttpRequest request, const Api* api);
+Handling get_usage(HttpRequest request, const Api* api);
 
 Handling get_reload(HttpRequest request, const Api* api);
 Handling post_reload(HttpRequest request, const Api* api);

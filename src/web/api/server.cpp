@@ -82,6 +82,10 @@ void Server::renew(const tls::Settings& settings) {
     crossing_->run([listener = listener_, settings] { listener->renew(settings); });
 }
 
+void Server::review() {
+    crossing_->run([listener = listener_] { listener->review(); });
+}
+
 Counters Server::counters() const {
     return crossing_->is_one_loop() ? listener_->counters() : *figures_;
 }

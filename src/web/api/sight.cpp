@@ -214,7 +214,7 @@ std::string_view label_in(std::string_view line, std::string_view name) {
 bool is_seen(std::string_view line, const Sight& sight) {
     if (line.starts_with('#')) return true;
     if (!label_in(line, "relay").empty()) return false;
-    for (const std::string_view whose : {"rule", "token"})
+    for (const std::string_view whose : {"rule", "token", "name"})
         if (!label_in(line, whose).empty()) return sight.everything();
     return sight.named(label_in(line, "line"), label_in(line, "station"), label_in(line, "point"));
 }

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <string>
 
+#include "panelgate/base/network.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/web/http/settings.hpp"
 
@@ -18,10 +18,10 @@ class WrongTokens {
     explicit WrongTokens(const WrongTokenSettings& settings) : settings_(settings) {}
     void apply(const WrongTokenSettings& settings) { settings_ = settings; }
 
-    void add(TimePoint now, const std::string& address);
+    void add(TimePoint now, const HostKey& host);
     /// Returns for how long no token of the address is judged any more; zero: its tokens are
     /// judged.
-    Duration barred_for(TimePoint now, const std::string& address) const;
+    Duration barred_for(TimePoint now, const HostKey& host) const;
 
   private:
     struct Count {
@@ -30,7 +30,7 @@ class WrongTokens {
     };
 
     WrongTokenSettings settings_;
-    std::map<std::string, Count> counts_;  ///< by address
+    std::map<HostKey, Count> counts_;
 };
 
 /// Decides which connections stay when limits are reached: in all and per address. Event streams
@@ -51,7 +51,7 @@ class Places {
     /// Applies new limits to connections that arrive later.
     void apply(const Settings& settings);
 
-    Arrival arrive(Id id, const std::string& address);
+    Arrival arrive(Id id, const HostKey& host);
     /// A complete request has arrived: the connection keeps its place until idle(). These calls
     /// ignore unknown ids.
     void busy(Id id);
@@ -63,17 +63,17 @@ class Places {
   private:
     enum class State : std::uint8_t { idle, busy, streaming };
     struct Guest {
-        std::string address;
+        HostKey host;
         bool probes_only = false;
         State state = State::idle;
         std::uint64_t since = 0;  ///< turn at which it became idle or arrived
     };
     void set(Id id, State state);
     /// Counts the connections of a kind of place, of all or of one address.
-    std::size_t count(bool probes_only, const std::string* address = nullptr) const;
-    std::size_t streams(const std::string& address) const;
+    std::size_t count(bool probes_only, const HostKey* host = nullptr) const;
+    std::size_t streams(const HostKey& host) const;
     /// Returns the longest-idle connection, of all or of one address.
-    std::optional<Id> longest_idle(bool probes_only, const std::string* address = nullptr) const;
+    std::optional<Id> longest_idle(bool probes_only, const HostKey* host = nullptr) const;
 
     std::size_t limit_ = 0;
     std::size_t limit_of_address_ = 0;

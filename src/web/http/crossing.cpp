@@ -59,7 +59,7 @@ Handling Crossing::ask(HttpRequest request, Handler handler, bool probe) {
     });
     request.caller = caller;
     const auto asked = std::make_shared<HttpRequest>(std::move(request));
-    turns_.add(probe ? "" : client->address(),
+    turns_.add(probe ? HostKey() : client->host(),
                [this, asked, handler = std::make_shared<const Handler>(std::move(handler)),
                 waiting = std::weak_ptr(question)] { begin(std::move(*asked), handler, waiting); });
     pass_next();
@@ -83,9 +83,9 @@ std::optional<Turns::Turn> Turns::take() {
 }
 
 /// Who owes nothing and asks nothing is forgotten.
-void Turns::charge(TimePoint now, const std::string& address, Duration cost) {
-    TimePoint& paid = askers_[address].paid;
-    if (!address.empty()) paid = std::max(paid, now) + cost;
+void Turns::charge(TimePoint now, const HostKey& host, Duration cost) {
+    TimePoint& paid = askers_[host].paid;
+    if (host != HostKey()) paid = std::max(paid, now) + cost;
     std::erase_if(askers_, [&](const auto& one) {
         return one.second.waiting.empty() && one.second.holds == 0 && one.second.paid <= now;
     });
@@ -101,15 +101,14 @@ void Crossing::pass_next() {
         const TimePoint began = rt::AsioClock::read();
         next.work();
         const Duration took = rt::AsioClock::read() - began;
-        asio::post(self->loops_.faces,
-                   [self, address = next.address, took] { self->rest(address, took); });
+        asio::post(self->loops_.faces, [self, host = next.host, took] { self->rest(host, took); });
     });
 }
 
 /// Leaves the plant to its lines for a multiple of what the last request took.
-void Crossing::rest(const std::string& address, Duration took) {
+void Crossing::rest(const HostKey& host, Duration took) {
     constexpr int kRest = 9;  // so that requests have a tenth of the plant's time at most
-    turns_.charge(rt::AsioClock::read(), address, (1 + kRest) * took);
+    turns_.charge(rt::AsioClock::read(), host, (1 + kRest) * took);
     const auto pause = std::make_shared<asio::steady_timer>(loops_.faces, kRest * took);
     pause->async_wait([self = shared_from_this(), pause](const boost::system::error_code&) {
         self->passing_ = false;
@@ -183,12 +182,12 @@ Handling Crossing::made_by_worker(HttpResponse response, std::function<void(Http
         }
         *took = rt::AsioClock::read() - began;
     };
-    const std::string address = caller->address();
-    turns_.hold(address);
-    worker->run(work, [self = shared_from_this(), making, awaited, took, address] {
+    const HostKey host = caller->host();
+    turns_.hold(host);
+    worker->run(work, [self = shared_from_this(), making, awaited, took, host] {
         awaited->give(std::move(*making));
-        self->turns_.release(address);
-        self->turns_.charge(rt::AsioClock::read(), address, *took);
+        self->turns_.release(host);
+        self->turns_.charge(rt::AsioClock::read(), host, *took);
         self->pass_next();
     });
     Handling waiting = wait_for(awaited, std::move(caller));

@@ -82,9 +82,8 @@ void HttpListener::apply(std::shared_ptr<const Site> site) {
         if (!may_read || !has_same_right(session->caller(), before->settings, now))
             session->end_events();
     }
-    if (!handshakes_) return;
-    apply_roles(before->settings);
-    dismiss_revoked();
+    if (handshakes_) apply_roles(before->settings);
+    review();
 }
 
 namespace {
@@ -115,7 +114,8 @@ void HttpListener::apply_roles(const Settings& before) {
 }
 
 /// Running requests are answered, such as the one that has asked for the new rules.
-void HttpListener::dismiss_revoked() {
+void HttpListener::review() {
+    if (!handshakes_) return;
     const Settings& settings = shared_->site->settings;
     const auto sessions = sessions_;
     for (const auto& [id, session] : sessions) {
@@ -127,7 +127,7 @@ void HttpListener::dismiss_revoked() {
 void HttpListener::renew(const tls::Settings& settings) {
     if (!handshakes_) return;
     handshakes_->apply(settings);
-    dismiss_revoked();
+    review();
 }
 
 Counters HttpListener::counters() const {
@@ -181,7 +181,7 @@ void HttpListener::serve(tls::Stream stream) {
 }
 
 bool HttpListener::make_room(const Caller& caller) {
-    const Places::Arrival arrival = shared_->places.arrive(caller.id(), caller.address());
+    const Places::Arrival arrival = shared_->places.arrive(caller.id(), caller.host());
     if (arrival.probes_only) {
         rt::log(rt::LogLevel::warn, "http requests refused",
                 {{"listener", shared_->site->settings.name()},

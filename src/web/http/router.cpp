@@ -293,11 +293,10 @@ HttpResponse options(const Found& found, const HttpRequest& request, const Site&
 }
 
 void record_failed_login(const HttpRequest& request, Shared& shared) {
-    const std::string& address = request.caller->address();
     ++shared.counters.login_failures;
-    shared.wrong_tokens.add(shared.site->now(), address);
+    shared.wrong_tokens.add(shared.site->now(), request.caller->host());
     rt::log(rt::LogLevel::warn, "login failed",
-            {{"listener", shared.site->settings.name()}, {"client", address}});
+            {{"listener", shared.site->settings.name()}, {"client", request.caller->address()}});
 }
 
 /// When each token was used last, for metrics; those that are gone are forgotten.
@@ -331,7 +330,7 @@ void count_refused(const HttpRequest& request, const Problem& why) {
 /// 429 while no token of the request's address is judged.
 std::optional<Problem> too_many_wrong_tokens(const HttpRequest& request, const Shared& shared) {
     const Duration left =
-        shared.wrong_tokens.barred_for(shared.site->now(), request.caller->address());
+        shared.wrong_tokens.barred_for(shared.site->now(), request.caller->host());
     if (left == Duration::zero()) return std::nullopt;
     const auto seconds = std::chrono::ceil<std::chrono::seconds>(left).count();
     return passing_problem(429, "too many wrong tokens came from this address", seconds);

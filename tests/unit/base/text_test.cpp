@@ -184,14 +184,38 @@ TEST(Nearest, KnowsOtherSpellingsAndSynonymsOfOtherIndustries) {
     EXPECT_EQ(nearest("double", kOurs), "") << "nobody here has f64";
 }
 
-TEST(WithoutPort, CutsThePortOfAConnectionAndNothingElse) {
-    EXPECT_EQ(without_port("10.0.0.7:50000"), "10.0.0.7");
-    EXPECT_EQ(without_port("[::1]:50000"), "[::1]");
-    EXPECT_EQ(without_port("modbus_tcp 10.0.0.7:50000"), "modbus_tcp 10.0.0.7");
-    EXPECT_EQ(without_port("modbus_tcp [2001:db8::9]:5"), "modbus_tcp [2001:db8::9]");
-    for (const char* whole : {"http ::1", "http 2001:db8::12", "http ::1 token bob", "mqtt", "",
-                              "http 10.0.0.9 token a:1", "http 10.0.0.9 token b"})
-        EXPECT_EQ(without_port(whole), whole);
+TEST(HostKey, IsAnIpv4AddressOrAnIpv6Network) {
+    EXPECT_EQ(HostKey("10.0.0.7").text(), "10.0.0.7");
+    EXPECT_EQ(HostKey("::ffff:10.0.0.7"), HostKey("10.0.0.7"));
+    EXPECT_NE(HostKey("::ffff:10.0.0.8"), HostKey("10.0.0.7"));
+    EXPECT_EQ(HostKey("2001:db8:1:2:3:4:5:6").text(), "2001:db8:1:2::/64");
+    EXPECT_EQ(HostKey("2001:db8:1:2:ffff::1"), HostKey("2001:db8:1:2::9"));
+    EXPECT_NE(HostKey("2001:db8:1:3::9"), HostKey("2001:db8:1:2::9"));
+    EXPECT_EQ(HostKey("fe80::1%eth0").text(), "fe80::/64");
+    EXPECT_EQ(HostKey("::1").text(), "::1");
+    EXPECT_EQ(HostKey("").text(), "");
+    EXPECT_EQ(HostKey("/dev/ttyUSB0").text(), "/dev/ttyUSB0");
+}
+
+TEST(NameOfHost, IsTheSameForAllConnectionsOfAHost) {
+    EXPECT_EQ(name_of_host("10.0.0.7:50000"), "10.0.0.7");
+    EXPECT_EQ(name_of_host("[::1]:50000"), "::1");
+    EXPECT_EQ(name_of_host("modbus_tcp 10.0.0.7:50000"), "modbus_tcp 10.0.0.7");
+    EXPECT_EQ(name_of_host("modbus_tcp [2001:db8::9]:5"), "modbus_tcp 2001:db8::/64");
+    EXPECT_EQ(name_of_host("http 2001:db8::12 token bob"), "http 2001:db8::/64 token bob");
+    for (const char* whole : {"http ::1 token bob", "mqtt", "", "http 10.0.0.9 token a:1",
+                              "poll of 10.0.0.7", "relay 1.2.3.4/UW0 to oven/GDT1"})
+        EXPECT_EQ(name_of_host(whole), whole);
+}
+
+TEST(AddressIn, IsTheFirstOrTheSecondWord) {
+    EXPECT_EQ(address_in("modbus_tcp 10.0.0.7:51234"), "10.0.0.7");
+    EXPECT_EQ(address_in("modbus_tcp [::1]:51234"), "::1");
+    EXPECT_EQ(address_in("http 10.0.0.9 token ops"), "10.0.0.9");
+    EXPECT_EQ(address_in("http fe80::1 token ops"), "fe80::1");
+    EXPECT_EQ(address_in("http 2001:db8::/64 token ops"), "2001:db8::/64");
+    for (const char* none : {"poll of press", "http", "", "relay press/UW0 to oven/GDT1"})
+        EXPECT_EQ(address_in(none), "");
 }
 
 /// Labels of the first `count` enumerators, in order, separated by commas.

@@ -14,6 +14,9 @@ TEST(Who, AnIpv4ClientOfAnIpv6ListenerIsIpv4) {
     EXPECT_EQ(mapped->host, plain->host) << "both take the turns of one address";
     EXPECT_EQ(make_who({.address = "::ffff:1:2"})->address, "::ffff:1:2") << "is no IPv4 address";
     EXPECT_NE(make_who({.address = "10.0.0.8"})->host, plain->host);
+    EXPECT_EQ(make_who({.address = "2001:db8::1"})->host,
+              make_who({.address = "2001:db8::2"})->host)
+        << "an IPv6 network of 64 bits is one host";
 }
 
 TEST(Who, WithoutAnAddressKeepsItsHost) {

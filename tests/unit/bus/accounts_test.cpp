@@ -125,6 +125,16 @@ TEST_F(ClientSharesTest, TheDepartedAreOneForAllPortsOfAnAddress) {
     EXPECT_EQ(row.left, kNow - 1s);
 }
 
+TEST_F(ClientSharesTest, TheDepartedAreOneForAllAddressesOfAnIpv6Network) {
+    departed.leave(kNow - 2s, "http 2001:db8:1:2::7", {1s, 1}, {1, 0, {}, {}});
+    departed.leave(kNow - 1s, "http 2001:db8:1:2:a:b:c:d", {1s, 1}, {1, 0, {}, {}});
+    const auto all = shares(2s);
+    ASSERT_EQ(all.size(), 1u);
+    EXPECT_EQ(all[0].name, "http 2001:db8:1:2::/64");
+    EXPECT_EQ(all[0].address, "2001:db8:1:2::/64");
+    EXPECT_EQ(all[0].requests, 2u);
+}
+
 TEST_F(ClientSharesTest, TheDepartedAreBoundedInTimeAndNumberAndNothingIsLost) {
     departed.apply(ClientSettings{.remembered_for = 5min, .remembered = 2});
     for (int i = 1; i <= 3; ++i)
@@ -147,19 +157,6 @@ TEST(ClientNames, P9AreBoundedAndTheLastOneCountsUntilTheClientHasGone) {
     EXPECT_EQ(names.of(1), "y");
     names.forget(1);
     EXPECT_EQ(names.of(1), "a client without a name");
-}
-
-TEST(ClientNames, OfServersClientsHaveAnAddressAndAPort) {
-    EXPECT_EQ(without_port("modbus_tcp [2001:db8::1]:51234"), "modbus_tcp 2001:db8::1");
-    EXPECT_EQ(without_port("http ::1 token ops"), "http ::1 token ops");
-    EXPECT_EQ(without_port("poll of press"), "poll of press");
-    EXPECT_EQ(address_in("modbus_tcp 10.0.0.7:51234"), "10.0.0.7");
-    EXPECT_EQ(address_in("modbus_tcp [::1]:51234"), "::1");
-    EXPECT_EQ(address_in("http 10.0.0.9 token ops"), "10.0.0.9");
-    EXPECT_EQ(address_in("http fe80::1 token ops"), "fe80::1");
-    EXPECT_EQ(address_in("poll of press"), std::nullopt);
-    EXPECT_EQ(address_in("http"), std::nullopt);
-    EXPECT_EQ(address_in("relay press/UW0 to oven/GDT1"), std::nullopt);
 }
 
 Answer answer(Result<Bytes> pdu, bool transmitted = true) {

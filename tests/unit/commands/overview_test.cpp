@@ -14,65 +14,36 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-constexpr std::string_view kMetrics =
-    "# HELP panelgate_requests_total Requests.\n"
-    "panelgate_requests_total{line=\"floor1\",station=\"press\",function=\"3\",outcome=\"ok\"} 90\n"
-    "panelgate_requests_total{line=\"floor1\",station=\"press\",function=\"3\",outcome=\"shared\"} "
-    "5\n"
-    "panelgate_requests_total{line=\"floor1\",station=\"press\",function=\"3\",outcome=\"timeout\"}"
-    " 3\n"
-    "panelgate_requests_total{line=\"floor1\",station=\"a\\\"b\",outcome=\"exception\"} 2 "
-    "1700000000\n"
-    "panelgate_bus_transaction_seconds_bucket{line=\"floor1\",station=\"press\",le=\"0.1\"} 90\n"
-    "panelgate_bus_transaction_seconds_count{line=\"floor1\",station=\"press\"} 90\n"
-    "panelgate_bus_transaction_seconds_sum{line=\"floor1\",station=\"press\"} 0.9\n"
-    "panelgate_broadcasts_total{line=\"floor1\"} 7\nbroken{line=\"x\n\nalso broken\n";
-
 boost::json::object object(std::string_view text) { return boost::json::parse(text).as_object(); }
 
 Overview well() {
     Overview made;
     made.url = "http://127.0.0.1:8080";
     made.lines.push_back(object(R"({"name":"floor1","device":"sim","state":"up","mode":"master",
-        "up":true,"load_percent":52.5,"queue_depth":1,"findings":[],"clients":[
-        {"name":"poll of press","requests":9,"failed":0,"last_error":null,"last_error_ms":null,
-         "percent":20.5},
-        {"name":"http 10.0.0.7","requests":8,"failed":2,"last_error":"timeout",
-         "last_error_ms":3000,"percent":79.5}]})"));
+        "up":true,"load_percent":99,"queue_depth":1,"findings":[],"clients":[]})"));
     made.stations = object(R"({"stations":[
         {"name":"press","line":"floor1","id":31,"profile":"autonics-gplp-s","state":"online",
          "last_success_ms":400},
         {"name":"io","line":"floor1","id":17,"profile":"autonics-arm","state":"unknown",
          "last_success_ms":null}]})");
     made.relays = object(R"({"relays":[{"name":"a to b","state":"ok"}]})");
-    made.figures = figures_of(kMetrics);
+    made.findings = object(R"({"findings":[]})");
+    made.usage = object(R"({"lines":[{"line":"floor1","seconds":64,"load_percent":52.5,
+        "requests":100,"errors":5,"no_turn":0,"transactions":90,"transaction_ms":10,
+        "stations":[{"station":"press","requests":98,"errors":3,"no_turn":0,"transactions":90,
+                     "transaction_ms":10}],
+        "clients":[
+        {"name":"poll of press","requests":9,"failed":0,"last_error":null,"last_error_ms":null,
+         "percent":20.5},
+        {"name":"10.0.0.7","requests":8,"failed":2,"last_error":"timeout","last_error_ms":3000,
+         "percent":79.5}]}]})");
     return made;
-}
-
-TEST(FiguresOf, AddsUpALineAndItsStations) {
-    const AllFigures all = figures_of(kMetrics);
-    const Figures press = all.at({"floor1", "press"});
-    EXPECT_EQ(press.requests, 98);
-    EXPECT_EQ(press.errors, 3);
-    EXPECT_EQ(press.transactions, 90);
-    EXPECT_DOUBLE_EQ(press.seconds, 0.9);
-    EXPECT_EQ(all.at({"floor1", "a\"b"}).errors, 2);
-    EXPECT_EQ(all.at({"floor1", ""}).requests, 100);
-    EXPECT_EQ(all.size(), 3U);
-}
-
-TEST(Difference, IsOfTheTimeBetweenUnlessTheGatewayBeganAnew) {
-    const AllFigures before{{{"l", "a"}, {10, 1, 8, 0.5}}, {{"l", "b"}, {10, 0, 10, 1}}};
-    const AllFigures now{{{"l", "a"}, {15, 1, 12, 0.9}}, {{"l", "b"}, {2, 0, 2, 0.1}}};
-    const AllFigures made = difference(now, before);
-    EXPECT_EQ(made.at({"l", "a"}).requests, 5);
-    EXPECT_EQ(made.at({"l", "a"}).transactions, 4);
-    EXPECT_EQ(made.at({"l", "b"}).requests, 2);
-    EXPECT_EQ(made.at({"l", ""}).requests, 7) << "the line's are its stations'";
 }
 
 TEST(StatusText, IsTwoTablesAndAVerdict) {
     EXPECT_EQ(status_text(well(), false),
+              "http://127.0.0.1:8080, figures of the last minute\n"
+              "\n"
               "LINE    STATE    LOAD  QUEUE  LATENCY    ERRORS  DEVICE\n"
               "floor1  up     52.5 %      1  10.0 ms  5 of 100  sim\n"
               "\n"
@@ -98,6 +69,8 @@ TEST(StatusJson, HasTheSameForPrograms) {
     EXPECT_EQ(made.at("lines").at(0).at("name"), boost::json::value("floor1"));
     EXPECT_EQ(made.at("stations").as_array().size(), 2U);
     EXPECT_TRUE(made.at("relays").is_array());
+    EXPECT_TRUE(made.at("findings").is_array());
+    EXPECT_EQ(made.at("usage").at(0).at("load_percent"), boost::json::value(52.5));
 }
 
 TEST(StatusText, NamesWhatIsNotWell) {
@@ -123,16 +96,34 @@ TEST(StatusText, NamesWhatIsNotWell) {
     EXPECT_THAT(status_text(overview, true), HasSubstr("\x1b[1;31moffline\x1b[0m"));
 }
 
+TEST(StatusText, NamesWhatIsNotWellWithTheGatewayItself) {
+    Overview overview = well();
+    overview.findings = object(R"({"findings":[{"cause":"overload","line":"floor1","name":"floor1",
+        "text":"Line floor1 is overloaded.","evidence":"asked by 10.0.0.7","advice":"Ask less."},
+        {"cause":"audit-fails","line":null,"name":"/a.jsonl","text":"The audit cannot be written.",
+        "evidence":"","advice":"Look at the disk."}]})");
+    EXPECT_THAT(troubles(overview),
+                ElementsAre("Line floor1 is overloaded.", "The audit cannot be written."));
+    const std::string text = status_text(overview, false);
+    EXPECT_THAT(text,
+                HasSubstr("floor1: overload\n  Line floor1 is overloaded.\n  asked by 10.0.0.7\n"
+                          "  Ask less.\n/a.jsonl: audit-fails\n  The audit cannot be "
+                          "written.\n  Look at the disk.\n"));
+    EXPECT_THAT(text, HasSubstr("not all is well:\n  Line floor1 is overloaded.\n  The audit"));
+}
+
 TEST(TopText, HasWhoUsesTheLineAndWhoIsSlow) {
-    const std::string text = top_text(well(), 2, false);
-    EXPECT_THAT(text, HasSubstr("http://127.0.0.1:8080, figures of the last 2.0 s\n"));
-    EXPECT_THAT(text, HasSubstr("floor1  up     52.5 %  [########        ]      1        50.0"
-                                "       2.5  10.0 ms\n"));
-    EXPECT_LT(text.find("http 10.0.0.7  floor1  79.5 %         8       2  timeout, 3.0 s ago"),
+    Overview overview = well();
+    const std::string text = top_text(overview, false);
+    EXPECT_THAT(text, HasSubstr("http://127.0.0.1:8080, figures of the last minute\n"));
+    EXPECT_THAT(text, HasSubstr("floor1  up     52.5 %  [########        ]      1         1.6"
+                                "       0.1  10.0 ms\n"));
+    EXPECT_LT(text.find("10.0.0.7       floor1  79.5 %         8       2  timeout, 3.0 s ago"),
               text.find("poll of press"));
     EXPECT_THAT(text, HasSubstr("press    floor1/31  online  10.0 ms  3 of 98\n"));
     EXPECT_THAT(text, Not(HasSubstr("io ")));
-    EXPECT_THAT(top_text(well(), 0, false), HasSubstr("figures since its start"));
+    overview.usage.at("lines").at(0).as_object()["seconds"] = 34;
+    EXPECT_THAT(top_text(overview, false), HasSubstr("figures of the last 34 s\n"));
 }
 
 }  // namespace

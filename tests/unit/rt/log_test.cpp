@@ -271,8 +271,12 @@ TEST_F(LogTest, ThrottlesAClientWhateverItsPort) {
     EXPECT_EQ(tap.count("client=10.0.0.8"), 1u);
     for (int part = 1; part <= 9; ++part)
         log(LogLevel::warn, "login failed",
-            {{"listener", "a:80"}, {"client", "2001:db8::" + std::to_string(part)}});
+            {{"listener", "a:80"}, {"client", "2001:db8::" + std::to_string(part) + ":0:0:0:1"}});
     EXPECT_EQ(tap.count("login failed"), 9u) << "none of them is another's port";
+    for (int part = 1; part <= 9; ++part)
+        log(LogLevel::warn, "login failed",
+            {{"listener", "a:80"}, {"client", "2001:db8:7::" + std::to_string(part)}});
+    EXPECT_EQ(tap.count("login failed"), 12u) << "a network of 64 bits is one client";
 }
 
 TEST_F(LogTest, TopicsThatChangeDoNotFillTheLog) {

@@ -16,6 +16,7 @@ namespace panelgate::tls::handshakes_test {
 namespace {
 
 namespace asio = boost::asio;
+using asio::ip::tcp;
 
 std::uint64_t count(const Handshakes& all, Outcome outcome) {
     return all.counters().handshakes[static_cast<std::size_t>(outcome)];
@@ -154,6 +155,37 @@ TEST_F(HandshakesTest, TheOldestOfAnAddressGivesWayBeyondItsLimitAndStopEndsAll)
     EXPECT_EQ(end, asio::error::eof) << "the oldest";
     handshakes->stop();
     EXPECT_EQ(count(*handshakes, Outcome::displaced), 4u);
+}
+
+TEST_F(HandshakesTest, WhoWaitsForTheClientGivesWayBeforeWhoWaitsForItsTurn) {
+    Settings settings = plant.settings();
+    settings.max_handshakes = 3;
+    settings.between_handshakes = 1h;
+    serve(settings);
+    std::list<Sockets> sockets;
+    const auto newcomer = [&](const std::string& first_bytes) -> tcp::socket& {
+        Sockets& both = sockets.emplace_back(io);
+        asio::write(both.client, asio::buffer(first_bytes));
+        begin(std::move(both.server));
+        io.restart();
+        io.poll();
+        return both.client;
+    };
+    const auto is_closed = [](tcp::socket& client) {
+        boost::system::error_code end;
+        char byte = 0;
+        client.non_blocking(true);
+        client.read_some(asio::buffer(&byte, 1), end);
+        return end != asio::error::would_block;
+    };
+    tcp::socket& begun = newcomer("\x16");
+    tcp::socket& waiting = newcomer("\x16");
+    tcp::socket& silent = newcomer("");
+    newcomer("");
+    EXPECT_TRUE(is_closed(begun)) << "its turn came, and it says nothing";
+    newcomer("");
+    EXPECT_TRUE(is_closed(silent));
+    EXPECT_FALSE(is_closed(waiting));
 }
 
 TEST_F(HandshakesTest, CarriesWhatComesTogetherWithTheHandshakesEnd) {

@@ -63,6 +63,8 @@ struct Providers {
     std::function<TimePoint()> now;                ///< the machine's monotonic clock, any thread
     std::function<WallTime()> wall;                ///< the current wall-clock time, any thread
     std::function<std::vector<points::RelayStatus>()> relays;
+    std::function<std::vector<Finding>()> findings{};  ///< of the gateway; empty: it looks for none
+    std::function<std::vector<LineUsage>()> usage{};   ///< of each line; empty: none is counted
     /// Of the faces' loop, before a scrape: takes counters of other faces along to the plant's
     /// loop, where the function returned is called. Both may be empty.
     std::function<std::function<void()>()> collect{};
@@ -112,6 +114,8 @@ class Server {
     std::size_t connections() const;
     /// As HttpListener::renew().
     void renew(const tls::Settings& settings);
+    /// As HttpListener::review().
+    void review();
     /// The counters as they were when /metrics was asked for last.
     Counters counters() const;
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +13,7 @@
 #include "panelgate/alarms/alarms.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/words.hpp"
+#include "panelgate/bus/last_minute.hpp"
 #include "panelgate/web/http/message.hpp"
 
 namespace panelgate::web {
@@ -73,6 +75,26 @@ class AlarmSource {
     /// In the order of the configuration.
     virtual std::vector<AlarmView> list() const = 0;
     virtual Acknowledged acknowledge(const std::string& name, const std::string& who) = 0;
+};
+
+/// A finding of the gateway itself, or of the load of a line: what a user must know beside what the
+/// line doctor finds.
+struct Finding {
+    std::string cause;  ///< "overload", "broker-away" ...: stable identifiers
+    std::string line;   ///< of an overload; else empty
+    std::string name;   ///< the line, the broker, the file, or the listener that it is about
+    std::string text;   ///< what is wrong
+    std::string advice;
+    std::string evidence;  ///< the numbers behind it; may be empty
+    std::map<std::string, std::uint64_t> figures{};
+    std::vector<bus::HostUse> clients{};  ///< of an overload: who asked in the last minute
+    WallTime since{};
+};
+
+/// A line and what was used of it.
+struct LineUsage {
+    std::string line;
+    bus::MinuteUse minute;
 };
 
 /// The result of a reload.

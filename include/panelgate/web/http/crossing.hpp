@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "panelgate/base/network.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/rt/loop.hpp"
 #include "panelgate/web/http/message.hpp"
@@ -34,26 +35,24 @@ struct Loops {
         : faces(std::move(of_faces)), plant(std::move(of_plant)) {}
 };
 
-/// Work of several addresses for one thread. The address goes first that is least in debt: what its
+/// Work of several hosts for one thread. The host goes first that is least in debt: what its
 /// work has cost is a debt that time pays off. Pure.
 class Turns {
   public:
     using Work = std::function<void()>;
     struct Turn {
-        std::string address;
+        HostKey host;
         Work work;
     };
 
-    /// The address "" goes first.
-    void add(const std::string& address, Work work) {
-        askers_[address].waiting.push_back(std::move(work));
-    }
+    /// Work of the empty key goes first.
+    void add(const HostKey& host, Work work) { askers_[host].waiting.push_back(std::move(work)); }
     /// Returns nothing if no work waits but that of addresses on hold.
     std::optional<Turn> take();
-    void charge(TimePoint now, const std::string& address, Duration cost);
+    void charge(TimePoint now, const HostKey& host, Duration cost);
     /// Nothing of the address is taken until as many calls of release() have come.
-    void hold(const std::string& address) { ++askers_[address].holds; }
-    void release(const std::string& address) { --askers_[address].holds; }
+    void hold(const HostKey& host) { ++askers_[host].holds; }
+    void release(const HostKey& host) { --askers_[host].holds; }
 
   private:
     struct Asker {
@@ -61,7 +60,7 @@ class Turns {
         TimePoint paid{};  ///< when its debt is paid
         unsigned holds = 0;
     };
-    std::map<std::string, Asker> askers_;
+    std::map<HostKey, Asker> askers_;
 };
 
 /// What crosses between the loops of a server, as messages: a request to the plant, its response
@@ -111,7 +110,7 @@ class Crossing : public std::enable_shared_from_this<Crossing> {
     void begin(HttpRequest request, std::shared_ptr<const Handler> handler,
                std::weak_ptr<Awaited> waiting);
     void pass_next();
-    void rest(const std::string& address, Duration took);
+    void rest(const HostKey& host, Duration took);
 
     Loops loops_;
     // Of the faces' loop:

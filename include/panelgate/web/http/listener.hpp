@@ -48,6 +48,9 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
     /// Takes the same `tls` with changed files, for connections to come; those whose certificate is
     /// revoked now are closed behind the running request. Ignored without TLS.
     void renew(const tls::Settings& settings);
+    /// Closes, behind the running request, connections whose certificate is revoked or has expired.
+    /// Ignored without TLS.
+    void review();
     Counters counters() const;
 
   private:
@@ -55,8 +58,6 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
     void serve(tls::Stream stream);
     /// True if it gets one of the places for probes only.
     bool make_room(const Caller& caller);
-    /// Lets clients go whose certificate does not count any more.
-    void dismiss_revoked();
     void apply_roles(const Settings& before);
 
     std::shared_ptr<Shared> shared_;

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "panelgate/base/network.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/who.hpp"
 #include "panelgate/web/http/event_hub.hpp"
@@ -24,12 +25,15 @@ namespace panelgate::web {
 class Caller {
   public:
     /// `id` is unique to this connection; `address` has no port, "" if unknown.
-    Caller(std::uint64_t id, std::string address) : id_(id), address_(std::move(address)) {
+    Caller(std::uint64_t id, std::string address)
+        : id_(id), address_(std::move(address)), host_(address_) {
         identify({}, {}, {});
     }
 
     std::uint64_t id() const { return id_; }
     const std::string& address() const { return address_; }
+    /// What its places, turns and wrong tokens are counted by.
+    const HostKey& host() const { return host_; }
     /// Who makes the current request. Its name is "http 10.0.0.9" or "http 10.0.0.9 token ops".
     const WhoRef& who() const { return who_; }
     const std::string& name() const { return who_->name; }
@@ -90,6 +94,7 @@ class Caller {
   private:
     std::uint64_t id_;
     std::string address_;
+    HostKey host_;
     WhoRef who_;
     std::optional<Standing> certificate_role_{};
     bool left_ = false;

@@ -15,16 +15,16 @@ TEST(WrongTokens, OfAnAddressBarItUntilItsMinuteIsOver) {
     const WrongTokenSettings settings;
     WrongTokens wrong{settings};
     TimePoint now{1h};
-    for (unsigned i = 0; i < settings.most; ++i) wrong.add(now, "a");
-    EXPECT_EQ(wrong.barred_for(now, "a"), Duration::zero());
+    for (unsigned i = 0; i < settings.most; ++i) wrong.add(now, HostKey("a"));
+    EXPECT_EQ(wrong.barred_for(now, HostKey("a")), Duration::zero());
     now += 20s;
-    wrong.add(now, "a");
-    EXPECT_EQ(wrong.barred_for(now, "a"), 40s);
-    EXPECT_EQ(wrong.barred_for(now, "b"), Duration::zero());
+    wrong.add(now, HostKey("a"));
+    EXPECT_EQ(wrong.barred_for(now, HostKey("a")), 40s);
+    EXPECT_EQ(wrong.barred_for(now, HostKey("b")), Duration::zero());
     now += 40s;
-    EXPECT_EQ(wrong.barred_for(now, "a"), Duration::zero());
-    for (unsigned i = 0; i < settings.most; ++i) wrong.add(now, "a");
-    EXPECT_EQ(wrong.barred_for(now, "a"), Duration::zero()) << "another minute";
+    EXPECT_EQ(wrong.barred_for(now, HostKey("a")), Duration::zero());
+    for (unsigned i = 0; i < settings.most; ++i) wrong.add(now, HostKey("a"));
+    EXPECT_EQ(wrong.barred_for(now, HostKey("a")), Duration::zero()) << "another minute";
 }
 
 TEST(WrongTokens, AreCountedOfSoManyAddresses) {
@@ -34,13 +34,13 @@ TEST(WrongTokens, AreCountedOfSoManyAddresses) {
     WrongTokens wrong{settings};
     const TimePoint now{1h};
     const auto is_barred = [&](const char* address) {
-        return wrong.barred_for(now + 3ms, address) > Duration::zero();
+        return wrong.barred_for(now + 3ms, HostKey(address)) > Duration::zero();
     };
-    wrong.add(now, "a");
-    wrong.add(now + 1ms, "b");
-    wrong.add(now + 2ms, "b");
+    wrong.add(now, HostKey("a"));
+    wrong.add(now + 1ms, HostKey("b"));
+    wrong.add(now + 2ms, HostKey("b"));
     EXPECT_TRUE(is_barred("a")) << "no other address has come";
-    wrong.add(now + 3ms, "c");
+    wrong.add(now + 3ms, HostKey("c"));
     EXPECT_FALSE(is_barred("a"));
     EXPECT_TRUE(is_barred("b"));
     EXPECT_TRUE(is_barred("c"));
@@ -62,7 +62,7 @@ void play(const std::string& moves) {
         SCOPED_TRACE(moves + ": " + move);
         if (std::isdigit(static_cast<unsigned char>(move[0])) != 0) {
             const std::size_t address = move.find_first_of("abcde");
-            const auto arrival = places.arrive(std::stoull(move), std::string(1, move.at(address)));
+            const auto arrival = places.arrive(std::stoull(move), HostKey(move.substr(address, 1)));
             std::string came = arrival.probes_only ? "?" : "";
             if (arrival.leaves) came += '-' + std::to_string(*arrival.leaves);
             EXPECT_EQ(came, move.substr(address + 1));

@@ -144,16 +144,16 @@ TEST(TurnsTest, WhoHasCostMoreWaitsForWhoHasCostLess) {
         const auto turn = turns.take();
         return turn ? turn->address : "nobody";
     };
-    for (const char* address : {"a", "a", "b", "b", "b", ""}) turns.add(address, [] {});
+    for (const char* address : {"a", "a", "b", "b", "b", ""}) turns.add(HostKey(address), [] {});
     EXPECT_EQ(taken(), "") << "a probe";
-    turns.charge(now, "", 1s);
+    turns.charge(now, HostKey(""), 1s);
     EXPECT_EQ(taken(), "a");
-    turns.charge(now, "a", 100ms);
+    turns.charge(now, HostKey("a"), 100ms);
     for (const Duration cost : {30ms, 40ms, 50ms}) {
         EXPECT_EQ(taken(), "b") << "until it owes as much";
-        turns.charge(now, "b", cost);
+        turns.charge(now, HostKey("b"), cost);
     }
-    turns.add("b", [] {});
+    turns.add(HostKey("b"), [] {});
     EXPECT_EQ(taken(), "a");
     EXPECT_EQ(taken(), "b");
     EXPECT_EQ(taken(), "nobody");
@@ -162,17 +162,17 @@ TEST(TurnsTest, WhoHasCostMoreWaitsForWhoHasCostLess) {
 TEST(TurnsTest, ADebtIsPaidByTimeAndWhoIsOnHoldWaits) {
     Turns turns;
     const TimePoint now = TimePoint() + 1s;
-    turns.charge(now, "a", 100ms);
-    turns.charge(now + 90ms, "b", 20ms);
-    turns.add("b", [] {});
-    turns.add("a", [] {});
-    turns.hold("a");
+    turns.charge(now, HostKey("a"), 100ms);
+    turns.charge(now + 90ms, HostKey("b"), 20ms);
+    turns.add(HostKey("b"), [] {});
+    turns.add(HostKey("a"), [] {});
+    turns.hold(HostKey("a"));
     EXPECT_EQ(turns.take()->address, "b");
     EXPECT_FALSE(turns.take());
-    turns.release("a");
+    turns.release(HostKey("a"));
     EXPECT_EQ(turns.take()->address, "a");
-    turns.charge(now + 1s, "a", 0ms);  // both have paid long ago
-    for (const char* address : {"b", "a"}) turns.add(address, [] {});
+    turns.charge(now + 1s, HostKey("a"), 0ms);  // both have paid long ago
+    for (const char* address : {"b", "a"}) turns.add(HostKey(address), [] {});
     EXPECT_EQ(turns.take()->address, "a");
 }
 
