@@ -6,6 +6,9 @@
 #include <unistd.h>
 #include <cstdlib>
 #include <filesystem>
+#include <system_error>
+
+#include "commands.hpp"
 
 namespace panelgate::commands {
 
@@ -76,7 +79,8 @@ std::vector<std::string> service_doubts(const std::string& file, const config::C
     const passwd* user = ::geteuid() == 0 ? ::getpwnam(kServiceUser) : nullptr;
     if (user == nullptr) return doubts;
     std::vector<Used> all = used_by(config);
-    if (!file.starts_with("/dev/")) all.push_back({file, R_OK, "640"});
+    if (file == kDefaultConfig)
+        all.push_back({file, R_OK, "640"});  // else a copy, such as Ansible's
     const std::string name = kServiceUser;
     for (const Used& used : all) {
         if (may(*user, used)) continue;

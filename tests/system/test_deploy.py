@@ -9,6 +9,8 @@ import tempfile
 import unittest
 import urllib.request
 
+import yaml
+
 import config
 import harness
 from harness import ROOT
@@ -127,6 +129,38 @@ class Deploy(unittest.TestCase):
         for name in re.findall(r"(?m)^\s*(\S+\.so\S*) =>", run("ldd", harness.PANELGATE).stdout):
             owners = run("dpkg-query", "-S", f"*/{name}").stdout
             self.assertTrue(listed & set(re.findall(r"(?m)^([^:,\s]+)", owners)), (name, owners))
+
+
+class Fleet(unittest.TestCase):
+    """The repository and the tasks of docs/operate/fleet.md, played without Ansible."""
+
+    def test_a_box_takes_what_the_repository_has_and_so_does_its_ci(self):
+        page = (ROOT / "docs/operate/fleet.md").read_text()
+        [named] = re.findall(r"`(profiles_dir: [^`]*)`", page)
+        blocks = re.findall(r"(?ms)^```yaml\n(.*?)^```$", page)
+        [tasks] = [yaml.safe_load(block.split("# handlers")[0]) for block in blocks if "ansible.builtin" in block]
+        copies = [task["ansible.builtin.copy"] for task in tasks]
+        self.assertEqual([copy["dest"] for copy in copies],
+                         ["/etc/panelgate/profiles/", "/etc/panelgate/scada.hash", "/etc/panelgate/panelgate.yaml"])
+        with tempfile.TemporaryDirectory() as folder:
+            repository, box, elsewhere = (pathlib.Path(folder, name) for name in ("repository", "box", "copy"))
+            own = (ROOT / "config/profiles/generic.yaml").read_text()
+            text = f"{named}\n" + next(block for block in blocks if block.startswith("templates:"))
+            text = text.replace("profile: generic", "profile: meter-of-ours")
+            for file, content in ((repository / "profiles/meter-of-ours.yaml", own),
+                                  (repository / "plants/hall3/box17.yaml", text),
+                                  (elsewhere / "source", text.replace("/etc/panelgate", str(box)))):
+                file.parent.mkdir(parents=True)
+                file.write_text(content)
+            shutil.copytree(repository / "profiles", box / "profiles")
+            validated = copies[-1]["validate"].replace("/usr/bin/panelgate", harness.PANELGATE)
+            done = run(*(validated % (elsewhere / "source")).split())
+            self.assertEqual(done.returncode, 0, done.stderr)
+            [variable] = re.findall(r"export (\w+)=\$PWD/profiles", page)
+            done = subprocess.run([harness.PANELGATE, "check", "-c", "plants/hall3/box17.yaml"], cwd=repository,
+                                  env={**os.environ, variable: f"{repository}/profiles"}, capture_output=True,
+                                  text=True, timeout=harness.PATIENCE, check=False)
+            self.assertEqual(done.returncode, 0, done.stderr)
 
 
 @unittest.skipUnless(os.geteuid() == 0 and shutil.which("unshare"), "wants root, for mounts of its own")
