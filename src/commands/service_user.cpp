@@ -42,7 +42,7 @@ std::vector<Used> used_by(const config::Config& config) {
         for (const web::Token& token : config.http->tokens) add(token.file);
     }
     if (config.mqtt) {
-        add_tls(config.mqtt->tls);
+        if (config.mqtt->tls) add_tls(config.mqtt->client());
         add(config.mqtt->password_file);
     }
     if (!config.profiles_dir.empty()) all.push_back({config.profiles_dir, R_OK | X_OK, "750"});

@@ -108,6 +108,8 @@ class Deploy(unittest.TestCase):
             self.assertRegex(played, rf'labels: \'{{alertname="{alert}"', alert)
 
     def test_each_alert_says_what_to_do(self):
+        listed = re.findall(r"(?m)^\| `(Panelgate\w+)`", (ROOT / "docs/operate/monitoring.md").read_text())
+        self.assertEqual(set(listed), set(ALERT.findall(ALERTS.read_text())))
         for alert in ALERTS.read_text().split("- alert: ")[1:]:
             for key in ("severity", "summary", "description", "runbook"):
                 self.assertRegex(alert, rf"\b{key}: \S", alert)

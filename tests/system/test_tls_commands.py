@@ -235,7 +235,8 @@ class Says(unittest.TestCase):
         rules = "{rules: [{name: no, deny: [write], roles: [viewer]}]}"
         with plant() as made:
             file = made.folder / "p.yaml"
-            file.write_text(gateway(line(), http='listen: "127.0.0.1:8443", anonymous: none, ' +
+            file.write_text(gateway(line(), modbus="listen: 127.0.0.1:0, access: read_only",
+                                    http='listen: "127.0.0.1:8443", anonymous: none, ' +
                                     made.tls("optional", role_from="certificate"), access=rules))
             done = harness.run("check", "-c", str(file))
             self.assertEqual((done.returncode, done.stderr), (0, ""))
