@@ -151,7 +151,7 @@ secure() {
     inside panelgate cert new-ca --dir /etc/panelgate/tls >/dev/null
     inside panelgate cert new-server localhost 127.0.0.1 --dir /etc/panelgate/tls >/dev/null
     new_token
-    install -d -m 700 "$root/etc/credstore"
+    mkdir -m 700 "$root/etc/credstore"
     (umask 077; echo the-token-of-the-shift-1 >"$root/etc/credstore/panelgate-operator")
     sed -i '/^http:/,$d' "$root/etc/panelgate/panelgate.yaml"
     cat >>"$root/etc/panelgate/panelgate.yaml" <<'YAML'
