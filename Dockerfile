@@ -24,6 +24,8 @@ FROM debian:${DEBIAN}
 COPY deploy/install_packages.sh deploy/packages.txt deploy/sbom.sh /tmp/deploy/
 RUN /tmp/deploy/install_packages.sh run && rm -rf /var/lib/apt/lists/* /var/cache/apt/* /var/log/*
 COPY --from=build /image/ /
+# What the service writes; a new volume that is mounted there takes over the owner.
+RUN install -d -o 10001 -g 10001 /var/lib/panelgate /var/log/panelgate
 # What is in here, for scanners: all packages of dpkg, and those that were compiled into the program
 RUN cd /usr/share/panelgate && { cat built-in.tsv; /tmp/deploy/sbom.sh rows; } | sort -u | \
     /tmp/deploy/sbom.sh cyclonedx >sbom.cdx.json && rm -r built-in.tsv /tmp/deploy

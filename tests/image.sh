@@ -70,6 +70,7 @@ start() {
     podman "${store[@]}" --runtime runc run -d --name $box --network none --read-only \
         --cap-drop=ALL --security-opt no-new-privileges --memory 128m --pids-limit 64 \
         --ulimit nofile=20000:20000 --ulimit nproc=32768:32768 \
+        --volume panelgate-state:/var/lib/panelgate --volume panelgate-audit:/var/log/panelgate \
         $image demo --http 0.0.0.0:8080 --modbus 0.0.0.0:1502 >/dev/null
 }
 
@@ -89,6 +90,9 @@ rights() {
         grep -qP "^$line" <<<"$status" || fail "not so: $line in $status"
     done
     if inside touch /usr/x 2>/dev/null; then fail "its root can be written to"; fi
+    for folder in /var/lib/panelgate /var/log/panelgate; do
+        inside touch $folder/x || fail "$folder cannot be written to"
+    done
 }
 
 listed() {

@@ -115,6 +115,16 @@ cp "$work/good" "$file"
 must inside systemctl restart panelgate
 lives
 
+say "an audit without which nothing is written, in the folder that the unit makes"
+echo 'audit: {file: /var/log/panelgate/audit.jsonl, on_failure: refuse_writes}' >>"$file"
+must inside systemctl reload panelgate
+within inside curl -sfo /dev/null -X PUT -d '{"value":21.5}' $url/api/v1/stations/press/points/setpoint
+within inside sh -c 'panelgate audit show --kind write | grep -q confirmed'
+must inside sh -c '[ "$(stat -c %U /var/log/panelgate/audit.jsonl)" = panelgate ]'
+must inside panelgate audit verify >"$work/console"
+cp "$work/good" "$file"
+must inside systemctl reload panelgate
+
 say "upgrade: the same program reloads, another one is started"
 echo "# ours" >>"$file"
 first=$(show MainPID)

@@ -98,7 +98,7 @@ def text(program):
              "Made from the program by `deploy/manual/reference.py`. `/metrics` has the text format of Prometheus.",
              "A scrape never touches a bus. Which to watch, and how to scrape, is in",
              "[Monitoring](../operate/monitoring.md); what alerts are made of is in [Alerts](alerts.md).", "",
-             "Labels come from the configuration only. What could not be read is absent, never 0.",
+             "Labels come from the configuration only. A value that could not be read is absent, never 0.",
              "A histogram has `_bucket`, `_sum` and `_count` behind its name. A scrape is packed (gzip) for clients",
              "that accept it, such as Prometheus.", "",
              "<!-- test: demo -->", "```sh", "curl -s http://127.0.0.1:8080/metrics | grep -c '^# HELP'", "```", ""]

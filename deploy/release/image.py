@@ -35,6 +35,7 @@ LEFT_OUT = re.compile(r"usr/share/(doc/.*(?<!/copyright)|man/.*|locale/.*|lintia
 TAKEN = re.compile(r"usr/(bin/panelgate|share/doc/panelgate/copyright|share/panelgate/sbom\.cdx\.json)$")
 # Without systemd and users to make the program wants none of these; the rest is scripts of packages.
 UNWANTED = {"adduser", "init-system-helpers", "debconf", "perl-base", "passwd", "dpkg", "tar"}
+WRITTEN = ("var/lib/panelgate", "var/log/panelgate")  # by the program; a new volume takes over their owner
 FILES = {
     "etc/passwd": f"root:x:0:0:root:/:/sbin/nologin\npanelgate:x:{USER}:{USER}::/:/sbin/nologin\n",
     "etc/group": f"root:x:0:\ndialout:x:20:\npanelgate:x:{USER}:\n",
@@ -102,6 +103,9 @@ def layers(folder):
         below.folder(name.rpartition("/")[0])
         below.add(name, text.encode())
     below.folder("var/lib/dpkg/status.d")
+    for name in WRITTEN:
+        below.folder(name.rpartition("/")[0])
+        below.add(name, type=tarfile.DIRTYPE, mode=0o755, uid=USER, gid=USER)
     for deb in sorted(folder.glob("*.deb")):
         name = field(deb, "Package")
         if name == "panelgate":

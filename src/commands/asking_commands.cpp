@@ -164,7 +164,7 @@ void add_status(Adder& adder) {
         "are findings; 64 usage; 66 the token file cannot be read; 69 no gateway answers.");
     adder.on_call(command, [typed] { return status(typed->at, typed->format == "json"); });
     const auto shown = std::make_shared<Typed>();
-    command = adder.add("top", "show load, clients and slow panels, each second anew", shown);
+    command = adder.add("top", "show load, clients and slow panels, again each second", shown);
     command->add_flag("--once", shown->once, "one look, as on a pipe");
     adder.on_call(command, [shown] { return top(shown->at, shown->once); });
 }
@@ -186,7 +186,7 @@ void add_trace(Adder& adder) {
 void add_report(Adder& adder) {
     const auto typed = std::make_shared<Typed>();
     CLI::App* command = adder.add(
-        "report", "write all that a gateway tells of itself into a file, for support", typed);
+        "report", "write all that a gateway knows about itself into a file, for support", typed);
     command->add_option("-o,--output", typed->file,
                         "a file that is not there yet, - for standard output; without: "
                         "panelgate-report-TIME.json");

@@ -24,6 +24,7 @@
 #include "panelgate/mbusd/conf.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/web/http/json_text.hpp"
+#include "service_user.hpp"
 
 namespace panelgate::commands {
 
@@ -176,6 +177,8 @@ ExitCode check(const std::string& file, const CheckOptions& options) {
         std::ranges::copy(
             gateway::certificate_doubts(*loaded.config, gateway::seconds_since_1970()),
             std::back_inserter(judged.warnings));
+        std::ranges::copy(service_doubts(explain::path_of(file), *loaded.config),
+                          std::back_inserter(judged.warnings));
         explain::print_warnings(*loaded.config);
         for (const std::string& message : judged.warnings)
             std::cerr << explain::path_of(file) << ": warning: " << message << '\n';

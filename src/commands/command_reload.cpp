@@ -101,10 +101,11 @@ ExitCode reload_by_signal(const ReloadOptions& options, const HttpDoor& door,
         const GatewayAnswer answer = gateway->get("/api/v1/reload");
         if (answer.is_ok() && answer.json.contains("outcome")) return print_verdict(answer.json);
     }
-    std::cerr << "panelgate: it was told to, and cannot be asked what came of it (a listener that "
-                 "wants a client's certificate answers no command): its log says whether it has "
-                 "reloaded; a token that systemd hands out (LoadCredential) is taken at a restart, "
-                 "and a certificate that must not replace a good one is not taken\n";
+    std::cerr
+        << "panelgate: the gateway got the signal, and cannot be asked for the result (a "
+           "listener that wants a client's certificate answers no command): its log says "
+           "whether it has reloaded; a token that systemd keeps (LoadCredential) is taken at "
+           "a restart only, and a certificate that must not replace a good one is not taken\n";
     return kUnknown;
 }
 

@@ -20,6 +20,7 @@
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/web/http/settings.hpp"
 #include "panelgate/yaml/document.hpp"
+#include "service_user.hpp"
 
 namespace panelgate::commands {
 
@@ -51,23 +52,39 @@ std::optional<std::string> last_day(std::string_view typed) {
     return web::expiry_text(today + days(number * found->second + 1));
 }
 
-/// Creates the file; returns what is wrong, "" if nothing is.
-std::string write_new(const std::string& file, const std::string& text) {
+/// What came of writing a file.
+struct Written {
+    std::string wrong{};     ///< "" if nothing is
+    bool is_shared = false;  ///< the group of the package's service may read it
+};
+
+/// Creates the file, for its owner and the service's group, whatever the umask.
+Written write_new(const std::string& file, const std::string& text) {
     constexpr mode_t kMode = S_IRUSR | S_IWUSR | S_IRGRP;
     const int handle = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode);
-    if (handle < 0) return std::strerror(errno);
-    const ssize_t written = ::write(handle, text.data(), text.size());
-    std::string wrong;
-    if (written != static_cast<ssize_t>(text.size()))
-        wrong = written < 0 ? std::strerror(errno) : "the disk is full";
-    if (::close(handle) != 0 && wrong.empty()) wrong = std::strerror(errno);
-    if (!wrong.empty()) ::unlink(file.c_str());
-    return wrong;
+    if (handle < 0) return {std::strerror(errno)};
+    const ssize_t size = ::write(handle, text.data(), text.size());
+    Written written;
+    if (size != static_cast<ssize_t>(text.size()))
+        written.wrong = size < 0 ? std::strerror(errno) : "the disk is full";
+    const auto group = service_group();
+    written.is_shared = group && ::fchown(handle, static_cast<uid_t>(-1), *group) == 0 &&
+                        ::fchmod(handle, kMode) == 0;
+    if (::close(handle) != 0 && written.wrong.empty()) written.wrong = std::strerror(errno);
+    if (!written.wrong.empty()) ::unlink(file.c_str());
+    return written;
 }
 
 ExitCode wrong_usage(const std::string& what) {
     std::cerr << "panelgate: token: " << what << '\n';
     return kUsage;
+}
+
+ExitCode not_written(const std::string& file, const std::string& why) {
+    if (why == std::strerror(EEXIST))
+        return wrong_usage(file + " is there already; give another name");
+    std::cerr << "panelgate: cannot write " << file << ": " << why << '\n';
+    return kInternal;
 }
 
 bool is_name(std::string_view name) {
@@ -84,8 +101,18 @@ bool is_role(std::string_view role) {
     return is_name(role) && small && role != "none" && role != "default";
 }
 
+/// Who may read the file of a hash, and what to type where the service may not.
+std::string readers_of(const std::string& file, bool is_shared) {
+    const std::string name = kServiceUser;
+    if (is_shared)
+        return "Its hash is in " + file + ", which the service's group " + name + " may read\n";
+    return "Its hash is in " + file +
+           ", which the user of the gateway has to be able to read: sudo " +
+           (service_group() ? "chgrp " + name : std::string("chown USER")) + ' ' + file + '\n';
+}
+
 void print_token(const TokenOptions& options, const std::string& token, const std::string& hash,
-                 const std::string& expires) {
+                 const std::string& expires, bool is_shared) {
     const std::string file =
         options.output.empty() ? "/etc/panelgate/tokens/" + options.name : options.output;
     std::cout
@@ -95,7 +122,7 @@ void print_token(const TokenOptions& options, const std::string& token, const st
         std::cout << "Its hash, the one line of a file such as " << file << "\n\n  " << hash
                   << "\n\n";
     } else {
-        std::cout << "Its hash is in " << file << '\n';
+        std::cout << readers_of(file, is_shared);
     }
     std::cout << "In the configuration, below http: tokens:, then `panelgate reload`\n\n  - {name: "
               << yaml::written(options.name) << ", role: " << options.role << ", file: " << file;
@@ -132,16 +159,10 @@ ExitCode token_new(const TokenOptions& options) {
         return kInternal;
     }
     const std::string hash = web::hash_of(*token);
-    if (!options.output.empty()) {
-        const std::string wrong = write_new(options.output, hash + '\n');
-        if (wrong == std::strerror(EEXIST))
-            return wrong_usage(options.output + " is there already; give another name");
-        if (!wrong.empty()) {
-            std::cerr << "panelgate: cannot write " << options.output << ": " << wrong << '\n';
-            return kInternal;
-        }
-    }
-    print_token(options, *token, hash, expires);
+    Written written;
+    if (!options.output.empty()) written = write_new(options.output, hash + '\n');
+    if (!written.wrong.empty()) return not_written(options.output, written.wrong);
+    print_token(options, *token, hash, expires, written.is_shared);
     return kFine;
 }
 

@@ -428,7 +428,7 @@ class CommandLine {
         command->footer(
             "Exit codes: 0 it serves the file, or did already; 1 no gateway could be asked, or a "
             "rollback would protect less; 69 valid, but something could not be opened; 75 the "
-            "gateway was told to, and cannot be asked what came of it; 78 the file has "
+            "gateway got the signal, and cannot be asked for the result; 78 the file has "
             "faults.\nAfter 1, 69 and 78 nothing has changed.");
         command->callback([this] { code_ = reload(reload_); });
     }

@@ -37,7 +37,7 @@ void add_audit(CLI::App& cli, ExitCode& code) {
     verify->callback([typed, &code] { code = audit_verify(*typed); });
     CLI::App* show = command->add_subcommand("show", "print records");
     add_files(show, *typed);
-    show->add_option("--station", typed->station, "only of this station");
+    show->add_option("--station", typed->station, "only records of this station");
     show->add_option("--since", typed->since,
                      "only since then: 30min, 1h, 7d, or a time such as 2026-11-26T08:00:00Z");
     show->add_option("--until", typed->until, "only until then, written like --since");

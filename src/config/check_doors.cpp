@@ -317,7 +317,8 @@ void warn_of_http(Loading& loading, const Node& node, const web::Settings& http)
     warn_of_health(loading, node, http);
     warn_of_plain_tokens(loading, node, http);
     warn_of_anonymous(loading, node, http);
-    if (http.anonymous.role == Role::none && http.tokens.empty())
+    const bool is_open = !http.tokens.empty() || tls::goes_by_certificates(http.tls);
+    if (http.anonymous.role == Role::none && !is_open)
         loading.warn(mark_of(node, "anonymous"),
                      "clients can use only /healthz and /readyz: anonymous is none and there is no "
                      "token; add tokens, or set anonymous: viewer");

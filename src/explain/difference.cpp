@@ -188,13 +188,31 @@ bool is_harmless(const Change& change, const config::KeyShape& key, const Sides&
     return key.path == "lines/stations/profile" && !Sides::has(sides.after, map + "/guard", "true");
 }
 
-/// A station that was protected is not listed any more, on a line that passes such stations.
+/// The path of the station that has this id on a line; "" if none has it.
+std::string station_with(const std::string& id, const std::string& line, const Settings& side) {
+    const std::string stations = line + "/stations/";
+    for (auto at = side.lower_bound(stations); at != side.end(); ++at) {
+        const std::string& path = at->first;
+        if (!path.starts_with(stations)) break;
+        const std::size_t end = path.find('/', stations.size());
+        if (end != path.npos && path.substr(end) == "/id" && at->second.value == id)
+            return path.substr(0, end);
+    }
+    return {};
+}
+
+/// A protected station has another name now, and is protected no more. A station that only goes is
+/// what it was before somebody added it.
 bool is_unprotected(const Change& change, const Sides& sides) {
+    const auto id = sides.before.find(change.path + "/id");
+    if (id == sides.before.end()) return false;
     const std::string line = change.path.substr(0, change.path.find("/stations/"));
-    const bool passes = Sides::has(sides.after, line + "/unlisted_stations", "pass") &&
-                        !Sides::has(sides.after, line + "/mode", "listen");
-    return passes && (Sides::has(sides.before, change.path + "/access", "read_only") ||
-                      Sides::has(sides.before, change.path + "/guard", "true"));
+    const std::string now = station_with(id->second.value, line, sides.after);
+    const auto loses = [&](const std::string& key, std::string_view value) {
+        return Sides::has(sides.before, change.path + key, value) &&
+               !Sides::has(sides.after, now + key, value);
+    };
+    return !now.empty() && (loses("/access", "read_only") || loses("/guard", "true"));
 }
 
 /// `setting`: of one of the sides.

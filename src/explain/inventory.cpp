@@ -164,8 +164,10 @@ Heading heading_of(const serial_server::Settings& master) {
 }
 
 Heading heading_of(const web::Settings& http) {
+    const bool by_role = tls::goes_by_certificates(http.tls);
     std::string text = "http " + http.name() + ": without a token " + text_of(http.anonymous) +
-                       ", for " + guests_of(http.allow, http.tls);
+                       (by_role ? ", with a certificate what its role may" : "") + ", for " +
+                       guests_of(http.allow, http.tls);
     if (!http.hosts.empty()) text += ", as";
     for (const std::string& host : http.hosts) text += ' ' + host;
     return {std::move(text), " listen anonymous allow hosts "};

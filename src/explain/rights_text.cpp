@@ -37,6 +37,11 @@ void add_http(const web::Settings& http, std::vector<Door>& doors) {
         doors.push_back(door("http " + http.name(), who));
         doors.back().is_open = !tls::wants_certificate(http.tls);
     }
+    if (tls::goes_by_certificates(http.tls)) {
+        who.standing = Role::operator_;
+        doors.push_back(door("http " + http.name() + " with a certificate of an operator", who));
+        doors.back().is_open = false;
+    }
     for (const web::Token& token : http.tokens) {
         who.token = token.name;
         who.standing = token.standing;

@@ -171,7 +171,7 @@ const Node* required_sequence(MapReader& in, std::string_view key, std::string_v
 }
 
 std::optional<AddressRange> range(MapReader& in, std::string_view key) {
-    const Node* list = in.sequence(key);
+    const Node* list = in.sequence(key, "[0, 119]");
     if (list == nullptr) return std::nullopt;
     std::vector<std::uint32_t> ends;
     for (const Node& item : list->items) {

@@ -50,6 +50,9 @@ std::string list_hint(const Node& node, std::string_view example) {
     constexpr std::string_view kBrackets = "[](){}<> ";
     items.remove_prefix(std::min(items.find_first_not_of(kBrackets), items.size()));
     items = items.substr(0, items.find_last_not_of(kBrackets) + 1);
+    const std::size_t dash = items.find_first_not_of("0123456789");
+    if (dash > 0 && dash != items.npos && items[dash] == '-')
+        return "; write all numbers, with ',' between, as [1, 2, 3]";
     return "; write [" + std::string(clip(items, 40)) + "], or '- ' before each item";
 }
 

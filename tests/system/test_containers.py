@@ -29,7 +29,7 @@ def uncommented():
     text = COMPOSE.read_text()
     block = re.search(r"(?s)# --- real adapter\n(.*?)    # ---\n", text)[1]
     own = re.sub(r"(?m)^    # ", "    ", block)
-    return re.sub(r'(?m)^    command: demo .*\n    ports:\n(?:      - .*\n)+', own, text)
+    return re.sub(r'(?m)^    command: demo .*\n    ports:\n(?:      - .*\n)+    # .*\n    volumes:\n(?:      - .*\n)+', own, text)
 
 
 def mounts(service):
@@ -91,6 +91,15 @@ class Compose(unittest.TestCase):
                 modbus="listen: 0.0.0.0:502, access: read_only", http="listen: 0.0.0.0:8080"))
             checked = harness.run("check", "-c", str(file))
             self.assertEqual(checked.returncode, 0, checked.stderr)
+
+    def test_what_the_gateway_writes_has_a_volume_of_its_own_and_an_owner(self):
+        for text in (COMPOSE.read_text(), uncommented()):
+            there = mounts(services(text)["panelgate"])
+            for name, inside in (("state", "/var/lib/panelgate"), ("audit", "/var/log/panelgate")):
+                self.assertEqual(there.get(name), inside)
+                self.assertIn(name, yaml.safe_load(text)["volumes"])
+        made = re.search(r"\nRUN install -d -o (\d+) -g (\d+) (.*)\n", DOCKERFILE.split("\nFROM ")[-1])
+        self.assertEqual(made.groups(), ("10001", "10001", "/var/lib/panelgate /var/log/panelgate"))
 
     @unittest.skipUnless(shutil.which("docker-compose"), "no docker-compose here")
     def test_docker_compose_takes_it(self):

@@ -9,6 +9,8 @@ import tempfile
 import unittest
 import urllib.request
 
+import yaml
+
 import config
 import harness
 from harness import ROOT
@@ -63,6 +65,14 @@ class Deploy(unittest.TestCase):
         self.assertLessEqual({"ttyS", "ttyUSB", "ttyACM", "ttyAMA", "ttymxc", "ttyO", "ttySC", "ttyTHS",
                               "ttyXRUSB", "pts", "ptmx"}, allowed)
 
+    def test_it_may_write_its_state_and_its_audit_and_a_purge_takes_both_away(self):
+        text = SERVICE.read_text()
+        purged = (ROOT / "deploy/package/postrm").read_text()
+        for key, folder in (("StateDirectory", "/var/lib/panelgate"), ("LogsDirectory", "/var/log/panelgate")):
+            self.assertIn(f"\n{key}=panelgate\n", text)
+            self.assertRegex(purged, rf"rm -rf .*{folder}\b")
+        self.assertIn("\nUser=panelgate\nGroup=panelgate\n", text)  # of the package: a folder that all find
+
     def test_a_token_of_the_service_is_taken(self):
         text = SERVICE.read_text()
         self.assertIn("\nConfigurationDirectory=panelgate\n", text)
@@ -98,6 +108,8 @@ class Deploy(unittest.TestCase):
             self.assertRegex(played, rf'labels: \'{{alertname="{alert}"', alert)
 
     def test_each_alert_says_what_to_do(self):
+        listed = re.findall(r"(?m)^\| `(Panelgate\w+)`", (ROOT / "docs/operate/monitoring.md").read_text())
+        self.assertEqual(set(listed), set(ALERT.findall(ALERTS.read_text())))
         for alert in ALERTS.read_text().split("- alert: ")[1:]:
             for key in ("severity", "summary", "description", "runbook"):
                 self.assertRegex(alert, rf"\b{key}: \S", alert)
@@ -119,6 +131,85 @@ class Deploy(unittest.TestCase):
         for name in re.findall(r"(?m)^\s*(\S+\.so\S*) =>", run("ldd", harness.PANELGATE).stdout):
             owners = run("dpkg-query", "-S", f"*/{name}").stdout
             self.assertTrue(listed & set(re.findall(r"(?m)^([^:,\s]+)", owners)), (name, owners))
+
+
+class Fleet(unittest.TestCase):
+    """The repository and the tasks of docs/operate/fleet.md, played without Ansible."""
+
+    def test_a_box_takes_what_the_repository_has_and_so_does_its_ci(self):
+        page = (ROOT / "docs/operate/fleet.md").read_text()
+        [named] = re.findall(r"`(profiles_dir: [^`]*)`", page)
+        blocks = re.findall(r"(?ms)^```yaml\n(.*?)^```$", page)
+        [tasks] = [yaml.safe_load(block.split("# handlers")[0]) for block in blocks if "ansible.builtin" in block]
+        copies = [task["ansible.builtin.copy"] for task in tasks]
+        self.assertEqual([copy["dest"] for copy in copies],
+                         ["/etc/panelgate/profiles/", "/etc/panelgate/scada.hash", "/etc/panelgate/panelgate.yaml"])
+        with tempfile.TemporaryDirectory() as folder:
+            repository, box, elsewhere = (pathlib.Path(folder, name) for name in ("repository", "box", "copy"))
+            own = (ROOT / "config/profiles/generic.yaml").read_text()
+            text = f"{named}\n" + next(block for block in blocks if block.startswith("templates:"))
+            text = text.replace("profile: generic", "profile: meter-of-ours")
+            for file, content in ((repository / "profiles/meter-of-ours.yaml", own),
+                                  (repository / "plants/hall3/box17.yaml", text),
+                                  (elsewhere / "source", text.replace("/etc/panelgate", str(box)))):
+                file.parent.mkdir(parents=True)
+                file.write_text(content)
+            shutil.copytree(repository / "profiles", box / "profiles")
+            validated = copies[-1]["validate"].replace("/usr/bin/panelgate", harness.PANELGATE)
+            done = run(*(validated % (elsewhere / "source")).split())
+            self.assertEqual(done.returncode, 0, done.stderr)
+            [variable] = re.findall(r"export (\w+)=\$PWD/profiles", page)
+            done = subprocess.run([harness.PANELGATE, "check", "-c", "plants/hall3/box17.yaml"], cwd=repository,
+                                  env={**os.environ, variable: f"{repository}/profiles"}, capture_output=True,
+                                  text=True, timeout=harness.PATIENCE, check=False)
+            self.assertEqual(done.returncode, 0, done.stderr)
+
+
+@unittest.skipUnless(os.geteuid() == 0 and shutil.which("unshare"), "wants root, for mounts of its own")
+class ServiceUser(unittest.TestCase):
+    """Commands of root on a machine where the package has made its user."""
+
+    def setUp(self):
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.folder.chmod(0o755)
+        for name, entry in (("passwd", "panelgate:x:951:951::/nonexistent:/usr/sbin/nologin"),
+                            ("group", "panelgate:x:951:")):
+            (self.folder / name).write_text(pathlib.Path("/etc", name).read_text() + entry + "\n")
+
+    def as_root(self, *words):
+        mounts = ("umask 077; for name in passwd group; do mount --bind $0/$name /etc/$name || exit 99; done; "
+                  'exec "$@"')
+        return run("unshare", "--mount", "sh", "-c", mounts, str(self.folder), harness.PANELGATE, *words)
+
+    def test_a_hash_is_readable_by_the_service_and_by_nobody_else(self):
+        file = self.folder / "scada.hash"
+        made = self.as_root("token", "new", "--name", "scada", "-o", str(file))
+        self.assertEqual(made.returncode, 0, made.stderr)
+        self.assertIn(f"{file}, which the service's group panelgate may read", made.stdout)
+        self.assertEqual((file.stat().st_gid, file.stat().st_mode & 0o777), (951, 0o640))
+        file.unlink()
+        alone = harness.run("token", "new", "--name", "scada", "-o", str(file))
+        self.assertRegex(alone.stdout, f"able to read: sudo (chgrp panelgate|chown USER) {file}\n")
+
+    def test_check_asks_for_the_service(self):
+        token, file = self.folder / "scada.hash", self.folder / "panelgate.yaml"
+        token.write_text("sha256:" + "ab" * 32)
+        token.chmod(0o600)
+        audit = self.folder / "log"
+        audit.mkdir(mode=0o700)
+        tokens = f"[{{name: scada, role: operator, file: {token}}}]"
+        file.write_text(config.gateway(config.line(), http=f"listen: 127.0.0.1:8080, tokens: {tokens}")
+                        + f"audit: {{file: {audit}/audit.jsonl}}\n")
+        file.chmod(0o644)
+        told = self.as_root("check", "-c", str(file))
+        self.assertEqual(told.returncode, 0, told.stderr)
+        for doubt in (f"cannot read {token}: chgrp panelgate {token}; chmod 640 {token}",
+                      f"cannot write in {audit}: chgrp panelgate {audit}; chmod 770 {audit}"):
+            self.assertIn(f"the service's user panelgate {doubt}", told.stderr)
+        for path, mode in ((token, 0o640), (audit, 0o770)):
+            os.chown(path, 0, 951)
+            path.chmod(mode)
+        self.assertEqual(self.as_root("check", "-c", str(file)).stderr, "")
 
 
 if __name__ == "__main__":

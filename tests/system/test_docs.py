@@ -44,6 +44,8 @@ ASKING = r"(?m)^(panelgate (?:read|write|watch|status|top|trace|report)\b[^|&;\n
 MARKED = "sh bash shell console yaml yml python py js javascript json".split()
 MARKS = r"demo|program(-\d+)?|config|station|config-part|file|output|python|script|not run|"
 UNWANTED = r"(?i)\b(whoever|nobody in particular|owed?)\b"
+# A sentence begins with its subject. (A question may begin so.)
+HEADLESS = re.compile(r"(?:^|[.!?] )((?:Of|Where|Who|Whom|Whose) [^.!?]*[.!])")
 
 STATION = """lines:
   - name: floor1
@@ -274,6 +276,12 @@ class Words(unittest.TestCase):
             for number, text in page.paragraphs():
                 with self.subTest(page=name, line=number):
                     self.assertLessEqual(len(text.split()), 80, text)
+
+    def test_sentences_begin_with_their_subject(self):
+        for name, page in WRITTEN.items():
+            for number, text in page.paragraphs():
+                with self.subTest(page=name, line=number):
+                    self.assertEqual(HEADLESS.findall(text), [])
 
     def test_words_that_say_nothing(self):
         for name, page in PAGES.items():

@@ -112,6 +112,20 @@ class Manifests(unittest.TestCase):
         rules = (ROOT / "deploy/prometheus/rules/alerts.yml").read_text()
         self.assertEqual(set(re.findall(r'job="(\w+)"', rules)), {scraped["metadata"]["name"]})
 
+    def test_names_and_a_broker_are_reached_out_of_the_pod(self):
+        ways = {(port["port"], port.get("protocol", "TCP"))
+                for rule in base()["NetworkPolicy/panelgate"]["spec"]["egress"] for port in rule["ports"]}
+        self.assertEqual(ways, {(53, "UDP"), (53, "TCP"), (1883, "TCP"), (8883, "TCP")})
+
+    def test_the_two_folders_that_are_written_are_there_on_a_read_only_root(self):
+        pod = pod_of(base())
+        [container] = pod["containers"]
+        self.assertTrue(container["securityContext"]["readOnlyRootFilesystem"])
+        written = {m["mountPath"]: m["name"] for m in container["volumeMounts"] if not m.get("readOnly")}
+        self.assertEqual(set(written), {"/var/lib/panelgate", "/var/log/panelgate"})
+        self.assertLessEqual(set(written.values()), {volume["name"] for volume in pod["volumes"]})
+        self.assertEqual(pod["securityContext"]["fsGroup"], pod["securityContext"]["runAsGroup"])
+
     def test_the_pod_keeps_to_the_restricted_standard(self):
         self.assertEqual(breaches(pod_of(base())), [])
         labels = base()["Namespace/panelgate"]["metadata"]["labels"]

@@ -241,6 +241,20 @@ class Says(unittest.TestCase):
             self.assertIn("certificate may, for everybody", done.stdout)
             self.assertNotIn("everybody with", done.stdout)
 
+    def test_check_knows_that_certificates_open_http(self):
+        rules = "{rules: [{name: no, deny: [write], roles: [viewer]}]}"
+        with plant() as made:
+            file = made.folder / "p.yaml"
+            file.write_text(gateway(line(), modbus="listen: 127.0.0.1:0, access: read_only",
+                                    http='listen: "127.0.0.1:8443", anonymous: none, ' +
+                                    made.tls("optional", role_from="certificate"), access=rules))
+            done = harness.run("check", "-c", str(file))
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+            self.assertIn("http 127.0.0.1:8443: without a token nothing, with a certificate what its role may, "
+                          "for everybody", done.stdout)
+            self.assertIn("http 127.0.0.1:8443 with a certificate of an operator: everywhere", done.stdout)
+            file.write_text(file.read_text().replace(", role_from: certificate", ""))
+            self.assertIn("clients can use only /healthz and /readyz", harness.run("check", "-c", str(file)).stderr)
 
 
 class Port(unittest.TestCase):

@@ -120,12 +120,23 @@ TEST(Weaker, WhatRelaysWrite) {
     EXPECT_EQ(told(relays, one, "{from: one/400001, to: two/400101, every: 5s}"), "");
 }
 
-TEST(Weaker, AStationThatIsNoLongerListedWhereUnlistedOnesPass) {
-    const std::string without =
-        "lines: [{name: floor1, device: sim, stations: [{id: 5}]}]\n" + kListener;
-    EXPECT_EQ(one_way(station(", access: read_only"), without),
-              "lines/floor1/stations/press: removed");
-    EXPECT_EQ(one_way(station(""), without), "");
+TEST(Weaker, AProtectedStationUnderAnotherName) {
+    const auto named = [](const std::string& keys) {
+        return plant("unlisted_stations: refuse, ", "}, {id: 5" + keys, kListener);
+    };
+    EXPECT_EQ(one_way(named(", name: a, access: read_only"), named(", name: b")),
+              "lines/floor1/stations/a: removed");
+    EXPECT_EQ(one_way(named(", name: a, guard: true"), named(", name: b")),
+              "lines/floor1/stations/a: removed");
+    EXPECT_EQ(one_way(named(", name: a, access: read_only"), named(", name: b, access: read_only")),
+              "");
+}
+
+TEST(Weaker, NotAStationThatIsTakenAway) {
+    const std::string three = station(
+        "}, {id: 5, name: a, access: read_only}, {id: 6, name: b, guard: true, profile: "
+        "omron-cp2e");
+    EXPECT_EQ(one_way(three, station("")), "") << "as a rollback takes away what a file added";
 }
 
 TEST(Weaker, UnlistedStationsAndTheModeOfALine) {

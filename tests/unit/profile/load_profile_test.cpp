@@ -137,7 +137,9 @@ TEST(LoadProfile, HoldsRangesInsideTheAddressSpaceAndTheWritableInsideTheReadabl
                   "5:62: readable must be [FIRST, LAST], two addresses from 0 to 65535")
             << range;
     EXPECT_EQ(problems_of(with_area("table: coils, readable: 5")),
-              "5:62: readable must be a list, not '5'; write [5], or '- ' before each item");
+              "5:62: readable must be a list such as [0, 119], not '5'");
+    EXPECT_EQ(problems_of(with_area("table: coils, readable: 0-99")),
+              "5:62: readable must be a list such as [0, 119], not '0-99'");
     EXPECT_EQ(problems_of(with_area("table: coils,\n"
                                     "     readable: [10, 20],\n"
                                     "     writable: [9, 20]")),

@@ -142,7 +142,7 @@ TEST(TurnsTest, WhoHasCostMoreWaitsForWhoHasCostLess) {
     const TimePoint now = TimePoint() + 1s;
     const auto taken = [&] {
         const auto turn = turns.take();
-        return turn ? turn->address : "nobody";
+        return turn ? turn->host.text() : "nobody";
     };
     for (const char* address : {"a", "a", "b", "b", "b", ""}) turns.add(HostKey(address), [] {});
     EXPECT_EQ(taken(), "") << "a probe";
@@ -167,13 +167,13 @@ TEST(TurnsTest, ADebtIsPaidByTimeAndWhoIsOnHoldWaits) {
     turns.add(HostKey("b"), [] {});
     turns.add(HostKey("a"), [] {});
     turns.hold(HostKey("a"));
-    EXPECT_EQ(turns.take()->address, "b");
+    EXPECT_EQ(turns.take()->host.text(), "b");
     EXPECT_FALSE(turns.take());
     turns.release(HostKey("a"));
-    EXPECT_EQ(turns.take()->address, "a");
+    EXPECT_EQ(turns.take()->host.text(), "a");
     turns.charge(now + 1s, HostKey("a"), 0ms);  // both have paid long ago
     for (const char* address : {"b", "a"}) turns.add(HostKey(address), [] {});
-    EXPECT_EQ(turns.take()->address, "a");
+    EXPECT_EQ(turns.take()->host.text(), "a");
 }
 
 TEST_F(CrossingTest, AnExceptionIsA500AndInTheLog) {
