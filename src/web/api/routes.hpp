@@ -66,6 +66,7 @@ Handling put_point(HttpRequest request, const Api* api);
 Handling get_point_history(HttpRequest request, const Api* api);
 Handling get_table_plan(HttpRequest request, const Api* api);
 Handling get_device_plan(HttpRequest request, const Api* api);
+Handling get_point_plan(HttpRequest request, const Api* api);
 Handling get_interpretations(HttpRequest request, const Api* api);
 Handling get_events(HttpRequest request, const Api* api);
 Handling get_relays(HttpRequest request, const Api* api);

@@ -2,7 +2,7 @@
 import {get, offers, path} from './api.js';
 import {h, list, table} from './dom.js';
 import {download} from './download.js';
-import {t, time, word} from './language.js';
+import {t, time, word, zone} from './language.js';
 import {live} from './live.js';
 
 const PERIOD = 3000;  // ms
@@ -11,7 +11,7 @@ const PERIOD = 3000;  // ms
 export function incidents(line) {
     const node = h('section', {hidden: true});
     if (!offers('GET /api/v1/lines/{}/incidents')) return {node, stop: () => {}};
-    const shown = table(t('incidents'), [[t('time')], [t('station')], [t('kind')], [t('errors'), 'number'], ['']]);
+    const shown = table(t('incidents'), [[`${t('time')} (${zone})`], [t('station')], [t('kind')], [t('errors'), 'number'], ['']]);
     node.append(h('h2', null, t('incidents')), shown.node);
     const row = (one) => {
         const away = (ending, name) => download(path('lines', line, 'incidents', one.id + ending), `${line}-${one.id}${ending || '.json'}`, name);
