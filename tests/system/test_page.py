@@ -313,6 +313,7 @@ class Looks(Browser):
                         self.screenshot(name)
                         scroll, seen = self.script("return [document.documentElement.scrollWidth, innerWidth]")
                         self.assertLessEqual(scroll, seen, "no horizontal scroll")
+                        self.assertEqual(self.has_cut(), [])
                         self.assertEqual(self.nameless(), [])
                         self.assertEqual(self.faint(), [])
                         self.assertEqual(self.complaints(), [])

@@ -1,6 +1,7 @@
 """The dashboard tells what is so: outages, who has used a line, what is wrong in the reader's words;
 in headless Chromium, skipped where there is none."""
 import contextlib
+import re
 import signal
 import unittest
 
@@ -43,7 +44,7 @@ class Outage(Browser):
 
     def test_its_tile_ticks_and_boasts_of_no_latency(self):
         self.open()
-        self.wait(lambda: self.text(tile("oven") + " .figure").startswith("answers in "))
+        self.wait(lambda: self.text(tile("oven") + " .figure").startswith("panel "))
         newest = "M120.0,20V28"
         def ticks():
             return self.find(tile("oven") + " .missing").get_attribute("d")
@@ -297,6 +298,34 @@ class Entry(Browser):
         self.find("#write").click()
         self.wait(lambda: "215 216" in self.text(".answer .refusal"))
         self.assertFalse(self.all("dialog"))
+
+
+class SameWords(Browser):
+    def tearDown(self):
+        self.driver.execute_cdp_cmd("Emulation.setTimezoneOverride", {"timezoneId": ""})
+
+    def test_queue_wire_and_panel_are_the_words_of_every_view(self):
+        self.open()
+        self.wait(lambda: self.text(tile("oven") + " .figure").startswith("panel "))
+        self.open("station/oven")
+        self.wait(lambda: self.all(".plot canvas"))
+        three = r"queue [\d.]+ ms, wire [\d.]+ ms, panel [\d.]+ ms"
+        self.wait(lambda: re.search(three, self.text("figure + .muted")))
+        self.assertRegex(self.text(".plot-values"), r"queue .*wire .*panel ")
+        self.open("latency")
+        self.assertRegex(self.text("thead"), "queuewirepanel")
+
+    def test_a_time_has_its_date_unless_it_is_today_and_the_zone_is_said(self):
+        self.driver.execute_cdp_cmd("Emulation.setTimezoneOverride", {"timezoneId": "Asia/Seoul"})
+        self.open("scope")
+        self.assertIn("UTC+9", self.text("#foot"))
+        self.wait(lambda: self.all("tbody tr"))
+        self.assertIn("UTC+9", self.text("thead"))
+        told = self.driver.execute_async_script("""const done = arguments[arguments.length - 1];
+            import(new URL('page/language.js', location.origin)).then(({time}) => done([0, 86400, 1e9].map((ago) => time(Date.now() / 1000 - ago))))""")
+        self.assertRegex(told[0], r"^\d\d:\d\d:\d\d\.\d{3}$")
+        for one in told[1:]:
+            self.assertRegex(one, r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3}$")
 
 
 if __name__ == "__main__":
