@@ -66,15 +66,15 @@ function build() {
 function entitle() {
     const {down, bad} = troubles();
     const name = `${main.querySelector('h1')?.textContent.trim() ?? ''} · panelgate`;
-    const trouble = live.old ? t('state.suspect') : bad || down;
+    const trouble = !live.reachable ? t('state.suspect') : bad || down || live.findings.length;
     document.title = trouble ? `⚠ ${trouble} · ${name}` : name;
 }
 
-/** Is what is shown old? One bar says so, and all of it is grey. */
+/** What is old is grey; a gateway that does not answer is one red bar. */
 function warn() {
     document.body.classList.toggle('old', live.old);
-    banner.hidden = !live.old;
-    if (live.old) text(banner, live.heard === 0 ? t('unreachable') : t('unreachable.since', {time: clockTime(live.heard)}));
+    banner.hidden = live.reachable;
+    if (!live.reachable) text(banner, live.heard === 0 ? t('unreachable') : t('unreachable.since', {time: clockTime(live.heard)}));
     entitle();
 }
 

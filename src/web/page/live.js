@@ -4,6 +4,7 @@ import {follow, get, offers, path} from './api.js';
 
 const PERIOD = 1000;  // ms
 const BEHIND = 10000; // ms
+const FINDINGS = 5000; // ms between two looks at the gateway's findings
 const OLD = 4000;     // ms without an answer: what is shown may be wrong
 const SOON = 60;      // ms: events of one moment are one reason to ask
 /** States that a transaction's outcome makes old. */
@@ -13,6 +14,7 @@ const CONTRADICTS = {ok: BACK, exception: BACK, timeout: ['online', 'unknown'], 
 class Live extends EventTarget {
     lines = [];
     stations = [];
+    findings = [];    // of the gateway itself, and overloads with their line
     reachable = true;
     heard = 0;        // ms since 1970: when the gateway has answered last
     refused = false;  // who we are may not see it
@@ -21,6 +23,7 @@ class Live extends EventTarget {
     #asking = false;
     #started = false;
     #due = false;
+    #looked = -Infinity;
 
     start() {
         this.#started = true;
@@ -85,7 +88,7 @@ class Live extends EventTarget {
         this.#asking = true;
         this.#due = false;
         try {
-            const [lines, stations] = await Promise.all([get(path('lines')), get(path('stations'))]);
+            const [lines, stations] = await Promise.all([get(path('lines')), get(path('stations')), this.#look()]);
             this.#hear(lines.lines, stations.stations);
         } catch (error) {
             if (error.status === 401) return this.#refuse();
@@ -96,6 +99,12 @@ class Live extends EventTarget {
         this.#tell('status');
         clearTimeout(this.#timer);
         this.#timer = setTimeout(() => this.refresh(), document.hidden ? BEHIND : this.#due ? SOON : PERIOD);
+    }
+
+    async #look() {
+        if (!offers('GET /api/v1/findings') || performance.now() - this.#looked < FINDINGS) return;
+        this.#looked = performance.now();
+        try { this.findings = (await get(path('findings'))).findings; } catch { /* the next look will do */ }
     }
 
     /** Nobody on a line that is down can answer, whatever he was before. */

@@ -73,6 +73,8 @@ async function recall(line, history) {
     } catch { /* it begins now */ }
 }
 
+const showFindings = (place, told) => list(place, told, (one) => `${one.cause} ${one.station} ${one.text}`, (one) => ({node: findingNote(one)}));
+
 /** A line's card with its tiles: {node, update}. */
 function card(first) {
     const meter = h('meter', {min: 0, max: 100, high: 80, optimum: 0, 'aria-label': t('load.of', {line: first.name})});
@@ -92,7 +94,8 @@ function card(first) {
             h('div', {class: 'load'}, meter, load, spark.node), why, facts, findings),
         tiles);
     return {node, update: (line) => {
-        state.update(!line.up ? 'down' : line.findings.includes('overload') ? 'overload' : 'up');
+        const found = [...line.told ?? [], ...live.findings.filter((one) => one.line === line.name)];
+        state.update(!line.up ? 'down' : found.some((one) => one.cause === 'overload') ? 'overload' : 'up');
         text(why, line.up ? '' : line.state);
         why.hidden = line.up;
         meter.value = line.load_percent;
@@ -101,8 +104,7 @@ function card(first) {
         if (history.length > HISTORY) history.shift();
         spark.update(history, {most: LOADED});
         text(facts, [line.device, line.mode === 'listen' ? t('listens') : null, t('waiting', {count: line.queue_depth})].filter(Boolean).join(' · '));
-        const told = (line.told ?? []).map((one) => ({...one, key: `${one.cause} ${one.station} ${one.text}`}));
-        list(findings, told, (one) => one.key, (one) => ({node: findingNote(one)}));
+        showFindings(findings, found);
         list(tiles, live.stations.filter((station) => station.line === line.name), (station) => station.name, tile);
     }};
 }
@@ -135,13 +137,18 @@ export function troubles() {
 export function overviewView() {
     const lines = h('div');
     const counts = h('p', {class: 'counts', role: 'status'});
-    const node = h('div', null, h('h1', null, t('nav.overview')), counts, lines);
+    const findings = h('ul', {class: 'findings'});
+    const own = h('section', {class: 'card', id: 'gateway'}, h('h2', null, t('gateway')), findings);
+    const node = h('div', null, h('h1', null, t('nav.overview')), counts, own, lines);
     const update = () => {
         const {down, bad} = troubles();
         const said = [t('counts', {lines: live.lines.length, stations: live.stations.length, bad})];
         if (down > 0) said.push(t('counts.down', {down}));
         text(counts, said.join(' · '));
         attribute(counts, 'class', bad + down > 0 ? 'counts bad' : 'counts');
+        const found = live.findings.filter((one) => !one.line);
+        showFindings(findings, found);
+        own.hidden = found.length === 0;
         list(lines, linesWithFindings(update), (line) => line.name, card);
         if (live.lines.length === 0) replace(lines, h('p', {class: 'empty'}, t('no.lines')));
     };
