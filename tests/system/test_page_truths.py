@@ -1,6 +1,7 @@
 """The dashboard tells what is so: outages, who has used a line, what is wrong in the reader's words;
 in headless Chromium, skipped where there is none."""
 import contextlib
+import json
 import re
 import signal
 import unittest
@@ -182,7 +183,7 @@ class Unplugged(Browser):
     @classmethod
     def gateway(cls):
         cls.server = DeviceServer(lambda frame, age: echo_address(frame))
-        far = line("far", cls.server.device, "{id: 7, name: pump, poll: [{table: holding, address: 0, count: 2, every: 100ms}]}")
+        far = line("far", cls.server.device, "{id: 7, name: pump, poll: [{read: 400001, count: 2, every: 100ms}]}")
         return cls.enterClassContext(harness.configured(gateway(line(stations=PRESS), far, http=ADMIN)))
 
     def test_it_is_red_counted_in_the_title_and_its_tiles_say_so(self):
@@ -210,7 +211,7 @@ class Unplugged(Browser):
 
 class Entry(Browser):
     """What is typed is what is written, or is refused."""
-    POINTS = """[{name: pump, at: UB100, writable: true}, {name: dose, at: UW300, type: f32, unit: g, min: 0, max: 5000, writable: true},
+    POINTS = """[{name: pump, at: UB200, writable: true}, {name: dose, at: UW300, type: f32, unit: g, min: 0, max: 5000, writable: true},
       {name: mode, at: UW105, labels: {0: manual, 1: auto, 2: "off"}, writable: true}]"""
 
     @classmethod
@@ -298,6 +299,39 @@ class Entry(Browser):
         self.find("#write").click()
         self.wait(lambda: "215 216" in self.text(".answer .refusal"))
         self.assertFalse(self.all("dialog"))
+
+
+class OfTheGateway(Browser):
+    """Findings that are of no panel, as GET /api/v1/findings tells them."""
+    FOUND = [{"cause": "overload", "line": "floor1", "station": None, "name": "floor1", "text": "Line floor1 is overloaded.",
+              "advice": "Ask less often.", "evidence": "1 of 9 requests; most is asked by 10.0.0.7 (87 %)",
+              "figures": {"load_percent": 99, "no_turn": 1, "requests": 9}, "clients": [{"name": "10.0.0.7", "percent": 87}]},
+             {"cause": "broker-away", "line": None, "station": None, "name": "mqtt://b:1883", "text": "The MQTT broker is away.",
+              "advice": "See whether it runs.", "evidence": "", "figures": {}, "clients": []}]
+    STUB = """const before = fetch, found = %s, route = {method: 'GET', path: '/api/v1/findings', role: 'viewer'};
+        window.fetch = async (path, options) => {
+            if (path === route.path) return Response.json({findings: found});
+            const answer = await before(path, options);
+            if (path !== '/api/v1/configuration') return answer;
+            const told = await answer.json();
+            return Response.json({...told, rest: [...told.rest, route]});
+        };"""
+
+    def test_an_overload_is_told_with_its_clients_and_the_line_says_it(self):
+        stub = self.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": self.STUB % json.dumps(self.FOUND)})
+        try:
+            for language, word in (("de", "überlastet"), ("en", "overloaded")):
+                self.open()
+                self.script("localStorage.setItem('panelgate.language', arguments[0])", language)
+                self.open()
+                self.wait(lambda: self.text(".line .head .badge") == word)
+                self.assertIn("10.0.0.7 (87 %)", self.text('.line .finding[data-cause="overload"]'))
+                self.assertIn("broker", self.text("#gateway").lower())
+                self.wait(lambda: self.driver.title.startswith("⚠ 2 · "))
+                self.screenshot(f"overload-{language}")
+        finally:
+            self.driver.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", stub)
+            self.script("localStorage.clear()")
 
 
 class SameWords(Browser):

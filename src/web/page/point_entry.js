@@ -20,8 +20,8 @@ function switches(take) {
     return {node: h('div', {class: 'bar'}, button(true), button(false))};
 }
 
-function names(labels) {
-    const select = h('select', {id: 'new-value'}, labels.map((label) => h('option', {value: label}, label)));
+function names(labels, now) {
+    const select = h('select', {id: 'new-value'}, labels.map((label) => h('option', {value: label, selected: label === now}, label)));
     return {node: select, read: () => ({json: JSON.stringify(select.value), value: select.value})};
 }
 
@@ -45,7 +45,7 @@ function words() {
 function fieldOf(point, take) {
     if (point.type === 'bool') return switches(take);
     const labels = Object.values(point.labels ?? {});
-    if (labels.length > 0) return names(labels);
+    if (labels.length > 0) return names(labels, point.label);
     return point.type === 'string' ? words() : numeral(point);
 }
 
