@@ -82,7 +82,7 @@ const calendar = new Intl.DateTimeFormat('sv-SE');  // 2026-11-29
 
 /** All times are of this zone: "UTC+9". */
 export const zone = new Intl.DateTimeFormat('en', {timeZoneName: 'shortOffset'}).formatToParts()
-    .find((part) => part.type === 'timeZoneName').value.replace('GMT', 'UTC');
+    .find((part) => part.type === 'timeZoneName').value.replace(/GMT(\+0$)?/, 'UTC');
 
 /** "19:04:05", the same in all languages; with its date where that is not today's. */
 export function clockTime(date) {

@@ -16,7 +16,7 @@ function limits({min, max, step, unit}) {
 
 /** Two buttons: each says its value by itself. */
 function switches(take) {
-    const button = (value) => h('button', {type: 'button', 'data-value': value, onclick: () => take({json: String(value), value})}, t(value ? 'on' : 'off'));
+    const button = (value) => h('button', {type: 'button', 'data-value': String(value), onclick: () => take({json: String(value), value})}, t(value ? 'on' : 'off'));
     return {node: h('div', {class: 'bar'}, button(true), button(false))};
 }
 
