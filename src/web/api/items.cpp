@@ -190,8 +190,7 @@ Handling get_device_plan(HttpRequest request, const Api* api) {
 }
 
 Handling get_point_plan(HttpRequest request, const Api* api) {
-    Target target =
-        find_point(*api->directory, request.arguments[0], request.arguments[1]).value();
+    Target target = find_point(*api->directory, request.arguments[0], request.arguments[1]).value();
     const auto value = request.query.find("value");
     if (value == request.query.end()) co_return plan_of_read(std::move(target));
     co_return plan_of_write(std::move(target),
