@@ -51,7 +51,7 @@ class Overview(Browser):
 
     def test_a_dead_panels_findings_are_told_and_readable(self):
         self.program.rest("PUT", "/api/v1/simulator/oven", {"dead": 1})
-        self.wait(lambda: "check this panel" in self.text(".findings"))
+        self.wait(lambda: "check this panel" in self.text(".line .findings"))
         for scheme in ("light", "dark"):
             self.prefer(scheme)
             self.assertEqual(self.faint(), [])

@@ -198,7 +198,7 @@ class Unplugged(Browser):
         self.assertIn("bad", self.find(".counts").get_attribute("class"))
         self.assertTrue(self.driver.title.startswith("⚠ 1 · "))
         far = '.line[aria-label="Line far"] '
-        self.assertEqual(self.text(far + ".badge"), "down")
+        self.assertEqual(self.text(far + ".badge"), "line is down")
         self.assertIn("down: ", self.text(far + ".refusal"))
         for size, name in ((NARROW, "narrow"), (WIDE, "wide")):
             self.resize(size)

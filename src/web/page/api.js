@@ -101,6 +101,9 @@ export function offers(pattern) {
     return gateway.configuration?.rest.some((route) => `${route.method} ${route.path}` === pattern) ?? false;
 }
 
+/** May we see what is on the wire of this line? */
+export const seesWhole = (line) => gateway.configuration?.lines.find((one) => one.name === line)?.whole !== false;
+
 const may = (right) => gateway.rights.includes(right);
 export const mayWrite = () => may('write');
 export const mayDiscover = () => may('discover');

@@ -1,5 +1,5 @@
 // What the flight recorder has frozen around errors, to be taken away.
-import {get, offers, path} from './api.js';
+import {get, offers, path, seesWhole} from './api.js';
 import {h, list, table} from './dom.js';
 import {download} from './download.js';
 import {t, time, word, zone} from './language.js';
@@ -10,7 +10,7 @@ const PERIOD = 3000;  // ms
 /** A line's incidents: {node, stop}; nothing where the gateway keeps none. */
 export function incidents(line) {
     const node = h('section', {hidden: true});
-    if (!offers('GET /api/v1/lines/{}/incidents')) return {node, stop: () => {}};
+    if (!offers('GET /api/v1/lines/{}/incidents') || !seesWhole(line)) return {node, stop: () => {}};
     const shown = table(t('incidents'), [[`${t('time')} (${zone})`], [t('station')], [t('kind')], [t('errors'), 'number'], ['']]);
     node.append(h('h2', null, t('incidents')), shown.node);
     const row = (one) => {

@@ -1,5 +1,5 @@
 // Lines with their load, and their stations as tiles.
-import {get, offers, path} from './api.js';
+import {get, offers, path, seesWhole} from './api.js';
 import {attribute, h, list, replace, text} from './dom.js';
 import {findingNote, findingText} from './finding.js';
 import {clockTime, duration, number, t, word} from './language.js';
@@ -33,7 +33,7 @@ export function badge() {
 
 /** When somebody has answered last, who was heard `ms` before the gateway said so. */
 function lastAnswer({state, last_success_ms: ms}) {
-    if (ms === null) return t('last.answer.none');
+    if (ms === null) return '';
     const ago = duration(live.ago(ms));
     return tone(state) === 'good' && !live.old ? t('last.answer', {ago}) : t('last.answer.at', {ago, time: clockTime(live.heard - ms)});
 }
@@ -66,7 +66,7 @@ function tile(first) {
 
 /** What the gateway remembers of a line's load comes before what this page sees. */
 async function recall(line, history) {
-    if (!offers('GET /api/v1/lines/{}/history')) return;
+    if (!offers('GET /api/v1/lines/{}/history') || !seesWhole(line)) return;
     try {
         const {samples} = await get(path('lines', line, 'history'));
         history.unshift(...samples.map((one) => one.load_percent).filter((load) => load !== null).slice(-HISTORY));
@@ -95,7 +95,7 @@ function card(first) {
         tiles);
     return {node, update: (line) => {
         const found = [...line.told ?? [], ...live.findings.filter((one) => one.line === line.name)];
-        state.update(!line.up ? 'down' : found.some((one) => one.cause === 'overload') ? 'overload' : 'up');
+        state.update(!line.up ? 'line_down' : found.some((one) => one.cause === 'overload') ? 'overload' : 'up');
         text(why, line.up ? '' : line.state);
         why.hidden = line.up;
         meter.value = line.load_percent;
