@@ -155,6 +155,7 @@ class Silence(Browser):
         with self.stopped():
             self.wait(lambda: "not known" in self.text(tile("oven")))
             self.assertNotIn("online", self.text("main"))
+            self.assertIn("without an answer ?", self.text(".counts"))
             self.assertEqual(self.text(tile("oven") + " .figure"), "–")
             self.assertRegex(self.text(tile("oven")), r"last answer \d\d:\d\d:\d\d, \d")
             self.assertEqual(self.faint(), [])

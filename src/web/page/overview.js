@@ -142,7 +142,7 @@ export function overviewView() {
     const node = h('div', null, h('h1', null, t('nav.overview')), counts, own, lines);
     const update = () => {
         const {down, bad} = troubles();
-        const said = [t('counts', {lines: live.lines.length, stations: live.stations.length, bad})];
+        const said = [t('counts', {lines: live.lines.length, stations: live.stations.length, bad: live.old ? '?' : bad})];
         if (down > 0) said.push(t('counts.down', {down}));
         text(counts, said.join(' · '));
         attribute(counts, 'class', bad + down > 0 ? 'counts bad' : 'counts');
