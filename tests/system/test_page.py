@@ -254,6 +254,8 @@ class Points(Browser):
         try:
             self.wait(lambda: "stale" in self.text(row) or "bad" in self.text(row))
             self.assertNotRegex(self.text(row + " .strong"), r"^0")
+            self.assertRegex(self.text(row), r"\(\d\d:\d\d:\d\d\)")
+            self.assertTrue(self.all(row + " .strong.muted"))
         finally:
             self.program.rest("PUT", "/api/v1/simulator/oven", {})
 

@@ -37,6 +37,7 @@ function row(station, first, pick) {
         last = point;
         const now = known(point);
         text(value, shownValue(point));
+        attribute(value, 'class', `number strong${now.quality === 'good' ? '' : ' muted'}`);
         attribute(quality, 'class', `badge ${TONES[now.quality]}`);
         text(quality, word('quality', now.quality));
         text(age, since(now.age, now.quality));
