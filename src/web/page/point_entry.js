@@ -69,13 +69,18 @@ class Entry {
         return this.#written && told.heard - (told.age_ms ?? 0) < this.#written.at ? {...told, ...this.#written} : told;
     }
 
+    get #shown() {
+        const now = this.#now;
+        return now.quality === 'good' ? shownValue(now) : `${shownValue(now)} (${word('quality', now.quality)})`;
+    }
+
     #say(...nodes) { replace(this.outcome, ...nodes); }
 
     #enter() {
         const field = fieldOf(this.#now, (value) => this.#judge(value));
         const write = field.read ? h('button', {class: 'primary'}, t('write.ask')) : null;
         const form = h('form', {onsubmit: (event) => { event.preventDefault(); this.#judge(field.read()); }},
-            h('p', {class: 'muted'}, `${t('value')}: ${shownValue(this.#now)}`), h('label', {for: 'new-value'}, t('new.value')), field.node, this.outcome,
+            h('p', {class: 'muted'}, `${t('value')}: ${this.#shown}`), h('label', {for: 'new-value'}, t('new.value')), field.node, this.outcome,
             h('div', {class: 'bar end'}, h('button', {type: 'button', class: 'close', onclick: () => this.node.close()}, t('close')), write));
         replace(this.place, form);
         form.querySelector('input, select, button').focus();
@@ -95,10 +100,9 @@ class Entry {
     }
 
     #ask({json, value}, frame) {
-        const now = this.#now;
         const stay = h('button', {type: 'button', onclick: () => this.#enter()}, t('cancel'));
         const write = h('button', {type: 'button', class: 'danger', id: 'confirm', onclick: () => { write.disabled = true; this.#write(json); }}, t('write.now'));
-        replace(this.place, h('p', {class: 'change'}, `${shownValue(now)} → `, h('strong', null, shownValue({value, unit: now.unit}))),
+        replace(this.place, h('p', {class: 'change'}, `${this.#shown} → `, h('strong', null, shownValue({value, unit: this.point().unit}))),
             frame, h('p', {class: 'warning'}, t('confirm.warning')), h('div', {class: 'bar end'}, stay, write));
         stay.focus();
     }
@@ -107,7 +111,7 @@ class Entry {
         const answer = await send(this.target, `{"value":${json}}`, (...nodes) => this.#say(...nodes), this.point().unit);
         if (answer) {
             remember(this.key, answer.value);
-            this.#written = {value: answer.value, label: answer.label, at: Date.now()};
+            this.#written = {value: answer.value, label: answer.label, quality: 'good', at: Date.now()};
         }
         this.#enter();
     }
