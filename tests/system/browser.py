@@ -82,7 +82,16 @@ class Browser(unittest.TestCase):
         return self.driver.find_elements(By.CSS_SELECTOR, selector)
 
     def text(self, selector):
-        return self.script("return document.querySelector(arguments[0])?.textContent ?? ''", selector)
+        """With ordinary blanks for those that no line ends at."""
+        return self.script("return document.querySelector(arguments[0])?.textContent ?? ''", selector).replace("\xa0", " ")
+
+    def has_cut(self):
+        """What does not show all that it has, and gives no sign of it."""
+        return self.script("""return [...document.querySelectorAll('main *, header *, dialog *')].filter((node) => {
+            const style = getComputedStyle(node);
+            return node.clientWidth > 0 && node.scrollWidth > node.clientWidth + 1 && style.display !== 'inline' && !node.closest('.plot, .yaml')
+                && style.textOverflow !== 'ellipsis' && !node.matches('select, input, .unseen, .stack');
+        }).map((node) => `${node.tagName}.${node.className}: ${node.textContent.slice(0, 60)}`)""")
 
     def wait(self, condition, patience=harness.PATIENCE):
         WebDriverWait(self.driver, patience, 0.02).until(lambda _: condition())

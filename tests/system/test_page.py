@@ -51,7 +51,7 @@ class Overview(Browser):
 
     def test_a_dead_panels_findings_are_told_and_readable(self):
         self.program.rest("PUT", "/api/v1/simulator/oven", {"dead": 1})
-        self.wait(lambda: "check this panel" in self.text(".findings"))
+        self.wait(lambda: "check this panel" in self.text(".line .findings"))
         for scheme in ("light", "dark"):
             self.prefer(scheme)
             self.assertEqual(self.faint(), [])
@@ -226,9 +226,12 @@ class Points(Browser):
         self.find("dialog button.primary").click()
         self.wait(lambda: self.all("#confirm"))
         self.assertEqual(self.program.get("/api/v1/stations/press/points/setpoint")[1]["value"], 40)
+        self.assertEqual(self.text("dialog .change"), "40 °C → 41.5 °C")
+        self.assertIn("1F100078000102019F", self.text("dialog .bytes").replace(" ", ""), "the frame is shown first")
         self.find("#confirm").click()
         self.wait(lambda: self.all("dialog .success"))
-        self.find("dialog button[type=button]").click()
+        self.assertIn("Value: 41.5 °C", self.text("dialog"))
+        self.find("dialog .close").click()
         self.wait(lambda: "41.5" in self.text(self.ROW))
         self.assertEqual(self.complaints(), [])
 
@@ -251,6 +254,8 @@ class Points(Browser):
         try:
             self.wait(lambda: "stale" in self.text(row) or "bad" in self.text(row))
             self.assertNotRegex(self.text(row + " .strong"), r"^0")
+            self.assertRegex(self.text(row), r"\(\d\d:\d\d:\d\d\)")
+            self.assertTrue(self.all(row + " .strong.muted"))
         finally:
             self.program.rest("PUT", "/api/v1/simulator/oven", {})
 
@@ -310,6 +315,7 @@ class Looks(Browser):
                         self.screenshot(name)
                         scroll, seen = self.script("return [document.documentElement.scrollWidth, innerWidth]")
                         self.assertLessEqual(scroll, seen, "no horizontal scroll")
+                        self.assertEqual(self.has_cut(), [])
                         self.assertEqual(self.nameless(), [])
                         self.assertEqual(self.faint(), [])
                         self.assertEqual(self.complaints(), [])

@@ -108,13 +108,18 @@ class Words(unittest.TestCase):
         doctor = "".join(path.read_text() for path in (harness.ROOT / "src/doctor").glob("*.cpp"))
         codes = re.findall(r'^    "([a-z-]+)",$', (harness.ROOT / "src/doctor/finding.cpp").read_text(), re.M)
         figures = set(re.findall(r'\{"(\w+)",', doctor)) | set(re.findall(r'figures\["(\w+)"\]', doctor))
+        gateway = "".join(path.read_text() for path in (harness.ROOT / "src/gateway").glob("findings.cpp"))
+        of_gateway = set(re.findall(r'\.cause = "([a-z-]+)"', gateway))
+        figures |= set(re.findall(r'\{"(\w+)",', gateway)) | {"clients"}
         table = words()
+        for cause in of_gateway:
+            self.assertLessEqual({f"finding.{cause}", f"advice.{cause}"}, set(table))
         damage = {"wrong-baud", "wrong-parity", "noise", "tcp-framing", "damaged-replies"}
         for cause in codes:
             self.assertLessEqual({f"finding.{cause}", f"advice.{cause}"}, set(table))
             self.assertIn("evidence.damage" if cause in damage else f"evidence.{cause}", table)
         for key, (english, *_) in table.items():
-            if key.startswith(("advice.", "evidence.")):
+            if key.startswith(("advice.", "evidence.")) and (gateway or key != "evidence.overload"):
                 self.assertLessEqual(set(re.findall(r"{(\w+)}", english)), figures, key)
 
     def test_no_word_is_there_twice(self):

@@ -9,6 +9,7 @@
 #include "panelgate/web/http/json_text.hpp"
 #include "routes.hpp"
 #include "sight.hpp"
+#include "target.hpp"
 
 namespace panelgate::web {
 
@@ -132,8 +133,9 @@ std::string configuration_text(const Api& api, const Who& who, const std::string
            ",\"rest\":" + json_text(offered()) + "}\n";
 }
 
-/// The configuration of the stations that may be seen.
-std::string seen_configuration(const std::string& text, const Sight& sight) {
+/// The configuration of the stations that may be seen. "whole": traces of the line may be, too.
+std::string seen_configuration(const std::string& text, const Directory& directory,
+                               const Sight& sight) {
     json::value whole = json::parse(text);
     json::array lines;
     for (json::value& line : whole.as_object()["lines"].as_array()) {
@@ -149,6 +151,8 @@ std::string seen_configuration(const std::string& text, const Sight& sight) {
         json::object shown{{"stations", seen("stations", "name")},
                            {"polls", seen("polls", "station")}};
         if (shown["stations"].as_array().empty()) continue;
+        const auto line = find_line(directory, name);
+        shown["whole"] = line && sight.whole(**line);
         for (const char* key : {"name", "device", "mode", "serial", "unlisted_stations"})
             if (const json::value* own = object.if_contains(key)) shown[key] = *own;
         lines.push_back(std::move(shown));
@@ -179,7 +183,8 @@ Handling get_configuration(HttpRequest request, const Api* api) {
     if (!kept) {
         const std::string& text = *api->providers.configuration;
         kept = std::make_shared<KeptAnswer>(
-            configuration_text(*api, who, all ? text : seen_configuration(text, sight)),
+            configuration_text(*api, who,
+                               all ? text : seen_configuration(text, *api->directory, sight)),
             "application/json");
     }
     co_return KeptAnswer::give(kept, request);

@@ -164,12 +164,10 @@ HttpResponse plan_of_read(Target target) {
     return plan_of(target, modbus::encode_read(target.span), requests);
 }
 
-HttpResponse plan_of_write(Target target, const std::string& values) {
-    target = made_writable(std::move(target)).value();
-    const auto body = parse_object("{\"values\":[" + values + "]}", {"values"});
+HttpResponse plan_of_write(Target target, const Parsed<json::object>& body) {
     const Writing writing = write_of(target, body).value();
     const modbus::Request& made = writing.request.request;
-    target.span.count = made.access().write->count;
+    target.span = *made.access().write;
     return plan_of(target, made.pdu(), 1);
 }
 
@@ -177,7 +175,8 @@ HttpResponse plan_of_write(Target target, const std::string& values) {
 HttpResponse plan(const HttpRequest& request, Target target) {
     const auto values = request.query.find("values");
     if (values == request.query.end()) return plan_of_read(std::move(target));
-    return plan_of_write(std::move(target), values->second);
+    return plan_of_write(made_writable(std::move(target)).value(),
+                         parse_object("{\"values\":[" + values->second + "]}", {"values"}));
 }
 
 }  // namespace
@@ -188,6 +187,14 @@ Handling get_table_plan(HttpRequest request, const Api* api) {
 
 Handling get_device_plan(HttpRequest request, const Api* api) {
     co_return plan(request, device_target(request, *api->directory).value());
+}
+
+Handling get_point_plan(HttpRequest request, const Api* api) {
+    Target target = find_point(*api->directory, request.arguments[0], request.arguments[1]).value();
+    const auto value = request.query.find("value");
+    if (value == request.query.end()) co_return plan_of_read(std::move(target));
+    co_return plan_of_write(std::move(target),
+                            parse_object("{\"value\":" + value->second + "}", {"value"}));
 }
 
 }  // namespace panelgate::web

@@ -104,7 +104,9 @@ constexpr Row kRows[] = {
      "since until kind station limit after"},
     {"GET", "/api/v1/stations/{}/{}/{}/interpretations", get_interpretations, kSee, kShowsStation,
      kAsks, "count"},
-    // Before the table routes: "devices" is not a table.
+    // Before the table routes: "points" and "devices" are no tables.
+    {"GET", "/api/v1/stations/{}/points/{}/plan", get_point_plan, kSee, kShowsPoint, kTagged,
+     "value"},
     {"GET", "/api/v1/stations/{}/devices/{}/plan", get_device_plan, kSee, kShowsStation, kTagged,
      "count values"},
     {"GET", "/api/v1/stations/{}/{}/{}/plan", get_table_plan, kSee, kShowsStation, kTagged,

@@ -73,6 +73,7 @@ Handling get_alarms(HttpRequest request, const Api* api);
 Handling post_acknowledge(HttpRequest request, const Api* api);
 Handling get_table_plan(HttpRequest request, const Api* api);
 Handling get_device_plan(HttpRequest request, const Api* api);
+Handling get_point_plan(HttpRequest request, const Api* api);
 Handling get_interpretations(HttpRequest request, const Api* api);
 Handling get_events(HttpRequest request, const Api* api);
 Handling get_relays(HttpRequest request, const Api* api);

@@ -15,13 +15,20 @@ export class Refused extends Error {
     }
 }
 
-/** fetch() with our token. */
-async function send(path, options = {}) {
+const LIMIT = 3000;   // ms for what the gateway answers by itself
+const LONG = 60000;   // ms for a file
+
+/** Ms for what may ask a panel: the gateway says why nothing came before the page gives up. */
+const patience = () => LIMIT + Math.max(0, ...gateway.configuration?.lines.map((line) => line.clients?.answered_within_ms ?? 0) ?? []);
+
+/** What take() makes of an answer to a request with our token; all of it has come within `limit` ms. */
+async function send(path, options, take, limit = LIMIT) {
     const headers = {...options.headers};
     if (token) headers.Authorization = `Bearer ${token}`;
     try {
-        return await fetch(path, {...options, headers, cache: 'no-store'});
-    } catch {
+        return await take(await fetch(path, {signal: AbortSignal.timeout(limit), ...options, headers, cache: 'no-store'}));
+    } catch (error) {
+        if (error instanceof Refused) throw error;
         throw new Refused(0, {title: 'unreachable'});
     }
 }
@@ -31,19 +38,18 @@ async function parsedOf(response) {
     const given = response.headers.get('Content-Type') ?? '';
     const parsed = given.includes('json') ? await response.json() : {detail: await response.text()};
     if (!response.ok) throw new Refused(response.status, parsed);
+    costs.set(parsed, response.headers.get('Panelgate-Transactions')?.split(',').map(transaction) ?? []);
     return parsed;
 }
 
-async function ask(method, path, body) {
+/** `body`: an object, or JSON as it shall be sent. */
+function ask(method, path, body, limit) {
     const options = {method};
     if (body !== undefined) {
-        options.body = JSON.stringify(body);
+        options.body = typeof body === 'string' ? body : JSON.stringify(body);
         options.headers = {'Content-Type': 'application/json'};
     }
-    const response = await send(path, options);
-    const parsed = await parsedOf(response);
-    costs.set(parsed, response.headers.get('Panelgate-Transactions')?.split(',').map(transaction) ?? []);
-    return parsed;
+    return send(path, options, parsedOf, limit);
 }
 
 const costs = new WeakMap();
@@ -58,15 +64,14 @@ function transaction(text) {
 export const costOf = (answer) => costs.get(answer) ?? [];
 
 export const get = (path) => ask('GET', path);
-export const put = (path, body) => ask('PUT', path, body);
-export const remove = (path) => ask('DELETE', path);
-export const post = (path, body) => ask('POST', path, body);
+/** From the panel itself. */
+export const getFromPanel = (path) => ask('GET', path, undefined, patience());
+export const put = (path, body) => ask('PUT', path, body, patience());
+export const remove = (path) => ask('DELETE', path, undefined, patience());
+export const post = (path, body) => ask('POST', path, body, patience());
 
 /** An answer as a file, for a link carries no token. */
-export async function getFile(target, accept) {
-    const response = await send(target, accept ? {headers: {Accept: accept}} : {});
-    return response.ok ? response.blob() : parsedOf(response);
-}
+export const getFile = (target, accept) => send(target, accept ? {headers: {Accept: accept}} : {}, (response) => response.ok ? response.blob() : parsedOf(response), LONG);
 
 /**
  * Server-sent events: told(type, data) for each, ended() when there are no more; close() ends them
@@ -74,8 +79,7 @@ export async function getFile(target, accept) {
  */
 export function follow(target, told, ended) {
     const stop = new AbortController();
-    const read = async () => {
-        const response = await send(target, {signal: stop.signal});
+    const read = async (response) => {
         if (!response.ok) return;
         const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
         const text = new EventText();
@@ -83,7 +87,7 @@ export function follow(target, told, ended) {
             for (const {type, data} of text.add(part.value)) told(type, data);
         }
     };
-    read().catch(() => {}).finally(() => stop.signal.aborted || ended());
+    send(target, {signal: stop.signal}, read).catch(() => {}).finally(() => stop.signal.aborted || ended());
     return {close: () => stop.abort()};
 }
 
@@ -96,6 +100,9 @@ export function path(...parts) {
 export function offers(pattern) {
     return gateway.configuration?.rest.some((route) => `${route.method} ${route.path}` === pattern) ?? false;
 }
+
+/** May we see what is on the wire of this line? */
+export const seesWhole = (line) => gateway.configuration?.lines.find((one) => one.name === line)?.whole !== false;
 
 const may = (right) => gateway.rights.includes(right);
 export const mayWrite = () => may('write');

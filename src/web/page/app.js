@@ -2,14 +2,14 @@
 import {alarms, alarmsView} from './alarms.js';
 import {forgetToken, gateway, hasToken, introduce, offers} from './api.js';
 import {attribute, choice, h, replace, text} from './dom.js';
-import {language, languages, store, stored, t} from './language.js';
+import {clockTime, language, languages, store, stored, t, zone} from './language.js';
 import {discoveryView} from './discovery.js';
 import {helpLink} from './help.js';
 import {historyView} from './history.js';
 import {journalView} from './journal.js';
 import {latencyView} from './latency.js';
 import {live} from './live.js';
-import {overviewView, tone} from './overview.js';
+import {overviewView, troubles} from './overview.js';
 import {clientsView, relaysView} from './plain_views.js';
 import {pointsView} from './points.js';
 import {requestView} from './request.js';
@@ -63,16 +63,26 @@ function build() {
     nav.addEventListener('click', () => open(false));
     tools(roleButton());
     text(document.getElementById('version'), gateway.configuration.version);
+    text(document.getElementById('foot'), t('times', {zone}));
 }
 
-/** A tab that nobody looks at says how many do not answer. */
+/** A tab that nobody looks at says how many do not answer, or that nobody knows. */
 function entitle() {
-    const silent = live.stations.filter((station) => tone(station.state) === 'bad').length;
+    const {down, bad} = troubles();
     const waiting = alarms.waiting.length;
     const name = `${main.querySelector('h1')?.textContent.trim() ?? ''} · panelgate`;
-    document.title = silent + waiting > 0 ? `⚠ ${silent + waiting} · ${name}` : name;
+    const trouble = !live.reachable ? t('state.suspect') : (bad || down || live.findings.length) + waiting;
+    document.title = trouble ? `⚠ ${trouble} · ${name}` : name;
     const link = document.querySelector('#nav a[data-view="alarms"]');
     if (link) text(link, waiting > 0 ? `${t('nav.alarms')} (${waiting})` : t('nav.alarms'));
+}
+
+/** What is old is grey; a gateway that does not answer is one red bar. */
+function warn() {
+    document.body.classList.toggle('old', live.old);
+    banner.hidden = live.reachable;
+    if (!live.reachable) text(banner, live.heard === 0 ? t('unreachable') : t('unreachable.since', {time: clockTime(live.heard)}));
+    entitle();
 }
 
 function show() {
@@ -81,6 +91,7 @@ function show() {
     const [argument, detail] = parts.map((part) => part === '' ? undefined : decodeURIComponent(part));
     shown?.stop?.();
     shown = VIEWS[view]({argument, detail});
+    for (const open of document.querySelectorAll('dialog')) open.close();
     replace(main, shown.node);
     shown.update?.();
     for (const link of document.querySelectorAll('#nav a')) attribute(link, 'aria-current', link.dataset.view === view ? 'page' : null);
@@ -91,9 +102,7 @@ function show() {
 }
 
 function refresh() {
-    banner.hidden = live.reachable;
-    if (!live.reachable) text(banner, t('unreachable'));
-    entitle();
+    warn();
     shown?.update?.();
 }
 
@@ -125,8 +134,9 @@ async function start() {
     try {
         await enter();
     } catch {
-        banner.hidden = false;
-        text(banner, t('unreachable'));
+        await first;
+        live.reachable = false;
+        warn();
         setTimeout(start, 2000);
         return;
     }

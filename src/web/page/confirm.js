@@ -1,12 +1,12 @@
 // Nothing is written without being shown first and confirmed.
 import {Refused, get, offers, path, put} from './api.js';
-import {h, replace} from './dom.js';
+import {h} from './dom.js';
 import {explain} from './frame.js';
 import {frameView} from './frame_view.js';
 import {explained, problemPage} from './help.js';
 import {bytesOf} from './timeline.js';
 import {t} from './language.js';
-import {remember, shownValue} from './point_values.js';
+import {shownValue} from './point_values.js';
 
 /** A dialog with a heading; `close` is its own, too. */
 export function dialog(title, ...content) {
@@ -44,13 +44,14 @@ export function planView(plan) {
     return h('div', null, frameView(found, plan.notations), plan.requests > 1 ? h('p', {class: 'muted'}, t('more.requests', {count: plan.requests})) : null);
 }
 
-async function send(target, body, done) {
+/** Writes, and says with done(node) what came of it; the answer, or null. `unit`: of the answer's value. */
+export async function send(target, body, done, unit) {
     try {
         const answer = await put(target, body);
-        done(h('p', {class: 'success', role: 'status'}, answer.value === undefined ? t('written') : t('written.value', {value: String(answer.value)})));
+        done(h('p', {class: 'success', role: 'status'}, answer.value === undefined ? t('written') : t('written.value', {value: shownValue({...answer, unit})})));
         return answer;
     } catch (error) {
-        done(refusal(error));
+        done(refusal(error), error.status === 0 ? h('p', {class: 'warning'}, t('write.unknown')) : null);
         return null;
     }
 }
@@ -71,29 +72,4 @@ export async function confirmMemory(station, where, values, done) {
         return send(target, {values}, done);
     }
     return null;
-}
-
-/** A value as people type it, for JSON: a number, true and false, or the text of a label. */
-function typed(point, given) {
-    if (point.type === 'bool' || typeof point.value === 'boolean') return /^(1|true|on)$/i.test(given.trim());
-    const digits = given.trim().replace(',', '.');
-    return digits !== '' && !Number.isNaN(Number(digits)) ? Number(digits) : given;
-}
-
-/** A point's new value: asked for, shown, confirmed. */
-export function confirmWrite({station, point}) {
-    const input = h('input', {id: 'new-value', required: true, autocomplete: 'off'});
-    const outcome = h('div');
-    const form = h('form', {method: 'dialog'}, h('p', {class: 'muted'}, `${t('value')}: ${shownValue(point)}`),
-        h('label', {for: 'new-value'}, t('new.value')), input, outcome,
-        h('div', {class: 'bar end'}, h('button', {type: 'button', onclick: () => node.close()}, t('close')), h('button', {class: 'primary'}, t('write.ask'))));
-    const node = dialog(`${station}/${point.name}`, form);
-    form.addEventListener('submit', async (event) => {
-        event.preventDefault();
-        const value = typed(point, input.value);
-        const said = h('p', null, t('confirm.write', {what: `${point.name} = ${value} ${point.unit}`, station}));
-        if (!await confirm(t('write'), [said, h('p', {class: 'warning'}, t('confirm.warning'))], t('write.now'))) return;
-        const answer = await send(path('stations', station, 'points', point.name), {value}, (node_) => replace(outcome, node_));
-        if (answer) remember(`${station}/${point.name}`, answer.value);
-    });
 }

@@ -68,11 +68,16 @@ export function choice(label, options, value, changed) {
     return select;
 }
 
-/** Makes a table's head and its body; rows are the caller's. The frame scrolls, not the page. */
+/** Makes a table's head and its body; rows are the caller's. The frame scrolls, not the page. Where that is narrow
+ *  a row is a card, whose cells bear the names of their columns. */
 export function table(caption, columns) {
     const body = h('tbody');
     const head = h('thead', null, h('tr', null, columns.map(([name, kind]) =>
         name === '' ? h('td') : h('th', {scope: 'col', class: kind}, name))));
+    const label = () => {
+        for (const row of body.rows) [...row.cells].forEach((cell, i) => attribute(cell, 'data-column', columns[i][0] || null));
+    };
+    new MutationObserver(label).observe(body, {childList: true});
     const node = h('div', {class: 'scroll', tabindex: 0, role: 'region', 'aria-label': caption},
         h('table', null, h('caption', {class: 'unseen'}, caption), head, body));
     return {node, body};

@@ -1,7 +1,8 @@
-// What the line doctor has found, in the reader's language: made of the finding's cause and figures.
+// What the line doctor and the gateway have found, in the reader's language: made of the finding's cause and figures.
 import {h} from './dom.js';
 import {explained, findingPage} from './help.js';
-import {language, said, t} from './language.js';
+import {language, number, said, t} from './language.js';
+import {clientName} from './plain_views.js';
 
 /** Causes that concern the whole line, or may; all others without a station are of one that is not listed. */
 const OF_LINES = ['echo', 'no-answer-at-all', 'wrong-baud', 'wrong-parity', 'other-master', 'collision', 'overrun', 'noise',
@@ -29,11 +30,14 @@ function evidenceKeys({cause, figures}) {
     return [cause === 'echo' && 'collided' in figures ? 'echo.none' : cause, 'damaged' in figures ? 'damage' : cause];
 }
 
+/** Who asks most, by address; undefined where that is not told. */
+const askers = ({clients = []}) => clients.length === 0 ? undefined : clients.map(({name, percent}) => `${clientName(name)} (${number(percent)} %)`).join(', ');
+
 /** {lang, text}: a sentence of the table, or the gateway's own where it has none, or says it in English anyway. */
 function sentence(kind, keys, finding, own) {
     const key = keys.map((name) => `${kind}.${name}`).find(said);
     if (language === 'en' || !key) return {lang: 'en', text: own};
-    const text = t(key, {...finding.figures, who: who(finding)});
+    const text = t(key, {...finding.figures, who: who(finding), clients: askers(finding)});
     return /\{\w+\}/.test(text) ? {lang: 'en', text: own} : {lang: language, text};
 }
 

@@ -1,8 +1,8 @@
 // What the flight recorder has frozen around errors, to be taken away.
-import {get, offers, path} from './api.js';
+import {get, offers, path, seesWhole} from './api.js';
 import {h, list, table} from './dom.js';
 import {download} from './download.js';
-import {t, time, word} from './language.js';
+import {t, time, word, zone} from './language.js';
 import {live} from './live.js';
 
 const PERIOD = 3000;  // ms
@@ -10,8 +10,8 @@ const PERIOD = 3000;  // ms
 /** A line's incidents: {node, stop}; nothing where the gateway keeps none. */
 export function incidents(line) {
     const node = h('section', {hidden: true});
-    if (!offers('GET /api/v1/lines/{}/incidents')) return {node, stop: () => {}};
-    const shown = table(t('incidents'), [[t('time')], [t('station')], [t('kind')], [t('errors'), 'number'], ['']]);
+    if (!offers('GET /api/v1/lines/{}/incidents') || !seesWhole(line)) return {node, stop: () => {}};
+    const shown = table(t('incidents'), [[`${t('time')} (${zone})`], [t('station')], [t('kind')], [t('errors'), 'number'], ['']]);
     node.append(h('h2', null, t('incidents')), shown.node);
     const row = (one) => {
         const away = (ending, name) => download(path('lines', line, 'incidents', one.id + ending), `${line}-${one.id}${ending || '.json'}`, name);

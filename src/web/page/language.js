@@ -51,21 +51,45 @@ export function number(value, digits = 0) {
     return formats.get(digits).format(value);
 }
 
+const sign = (1.5).toLocaleString(language).charAt(1);  // before a fraction
+const SPOKEN = /^[-+]?\d+(\.\d+)?(e[-+]?\d+)?$/i;
+
+/** A value with all its digits, as decimalOf() reads it: no mark between thousands. */
+export const decimalText = (value) => String(value).replace('.', sign);
+
+/** A typed number as JSON has it; null for what is none, or may be two. */
+export function decimalOf(typed) {
+    const plain = typed.normalize('NFKC').trim().replace('\u2212', '-');
+    const digits = plain.replace(sign, '.');
+    if (!SPOKEN.test(digits) || (sign !== '.' && plain.includes('.'))) return null;
+    return digits.replace('+', '').replace(/^(-?)0+(?=\d)/, '$1');
+}
+
+const withUnit = (value, unit) => `${value}\u00a0${unit}`;  // no line ends between them
+
 /** Milliseconds as people say them: "6.8 ms", "12 s", "3 min". */
 export function duration(ms) {
     if (ms === null || ms === undefined) return '–';
-    if (ms < 10) return `${number(ms, 1)} ms`;
-    if (ms < 1000) return `${number(ms)} ms`;
-    if (ms < 10000) return `${number(ms / 1000, 1)} s`;
-    if (ms < 120000) return `${number(ms / 1000)} s`;
-    if (ms < 7200000) return `${number(ms / 60000)} min`;
-    return `${number(ms / 3600000)} h`;
+    if (ms < 10) return withUnit(number(ms, 1), 'ms');
+    if (ms < 1000) return withUnit(number(ms), 'ms');
+    if (ms < 10000) return withUnit(number(ms / 1000, 1), 's');
+    if (ms < 120000) return withUnit(number(ms / 1000), 's');
+    if (ms < 7200000) return withUnit(number(ms / 60000), 'min');
+    return withUnit(number(ms / 3600000), 'h');
 }
 
 const clock = new Intl.DateTimeFormat('en-GB', {hour: '2-digit', minute: '2-digit', second: '2-digit'});
+const calendar = new Intl.DateTimeFormat('sv-SE');  // 2026-11-29
 
-/** "19:04:05", the same in all languages: it stands below plots. */
-export const clockTime = (date) => clock.format(date);
+/** All times are of this zone: "UTC+9". */
+export const zone = new Intl.DateTimeFormat('en', {timeZoneName: 'shortOffset'}).formatToParts()
+    .find((part) => part.type === 'timeZoneName').value.replace(/GMT(\+0$)?/, 'UTC');
+
+/** "19:04:05", the same in all languages; with its date where that is not today's. */
+export function clockTime(date) {
+    const day = calendar.format(date);
+    return day === calendar.format() ? clock.format(date) : `${day} ${clock.format(date)}`;
+}
 
 const date = new Intl.DateTimeFormat(language, {day: '2-digit', month: '2-digit'});
 
@@ -79,5 +103,5 @@ export function dayTime(ms) {
 /** Wall time of seconds since 1970, with milliseconds. */
 export function time(seconds) {
     const ms = Math.floor((seconds * 1000) % 1000);
-    return `${clock.format(seconds * 1000)}.${String(ms).padStart(3, '0')}`;
+    return `${clockTime(seconds * 1000)}.${String(ms).padStart(3, '0')}`;
 }

@@ -1,8 +1,11 @@
 // What lines and stations are now. Asked once a second while the page is seen, and at once when an
-// event says that something has changed.
+// event says that something has changed; a page that nobody sees asks for the sake of its title.
 import {follow, get, offers, path} from './api.js';
 
 const PERIOD = 1000;  // ms
+const BEHIND = 10000; // ms
+const FINDINGS = 5000; // ms between two looks at the gateway's findings
+const OLD = 4000;     // ms without an answer: what is shown may be wrong
 const SOON = 60;      // ms: events of one moment are one reason to ask
 /** States that a transaction's outcome makes old. */
 const BACK = ['suspect', 'offline', 'unknown'];
@@ -11,19 +14,29 @@ const CONTRADICTS = {ok: BACK, exception: BACK, timeout: ['online', 'unknown'], 
 class Live extends EventTarget {
     lines = [];
     stations = [];
+    findings = [];    // of the gateway itself, and overloads with their line
     reachable = true;
+    heard = 0;        // ms since 1970: when the gateway has answered last
     refused = false;  // who we are may not see it
     #timer = null;
     #events = null;
     #asking = false;
     #started = false;
     #due = false;
+    #looked = -Infinity;
 
     start() {
         this.#started = true;
         document.addEventListener('visibilitychange', () => this.#seen());
+        setInterval(() => document.hidden || this.silence < 2 * PERIOD || this.#tell('status'), PERIOD);
         this.#seen();
     }
+
+    get silence() { return Math.max(0, Date.now() - this.heard); }
+    /** May what is shown be wrong, because the gateway is silent? */
+    get old() { return !this.reachable || this.silence > OLD; }
+    /** How old something is by now that was `ms` old when the gateway told it. */
+    ago(ms) { return ms === null ? null : ms + this.silence; }
 
     line(name) { return this.lines.find((line) => line.name === name); }
     station(name) { return this.stations.find((station) => station.name === name); }
@@ -32,19 +45,20 @@ class Live extends EventTarget {
 
     /** The browser has few connections to one host: a page that nobody sees keeps none. */
     #seen() {
-        if (document.hidden) {
-            this.#rest();
-            return;
-        }
+        if (document.hidden) return this.#rest();
+        this.#tell('status');
         this.#listen();
-        this.refresh();
+        return this.refresh();
     }
 
     #rest() {
+        this.#hangUp();
+        this.#tell('rest');
+    }
+
+    #hangUp() {
         this.#events?.close();
         this.#events = null;
-        clearTimeout(this.#timer);
-        this.#tell('rest');
     }
 
     #listen() {
@@ -74,26 +88,37 @@ class Live extends EventTarget {
         this.#asking = true;
         this.#due = false;
         try {
-            const [lines, stations] = await Promise.all([get(path('lines')), get(path('stations'))]);
-            this.lines = lines.lines;
-            this.stations = stations.stations;
-            this.reachable = true;
-            this.refused = false;
-            this.#listen();
+            const [lines, stations] = await Promise.all([get(path('lines')), get(path('stations')), this.#look()]);
+            this.#hear(lines.lines, stations.stations);
         } catch (error) {
             if (error.status === 401) return this.#refuse();
             this.reachable = false;
+            this.#hangUp();
         }
         this.#asking = false;
         this.#tell('status');
         clearTimeout(this.#timer);
-        if (!document.hidden) this.#timer = setTimeout(() => this.refresh(), this.#due ? SOON : PERIOD);
+        this.#timer = setTimeout(() => this.refresh(), document.hidden ? BEHIND : this.#due ? SOON : PERIOD);
+    }
+
+    async #look() {
+        if (!offers('GET /api/v1/findings') || performance.now() - this.#looked < FINDINGS) return;
+        this.#looked = performance.now();
+        try { this.findings = (await get(path('findings'))).findings; } catch { /* the next look will do */ }
+    }
+
+    /** Nobody on a line that is down can answer, whatever he was before. */
+    #hear(lines, stations) {
+        Object.assign(this, {lines, stations, reachable: true, refused: false, heard: Date.now()});
+        for (const station of stations) if (this.line(station.line)?.up === false) station.state = 'line_down';
+        if (!document.hidden) this.#listen();
     }
 
     /** To ask again is no use without another token. */
     #refuse() {
         this.#asking = false;
         this.refused = true;
+        clearTimeout(this.#timer);
         this.#rest();
         this.#tell('refused');
     }

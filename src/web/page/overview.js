@@ -1,8 +1,8 @@
 // Lines with their load, and their stations as tiles.
-import {get, offers, path} from './api.js';
+import {get, offers, path, seesWhole} from './api.js';
 import {attribute, h, list, replace, text} from './dom.js';
 import {findingNote, findingText} from './finding.js';
-import {duration, number, t, word} from './language.js';
+import {clockTime, duration, number, t, word} from './language.js';
 import {live} from './live.js';
 import {sparkline} from './plot.js';
 import {latency} from './timeline.js';
@@ -14,39 +14,51 @@ const HISTORY = 120;    // loads of a sparkline
 const LOADED = 20;      // % of the wire that a sparkline shows at least
 const FINDINGS = 5000;  // ms between two looks at a line's findings
 
-/** How a state looks: 'good', 'bad' (nobody answers), 'idle' (nobody has asked). */
+/** How a state looks: 'good', 'warn', 'bad' (nobody answers), 'idle' (nobody has asked, or we do not know). */
 export function tone(state) {
-    if (state === 'online' || state === 'heard' || state === 'up' || state === 'ok') return 'good';
-    return state === 'unknown' ? 'idle' : 'bad';
+    if (['online', 'heard', 'up'].includes(state)) return 'good';
+    if (state === 'overload') return 'warn';
+    return state === 'unknown' || state === 'old' ? 'idle' : 'bad';
 }
 
-export function badge(kind, state) {
-    return h('span', {class: `badge ${tone(state)}`}, word(kind, state));
+/** A state as it is known now: {node, update}. */
+export function badge() {
+    const node = h('span', {class: 'badge'});
+    return {node, update: (state) => {
+        const now = live.old ? 'old' : state;
+        attribute(node, 'class', `badge ${tone(now)}`);
+        text(node, word('state', now));
+    }};
+}
+
+/** When somebody has answered last, who was heard `ms` before the gateway said so. */
+function lastAnswer({state, last_success_ms: ms}) {
+    if (ms === null) return '';
+    const ago = duration(live.ago(ms));
+    return tone(state) === 'good' && !live.old ? t('last.answer', {ago}) : t('last.answer.at', {ago, time: clockTime(live.heard - ms)});
 }
 
 /** A station's tile: {node, update}. */
 function tile(first) {
     const name = h('span', {class: 'name'}, first.name);
-    const state = h('span', {class: 'badge'});
+    const state = badge();
     const spark = sparkline();
     const figure = h('span', {class: 'figure'});
     const facts = h('span', {class: 'muted'});
     const finding = h('span', {class: 'tile-finding'});
     const node = h('a', {class: 'tile', href: `#/station/${encodeURIComponent(first.name)}`, 'data-station': first.name},
-        h('span', {class: 'head'}, name, state), h('span', {class: 'muted'}, `${first.line}:${first.id} · ${first.profile ?? t('no.profile')}`),
+        h('span', {class: 'head'}, name, state.node), h('span', {class: 'muted'}, `${first.line}:${first.id} · ${first.profile ?? t('no.profile')}`),
         h('span', {class: 'head'}, spark.node, figure), facts, finding);
     return {node, update: (station) => {
         attribute(node, 'class', `tile ${tone(station.state)} ${station.state}`);
-        attribute(state, 'class', `badge ${tone(station.state)}`);
-        text(state, word('state', station.state));
+        state.update(station.state);
         const line = live.line(station.line);
         const {timeline} = traceOf(station.line);
-        const traced = timeline.of(station.id).slice(-KEPT);
-        const over = traced.filter((one) => one !== timeline.waiting);
+        const over = timeline.of(station.id).slice(-KEPT).filter((one) => one !== timeline.waiting);
         spark.update(over.map((one) => one.total), {ticked: true});
-        const mean = tone(station.state) === 'bad' ? null : latency(traced).total.mean;
-        text(figure, mean === null ? '–' : t('answers.in', {time: duration(mean)}));
-        text(facts, t('last.answer', {ago: duration(station.last_success_ms)}));
+        const mean = tone(station.state) === 'bad' || live.old ? null : latency(timeline.of(station.id)).think.mean;
+        text(figure, mean === null ? '–' : `${t('think')} ${duration(mean)}`);
+        text(facts, lastAnswer(station));
         const told = line?.told?.find((one) => one.station === station.id);
         text(finding, told ? findingText(told).text : '');
     }};
@@ -54,18 +66,21 @@ function tile(first) {
 
 /** What the gateway remembers of a line's load comes before what this page sees. */
 async function recall(line, history) {
-    if (!offers('GET /api/v1/lines/{}/history')) return;
+    if (!offers('GET /api/v1/lines/{}/history') || !seesWhole(line)) return;
     try {
         const {samples} = await get(path('lines', line, 'history'));
         history.unshift(...samples.map((one) => one.load_percent).filter((load) => load !== null).slice(-HISTORY));
     } catch { /* it begins now */ }
 }
 
+const showFindings = (place, told) => list(place, told, (one) => `${one.cause} ${one.station} ${one.text}`, (one) => ({node: findingNote(one)}));
+
 /** A line's card with its tiles: {node, update}. */
 function card(first) {
     const meter = h('meter', {min: 0, max: 100, high: 80, optimum: 0, 'aria-label': t('load.of', {line: first.name})});
     const load = h('span', {class: 'figure'});
-    const state = h('span', {class: 'badge'});
+    const state = badge();
+    const why = h('p', {class: 'refusal', lang: 'en'});
     const facts = h('p', {class: 'muted'});
     const spark = sparkline();
     const history = [];
@@ -74,21 +89,22 @@ function card(first) {
     const tiles = h('div', {class: 'tiles'});
     const node = h('section', {class: 'line', 'aria-label': `${t('line')} ${first.name}`},
         h('div', {class: 'card'},
-            h('div', {class: 'head'}, h('h2', null, first.name), state, h('span', {class: 'grow'}),
+            h('div', {class: 'head'}, h('h2', null, first.name), state.node, h('span', {class: 'grow'}),
                 h('a', {href: `#/scope/${first.name}`}, t('nav.scope')), h('a', {href: `#/latency/${first.name}`}, t('nav.latency'))),
-            h('div', {class: 'load'}, meter, load, spark.node), facts, findings),
+            h('div', {class: 'load'}, meter, load, spark.node), why, facts, findings),
         tiles);
     return {node, update: (line) => {
-        attribute(state, 'class', `badge ${line.up ? 'good' : 'bad'}`);
-        text(state, line.up ? word('state', 'up') : line.state);
+        const found = [...line.told ?? [], ...live.findings.filter((one) => one.line === line.name)];
+        state.update(!line.up ? 'line_down' : found.some((one) => one.cause === 'overload') ? 'overload' : 'up');
+        text(why, line.up ? '' : line.state);
+        why.hidden = line.up;
         meter.value = line.load_percent;
         text(load, t('load', {percent: number(line.load_percent, 1)}));
         history.push(line.load_percent);
         if (history.length > HISTORY) history.shift();
         spark.update(history, {most: LOADED});
         text(facts, [line.device, line.mode === 'listen' ? t('listens') : null, t('waiting', {count: line.queue_depth})].filter(Boolean).join(' · '));
-        const told = (line.told ?? []).map((one) => ({...one, key: `${one.cause} ${one.station} ${one.text}`}));
-        list(findings, told, (one) => one.key, (one) => ({node: findingNote(one)}));
+        showFindings(findings, found);
         list(tiles, live.stations.filter((station) => station.line === line.name), (station) => station.name, tile);
     }};
 }
@@ -113,14 +129,26 @@ export function linesWithFindings(changed) {
     return live.lines.map((line) => Object.assign(line, {told: told.get(line.name)?.findings ?? []}));
 }
 
+/** How many lines are down, and how many stations do not answer. */
+export function troubles() {
+    return {down: live.lines.filter((line) => !line.up).length, bad: live.stations.filter((station) => tone(station.state) === 'bad').length};
+}
+
 export function overviewView() {
     const lines = h('div');
     const counts = h('p', {class: 'counts', role: 'status'});
-    const node = h('div', null, h('h1', null, t('nav.overview')), counts, lines);
+    const findings = h('ul', {class: 'findings'});
+    const own = h('section', {class: 'card', id: 'gateway'}, h('h2', null, t('gateway')), findings);
+    const node = h('div', null, h('h1', null, t('nav.overview')), counts, own, lines);
     const update = () => {
-        const bad = live.stations.filter((station) => tone(station.state) === 'bad').length;
-        text(counts, t('counts', {lines: live.lines.length, stations: live.stations.length, bad}));
-        attribute(counts, 'class', bad > 0 ? 'counts bad' : 'counts');
+        const {down, bad} = troubles();
+        const said = [t('counts', {lines: live.lines.length, stations: live.stations.length, bad: live.old ? '?' : bad})];
+        if (down > 0) said.push(t('counts.down', {down}));
+        text(counts, said.join(' · '));
+        attribute(counts, 'class', bad + down > 0 ? 'counts bad' : 'counts');
+        const found = live.findings.filter((one) => !one.line);
+        showFindings(findings, found);
+        own.hidden = found.length === 0;
         list(lines, linesWithFindings(update), (line) => line.name, card);
         if (live.lines.length === 0) replace(lines, h('p', {class: 'empty'}, t('no.lines')));
     };

@@ -17,12 +17,14 @@ function asking(node, ask, period = 2000) {
 }
 
 function relayRow(first) {
-    const state = h('span');
+    const state = h('span', {lang: 'en'});
+    const why = h('span', {lang: 'en'});
     const cells = Array.from({length: 4}, () => h('td', {class: 'number'}));
-    return {node: h('tr', null, h('th', {scope: 'row'}, first.name), h('td', null, state), cells), update: (relay) => {
+    return {node: h('tr', null, h('th', {scope: 'row'}, first.name), h('td', null, state, ' ', why), cells), update: (relay) => {
+        const [name, ...reason] = relay.state.split(': ');
         attribute(state, 'class', `badge ${relay.state === 'ok' ? 'good' : 'bad'}`);
-        attribute(state, 'lang', 'en');
-        text(state, relay.state);
+        text(state, name);
+        text(why, reason.join(': '));
         [`${number(relay.reads)} / ${number(relay.read_failures)}`, `${number(relay.writes)} / ${number(relay.write_failures)}`, number(relay.repairs),
             duration(relay.last_write_ms)].forEach((value, i) => text(cells[i], value));
     }};

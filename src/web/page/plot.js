@@ -19,6 +19,12 @@ export function library() {
     return loading;
 }
 
+/** On an axis; between two seconds ":05.500". */
+function axisTime(date) {
+    const two = (value, length = 2) => String(value).padStart(length, '0');
+    return date.getMilliseconds() === 0 ? clockTime(date) : `:${two(date.getSeconds())}.${two(date.getMilliseconds(), 3)}`;
+}
+
 const TICK = 12;  // pixels of a failure at the foot of a plot
 
 /** Each row as a bar of its own: what nobody measured is not painted. The whole comes first, its parts before it. */
@@ -66,7 +72,7 @@ export function plot({title, unit, labels, colours, stacked = false, steps = fal
     const options = () => ({
         labels: ['t', ...labels], colors: colours.map(colour), stackedGraph: stacked, stepPlot: steps,
         axisLineColor: colour('border'), gridLineColor: colour('border'), strokeWidth: 1.5, fillAlpha: 0.5,
-        axes: {x: {axisLabelFormatter: clockTime, pixelsPerLabel: 90}, y: {axisLabelFormatter: (v) => number(v, 2), axisLabelWidth: 46}},
+        axes: {x: {axisLabelFormatter: axisTime, pixelsPerLabel: 130, axisLabelWidth: 130}, y: {axisLabelFormatter: (v) => number(v, 2), axisLabelWidth: 46}},
         includeZero: stacked, animatedZooms: false, stackedGraphNaNFill: 'none', ...stacked ? {plotter: bars} : {},
         underlayCallback: (canvas, area, drawn) => ticks(canvas, area, drawn, failed),
         highlightCallback: (event, x, points) => say(points.map((point) => point.yval)),

@@ -1,6 +1,6 @@
 // What this page knows of points: their last values, and how a value is said.
 import {get, offers, path} from './api.js';
-import {number, t, word} from './language.js';
+import {decimalText, t, word} from './language.js';
 import {live} from './live.js';
 
 const MANY = 200;        // points, of which fewer values are remembered each
@@ -35,10 +35,11 @@ live.addEventListener('point', ({detail}) => {
 });
 live.addEventListener('rest', () => { for (const key of histories.keys()) rememberGap(key); });
 
-export function shownValue(point) {
-    if (point.value === null || point.value === undefined) return '–';
-    const value = typeof point.value === 'number' ? number(point.value, 6) : point.value === true ? t('on') : point.value === false ? t('off') : String(point.value);
-    return [point.label ? `${point.label} (${value})` : value, point.unit ? word('unit', point.unit) : ''].filter(Boolean).join(' ');
+/** As it is typed, too. */
+export function shownValue({value, label, unit}) {
+    if (value === null || value === undefined) return '–';
+    const said = typeof value === 'number' ? decimalText(value) : typeof value === 'boolean' ? t(value ? 'on' : 'off') : value;
+    return [label ? `${label} (${said})` : said, unit ? word('unit', unit) : ''].filter(Boolean).join('\u00a0');
 }
 
 /** What the gateway remembers comes before what this page has seen. */

@@ -1,10 +1,10 @@
 // Points with their age, quality and plot.
 import {get, mayWrite, path} from './api.js';
-import {confirmWrite} from './confirm.js';
 import {attribute, h, list, table, text} from './dom.js';
-import {duration, t, word} from './language.js';
+import {clockTime, duration, t, word} from './language.js';
 import {live} from './live.js';
 import {plot, sparkline} from './plot.js';
+import {enterPoint} from './point_entry.js';
 import {historyOf, keyOf, recall, remember, rememberGap, shownValue} from './point_values.js';
 
 const ASK = 2000;        // ms between two rounds of all stations
@@ -12,20 +12,35 @@ const PACE = 40;         // ms between two stations
 const SHOWN = 200;       // rows
 const FILTERED = 12;     // points that nobody needs a filter for
 
+const TONES = {good: 'good', stale: 'warn', bad: 'bad'};
+
+/** A point as it is known now: nobody knows whether a value still holds once the gateway is silent. */
+function known(point) {
+    const old = live.old && point.quality === 'good';
+    return {quality: old ? 'stale' : point.quality, age: point.age_ms === null ? null : point.age_ms + Math.max(0, Date.now() - point.heard)};
+}
+
+/** An age, with the instant where that is no longer now. */
+const since = (age, quality) => age === null || quality === 'good' ? duration(age) : `${duration(age)} (${clockTime(Date.now() - age)})`;
+
 function row(station, first, pick) {
     const key = keyOf(station, first.name);
     const value = h('td', {class: 'number strong'});
     const quality = h('span');
     const age = h('td', {class: 'number'});
     const spark = sparkline();
-    const write = first.writable && mayWrite() ? h('button', {type: 'button', onclick: () => confirmWrite({station, point: first})}, t('write')) : null;
+    let last = first;
+    const write = first.writable && mayWrite() ? h('button', {type: 'button', onclick: () => enterPoint(station, () => last)}, t('write')) : null;
     const node = h('tr', {'data-point': key}, h('td', null, h('button', {type: 'button', class: 'link', onclick: () => pick(station, first)}, key)), value,
         h('td', null, quality), age, h('td', null, spark.node), h('td', null, h('code', null, first.at), ` ${first.type}`), h('td', null, write));
     return {node, update: (point) => {
+        last = point;
+        const now = known(point);
         text(value, shownValue(point));
-        attribute(quality, 'class', `badge ${point.quality === 'good' ? 'good' : point.quality === 'stale' ? 'warn' : 'bad'}`);
-        text(quality, word('quality', point.quality));
-        text(age, duration(point.age_ms === null ? null : point.age_ms + Date.now() - point.heard));
+        attribute(value, 'class', `number strong${now.quality === 'good' ? '' : ' muted'}`);
+        attribute(quality, 'class', `badge ${TONES[now.quality]}`);
+        text(quality, word('quality', now.quality));
+        text(age, since(now.age, now.quality));
         spark.update(historyOf(key).slice(-120).map(([, one]) => one), {least: Infinity});
     }};
 }
@@ -69,7 +84,9 @@ class Points {
             try {
                 const {points} = await get(path('stations', station, 'points'));
                 for (const point of points) this.#take(station, point);
-            } catch { /* the bar above the page says it */ }
+            } catch {
+                for (const point of this.#points.values()) if (point.station === station && point.quality === 'good') point.quality = 'stale';
+            }
             if (this.stations.length > 1) await new Promise((resolve) => { setTimeout(resolve, PACE); });
         }
         this.#asked = performance.now();

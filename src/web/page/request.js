@@ -1,5 +1,5 @@
 // The request box: any notation of any panel. Shows the frame before it goes, and explains the answer.
-import {costOf, get, mayWrite, offers, path} from './api.js';
+import {costOf, get, getFromPanel, mayWrite, offers, path} from './api.js';
 import {choice, h, replace, table} from './dom.js';
 import {confirmMemory, planView, refusal} from './confirm.js';
 import {notations} from './frame_view.js';
@@ -17,6 +17,9 @@ function parts(given) {
     const known = TABLES.find((name) => name === table?.toLowerCase() || name.split('-').map((word) => word[0]).join('') === table?.toLowerCase());
     return known ? [known, address] : ['devices', given.trim()];
 }
+
+/** A typed whole number, or null: "1,250" may be two, or one. */
+const whole = (typed) => /^-?(\d+|0x[\da-f]+)$/i.test(typed) ? Number(typed) : typed === 'true' ? 1 : typed === 'false' ? 0 : null;
 
 /** Where the bus scope shows what an answer has cost. */
 function onTheWire(body) {
@@ -37,7 +40,7 @@ class Box {
         this.plan = h('div', {class: 'plan', 'aria-live': 'polite'});
         this.answer = h('div', {class: 'answer', 'aria-live': 'polite'});
         this.answered = h('section', {class: 'card', 'aria-label': t('answer'), hidden: true}, h('h2', null, t('answer')), this.answer);
-        this.values = h('input', {id: 'values', placeholder: '215, 216', autocomplete: 'off'});
+        this.values = h('input', {id: 'values', placeholder: '215 216', autocomplete: 'off'});
         this.writing = h('div');
         this.node = h('div', null, h('h1', null, t('nav.request')), h('section', {class: 'card'}, this.#form()),
             h('section', {class: 'card', 'aria-label': t('frame.before')}, h('h2', null, t('frame.before')), this.plan),
@@ -96,7 +99,7 @@ class Box {
         this.#say(h('p', {class: 'muted'}, t('asking')));
         const begin = performance.now();
         try {
-            const body = await get(path('stations', station, kind, where) + `?count=${this.count.value || 1}`);
+            const body = await getFromPanel(path('stations', station, kind, where) + `?count=${this.count.value || 1}`);
             const names = await notations(station, body.table, body.address, body.values.length);
             this.#say(this.#explained(body, names, performance.now() - begin));
         } catch (error) {
@@ -121,7 +124,7 @@ class Box {
         const place = h('div');
         const look = async () => {
             try {
-                const {interpretations} = await get(path('stations', body.station, body.table, String(body.address), 'interpretations') + `?count=${body.values.length}`);
+                const {interpretations} = await getFromPanel(path('stations', body.station, body.table, String(body.address), 'interpretations') + `?count=${body.values.length}`);
                 const shown = table(t('every.type'), [[t('type')], [t('word.order')], [t('values')]]);
                 shown.body.append(...interpretations.map((one) => h('tr', null, h('td', null, one.type), h('td', null, one.word_order),
                     h('td', {class: 'mono'}, one.values.map((value) => value ?? '–').join('  ')))));
@@ -136,9 +139,9 @@ class Box {
 
     #write() {
         const [station, kind, where] = this.#target;
-        const values = this.values.value.split(/[\s,;]+/).filter(Boolean).map((one) => one === 'true' ? 1 : one === 'false' ? 0 : Number(one));
-        if (where === '' || values.length === 0 || values.some(Number.isNaN)) return this.#say(h('p', {class: 'refusal', role: 'alert'}, t('values.hint')));
-        return confirmMemory(station, [kind, where], values, (node) => this.#say(node));
+        const values = this.values.value.split(/\s*[\s;]\s*|,\s+/).filter(Boolean).map(whole);
+        if (where === '' || values.length === 0 || values.includes(null)) return this.#say(h('p', {class: 'refusal', role: 'alert'}, t('values.hint')));
+        return confirmMemory(station, [kind, where], values, (...nodes) => this.#say(...nodes));
     }
 }
 

@@ -4,7 +4,7 @@ import {attribute, choice, h, list, table, text} from './dom.js';
 import {download} from './download.js';
 import {showFrame} from './frame_view.js';
 import {incidents} from './incidents.js';
-import {duration, t, time, word} from './language.js';
+import {duration, t, time, word, zone} from './language.js';
 import {live} from './live.js';
 import {ScopeCanvas, colours} from './scope_canvas.js';
 import {traceOf} from './trace.js';
@@ -38,7 +38,7 @@ class Scope {
         this.summary = h('p', {class: 'muted', 'aria-live': 'off'});
         this.detail = h('section', {class: 'card detail', 'aria-live': 'polite', 'aria-label': t('frame')}, h('p', {class: 'muted'}, t('scope.pick')));
         this.incidents = incidents(line);
-        this.table = table(t('frames'), [[t('time')], [t('station')], [t('kind')], [t('bytes')]]);
+        this.table = table(t('frames'), [[`${t('time')} (${zone})`], [t('station')], [t('kind')], [t('bytes')]]);
         this.node = h('div', null, this.#controls(), h('div', {class: 'card flush'}, this.canvas),
             h('p', {id: 'scope-keys', class: 'unseen'}, t('scope.keys')), legend(), this.summary, this.detail,
             h('h2', null, t('frames')), this.table.node, this.incidents.node);

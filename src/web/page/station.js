@@ -3,28 +3,26 @@ import {get, path} from './api.js';
 import {h, list, replace, text} from './dom.js';
 import {findingNote} from './finding.js';
 import {duration, number, t, word} from './language.js';
+import {PARTS, latencyBars} from './latency.js';
 import {badge, linesWithFindings} from './overview.js';
-import {plot} from './plot.js';
 import {pointsTable} from './points.js';
 import {simulator} from './simulator.js';
 import {latency, plotted} from './timeline.js';
-import {gatewayNow, traceOf} from './trace.js';
+import {traceOf} from './trace.js';
 import {live} from './live.js';
 
 function facts(station) {
     const rows = [[t('line'), `${station.line}:${station.id}`], [t('profile'), station.profile ?? t('no.profile')],
         [t('unit'), station.unit ?? '–'], [t('access'), word('access', station.read_only ? 'read_only' : 'read_write')],
-        [t('last'), duration(station.last_success_ms)], [t('condition'), station.condition ? word('condition', station.condition) : '–']];
+        [t('last'), duration(live.ago(station.last_success_ms))],
+        [t('condition'), station.condition && station.state !== 'line_down' ? word('condition', station.condition) : '–']];
     return rows.map(([name, value]) => h('div', null, h('dt', null, name), h('dd', null, String(value))));
 }
 
 function latencyPlot(station) {
     const trace = traceOf(station.line);
-    const read = () => {
-        const {rows, failed} = plotted(trace.timeline.of(station.id), trace.timeline.waiting);
-        return {rows: rows.map(([at, , wire, think]) => [at, wire, think]), failed};
-    };
-    const made = plot({title: t('nav.latency'), unit: 'ms', labels: [t('wire'), t('think')], colours: ['c0', 'c1'], stacked: true, read, now: gatewayNow});
+    const read = () => plotted(trace.timeline.of(station.id), trace.timeline.waiting);
+    const made = latencyBars(t('nav.latency'), read);
     return {...made, watch: (changed) => trace.watch(() => { made.update(); changed(); })};
 }
 
@@ -39,7 +37,7 @@ function polls(body) {
 export function stationView({argument}) {
     const first = live.station(argument);
     if (!first) return {node: h('p', {class: 'empty'}, t('no.station', {name: argument ?? ''}))};
-    const state = h('span');
+    const state = badge();
     const list_ = h('dl', {class: 'facts'});
     const findings = h('ul', {class: 'findings'});
     const figures = h('p', {class: 'muted'});
@@ -47,7 +45,7 @@ export function stationView({argument}) {
     const points = pointsTable([first.name]);
     const faults = simulator(first.name);
     const graph = latencyPlot(first);
-    const node = h('div', null, h('h1', null, first.name, ' ', state),
+    const node = h('div', null, h('h1', null, first.name, ' ', state.node),
         h('div', {class: 'columns'}, h('section', {class: 'card'}, h('h2', null, t('station')), list_, findings,
             h('p', null, h('a', {class: 'button', href: `#/request/${encodeURIComponent(first.name)}`}, t('nav.request')), ' ',
                 h('a', {class: 'button', href: `#/scope/${first.line}`}, t('nav.scope')))),
@@ -57,13 +55,13 @@ export function stationView({argument}) {
     const update = () => {
         const station = live.station(first.name);
         if (!station) return;
-        replace(state, badge('state', station.state));
+        state.update(station.state);
         replace(list_, facts(station));
         const known = linesWithFindings(() => {}).find((line) => line.name === station.line)?.told ?? [];
         list(findings, known.filter((one) => one.station === station.id), (one) => one.cause + one.text, (one) => ({node: findingNote(one)}));
         const all = latency(traceOf(station.line).timeline.of(station.id));
-        text(figures, t('latency.figures', {count: all.count, mean: duration(all.total.mean), high: duration(all.total.high),
-            failed: all.count - all.answered}));
+        text(figures, t('latency.figures', {count: all.count, failed: all.count - all.answered, high: duration(all.total.high),
+            parts: PARTS.map((part) => `${t(part)} ${duration(all[part].mean)}`).join(', ')}));
         points.update();
     };
     const end = graph.watch(update);

@@ -11,6 +11,7 @@ export const bytesOf = (hex) => hex === '' ? [] : hex.split(' ').map((pair) => p
 const LONGEST_GAP = 0.02;    // seconds: beyond, the line had nothing to do
 const LONGEST_WAIT = 1;      // seconds: nobody is drawn as waited for longer
 const OF_STATION = 600;      // exchanges that are remembered of each
+const LATELY = 200;          // exchanges that the figures are of
 const RESTS = /^only this request is sent for ([\d.]+) ms: station (\d+)/;
 
 /** A frame of the trace with its begin and end: `at` is its first bit out, or its last byte in. */
@@ -175,15 +176,16 @@ export function plotted(exchanges, waiting) {
     return {rows, failed};
 }
 
-/** Of the last exchanges of a station: how many, and mean and 95 % of each part, in
+/** Of the latest exchanges of a station: how many, and mean and 95 % of each part, in
  * milliseconds; null where nothing is known. */
 export function latency(exchanges) {
-    const good = exchanges.filter((exchange) => exchange.reply);
+    const lately = exchanges.slice(-LATELY);
+    const good = lately.filter((exchange) => exchange.reply);
     const figures = (part) => {
         const values = good.map((exchange) => exchange[part]).filter((value) => value !== undefined).sort((a, b) => a - b);
         const sum = values.reduce((a, b) => a + b, 0);
         return {mean: values.length ? sum / values.length : null, high: values[Math.floor(values.length * 0.95)] ?? null};
     };
-    return {count: exchanges.length, answered: good.length, queue: figures('queue'), wire: figures('wire'),
+    return {count: lately.length, answered: good.length, queue: figures('queue'), wire: figures('wire'),
         think: figures('think'), total: figures('total')};
 }

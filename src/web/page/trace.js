@@ -1,5 +1,6 @@
 // Follows the traces of lines, as long as somebody looks.
-import {gateway, get, path} from './api.js';
+import {gateway, get, path, seesWhole} from './api.js';
+import {t} from './language.js';
 import {Timeline, characterTime} from './timeline.js';
 
 const PERIOD = 400;  // ms
@@ -48,6 +49,7 @@ class Trace extends EventTarget {
     }
 
     async #ask() {
+        if (!seesWhole(this.#line)) return queueMicrotask(() => this.#refuse(t('not.whole')));
         let full = false;
         try {
             const asked = this.#next === null ? 'last=500' : `since=${this.#next}`;

@@ -63,6 +63,18 @@ class ApiPoints : public HttpRig {
     std::unique_ptr<points::StationPoints> shown;
 };
 
+TEST_F(ApiPoints, PlanIsTheFrameThatWouldReadItOrWriteAValue) {
+    const auto frame = [&](const std::string& query) {
+        return std::string(get(std::string(kOil) + "/plan" + query).at("frame").as_string());
+    };
+    EXPECT_THAT(frame(""), HasSubstr("1F 03 00 07 00 01"));
+    EXPECT_THAT(frame("?value=42"), HasSubstr("1F 06 00 07 00 2A"));
+    expect_gets("/api/v1/stations/press/points/", 422,
+                {"oil/plan?value=101", "oil/plan?value=true", "serial/plan?value=1"});
+    expect_gets("/api/v1/stations/press/points/", 400, {"oil/plan?value=1,250"});
+    EXPECT_TRUE(bus.requests.empty());
+}
+
 TEST_F(ApiPoints, P10ShowsNothingForWhatWasNeverRead) {
     EXPECT_EQ(get(kOil).json(),
               json_of(R"({"name":"oil","value":null,"unit":"bar","quality":"bad","age_ms":null,)"
