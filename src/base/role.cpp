@@ -23,6 +23,7 @@ constexpr Role least_with(Right right) {
         case Right::simulator:
             return Role::engineer;
         case Right::reload:
+        case Right::configure:
             return Role::admin;
     }
     std::abort();
@@ -62,6 +63,8 @@ std::string_view label(Right right) {
             return "simulator";
         case Right::reload:
             return "reload";
+        case Right::configure:
+            return "configure";
     }
     std::abort();
 }

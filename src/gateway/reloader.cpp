@@ -13,6 +13,7 @@
 #include "panelgate/gateway/gateway.hpp"
 #include "panelgate/gateway/prepare.hpp"
 #include "panelgate/gateway/servers.hpp"
+#include "panelgate/gateway/text_file.hpp"
 #include "panelgate/rt/log.hpp"
 
 namespace panelgate::gateway {
@@ -119,6 +120,8 @@ struct Reloader::Job {
     std::vector<ServedCertificate> certificates;     ///< in use
     std::shared_ptr<const config::Config> next;      ///< null: there is none
     web::SharedText shown;
+    std::string text;       ///< of the file
+    std::string read_only;  ///< why the file cannot be written
     web::ReloadVerdict verdict;
 
     void read();
@@ -164,6 +167,8 @@ void Reloader::Job::read() try {
         }
     } else {
         explain::Loaded loaded = explain::read_file(file);
+        text = std::move(loaded.text);
+        read_only = why_read_only(file);
         for (const yaml::Problem& problem : loaded.problems)
             verdict.faults.push_back(fault_of(problem));
         if (!loaded.config) {
@@ -213,7 +218,18 @@ void Reloader::Job::compare() {
 Reloader::Reloader(boost::asio::any_io_executor executor, std::string file)
     : file_(std::move(file)), worker_(std::move(executor)) {
     counters_.last_success_unix = unix_now();
+    read_only_ = no_file();
+    if (read_only_.empty()) read_only_ = why_read_only(file_);
 }
+
+std::string Reloader::no_file() const {
+    if (file_.empty()) return "this gateway runs the built-in demo, which is no file";
+    if (file_ == "-")
+        return "the configuration was read from standard input, which is read only once";
+    return {};
+}
+
+std::shared_ptr<const config::Config> Reloader::running() const { return gateway_->config(); }
 
 void Reloader::serve(Gateway& gateway) { gateway_ = &gateway; }
 
@@ -222,10 +238,7 @@ std::string Reloader::barred(bool rollback) const {
     if (waiting_.size() >= kWaiting) return "too many wait for a reload; try again";
     if (rollback)
         return before_ ? "" : "nothing else has run since the start, so there is no way back";
-    if (file_.empty()) return "this gateway runs the built-in demo, which is no file";
-    if (file_ == "-")
-        return "the configuration was read from standard input, which is read only once";
-    return {};
+    return no_file();
 }
 
 void Reloader::reload(web::ReloadWish wish, std::string cause, Handler handler) {
@@ -254,6 +267,7 @@ void Reloader::begin() {
 
 /// Runs in one turn of the loop.
 void Reloader::apply(const std::shared_ptr<Job>& job) {
+    if (!job->rollback) read_only_ = job->read_only;
     if (stopping_) {
         job->verdict.outcome = ReloadOutcome::failed;
         job->verdict.why = kStopping;
@@ -280,6 +294,7 @@ void Reloader::end(const std::shared_ptr<Job>& job) {
     if (good) counters_.last_success_unix = unix_now();
     log_verdict(verdict);
     gateway_->record(verdict);
+    if (good && !job->rollback && ran_) ran_(job->text, verdict.cause);
     last_ = std::make_shared<const web::ReloadVerdict>(std::move(verdict));
     if (step_) step_(false);
     for (Waiting& one : std::exchange(served_, {})) one.handler(last_);

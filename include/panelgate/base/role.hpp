@@ -16,7 +16,7 @@ enum class Role : std::uint8_t {
     viewer,     ///< reads
     operator_,  ///< writes
     engineer,   ///< raw requests, broadcasts, discoveries, simulated faults
-    admin,      ///< reload and rollback
+    admin,      ///< reload and rollback, and the text of the configuration
 };
 /// Returns its name in the configuration.
 std::string_view label(Role role);
@@ -29,11 +29,12 @@ enum class Right : std::uint8_t {
     raw,
     discover,
     simulator,
-    reload,  ///< and rollback
+    reload,     ///< and rollback
+    configure,  ///< read, judge and write the configuration's text, which includes all else
 };
-inline constexpr std::array kAllRights{Right::read,  Right::write,    Right::broadcast,
-                                       Right::raw,   Right::discover, Right::simulator,
-                                       Right::reload};
+inline constexpr std::array kAllRights{Right::read,   Right::write,    Right::broadcast,
+                                       Right::raw,    Right::discover, Right::simulator,
+                                       Right::reload, Right::configure};
 /// Returns its name in the configuration.
 std::string_view label(Right right);
 

@@ -4,7 +4,7 @@ import {EventText} from './event_text.js';
 let token = null;
 try { token = sessionStorage.getItem('panelgate.token'); } catch { /* private window */ }
 
-export const gateway = {configuration: null, role: 'viewer', rights: ['read']};
+export const gateway = {configuration: null, role: 'viewer', rights: ['read'], text: {writable: false}};
 
 /** An answer that is none: RFC 9457 with its members, or a gateway that does not answer. */
 export class Refused extends Error {
@@ -68,6 +68,19 @@ export async function getFile(target) {
     return response.ok ? response.blob() : parsedOf(response);
 }
 
+/** A text, and the ETag that names it. */
+export async function getText(target) {
+    const response = await send(target);
+    if (!response.ok) await parsedOf(response);
+    return {text: await response.text(), etag: response.headers.get('ETag')};
+}
+
+/** Sends a text; what is answered, and the ETag of that. */
+export async function sendText(method, target, body, headers = {}) {
+    const response = await send(target, {method, body, headers: {'Content-Type': 'text/yaml', ...headers}});
+    return {...await parsedOf(response), etag: response.headers.get('ETag')};
+}
+
 /**
  * Server-sent events: told(type, data) for each, ended() when there are no more; close() ends them
  * without a word. EventSource would not do, for it carries no token.
@@ -99,13 +112,16 @@ export function offers(pattern) {
 
 const may = (right) => gateway.rights.includes(right);
 export const mayWrite = () => may('write');
+/** May change the text of the configuration. */
+export const mayConfigure = () => may('configure') && offers('PUT /api/v1/configuration/text');
 export const mayDiscover = () => may('discover');
 /** May set faults of simulated panels. */
 export const maySimulate = () => may('simulator');
 
 /** Learns what is configured, and what we may do. */
 export async function introduce() {
-    const {configuration, rest, rights, role, version} = await get(path('configuration'));
+    const {configuration, rest, rights, role, text, version} = await get(path('configuration'));
+    gateway.text = text ?? {writable: false};
     gateway.configuration = {...configuration, rest, version};
     gateway.role = role;
     gateway.rights = rights;
