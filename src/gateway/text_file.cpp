@@ -42,8 +42,8 @@ bool write_all(int file, std::string_view text) {
     return true;
 }
 
-/// Writes a new file with the owner and the rights of the old one; false, with errno, if the disk
-/// has not taken it.
+/// Writes a new file with the owner, the group and the rights of the old one, as far as this
+/// program may give them; false, with errno, if the disk has not taken it.
 bool write_like(const std::string& old, const std::string& path, std::string_view text) {
     struct stat as{};
     if (::stat(old.c_str(), &as) != 0) return false;
@@ -51,9 +51,10 @@ bool write_like(const std::string& old, const std::string& path, std::string_vie
     const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC,
                             S_IRUSR | S_IWUSR);
     if (file < 0) return false;
-    const bool owned = ::fchown(file, as.st_uid, as.st_gid) == 0;
-    // A group that may read a file of root's shall not read it as another group.
-    const mode_t mode = as.st_mode & (owned ? 0777U : 0700U);
+    // What one group may read, another group may not.
+    const bool same_group = ::fchown(file, as.st_uid, as.st_gid) == 0 ||
+                            ::fchown(file, static_cast<uid_t>(-1), as.st_gid) == 0;
+    const mode_t mode = as.st_mode & (same_group ? 0777U : 0707U);
     const bool done = ::fchmod(file, mode) == 0 && write_all(file, text) && ::fsync(file) == 0;
     const int why = errno;
     ::close(file);

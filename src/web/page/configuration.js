@@ -32,6 +32,7 @@ function changeRow({path: where, kind, before, after, needs}) {
 
 class View {
     constructor() {
+        this.turn = 0;
         this.said = h('div', {role: 'status'});
         this.save = h('button', {type: 'button', class: 'primary', id: 'save', disabled: true, onclick: () => this.#save()}, t('text.save'));
         this.drop = h('button', {type: 'button', id: 'drop', disabled: true, onclick: () => this.#drop()}, t('text.drop'));
@@ -44,7 +45,7 @@ class View {
         const writable = gateway.text.writable;
         this.node = h('div', null, h('h1', null, t('nav.text')),
             writable ? null : h('p', {class: 'finding', id: 'read-only'}, h('strong', null, t('text.read.only')), ' ', h('span', {lang: 'en'}, gateway.text.why), '. ', t('text.copy')),
-            h('div', {class: 'bar'}, writable ? [this.save, this.drop] : h('button', {type: 'button', id: 'copy', onclick: () => navigator.clipboard?.writeText(draft.text)}, t('text.copy.now'))), this.said,
+            h('div', {class: 'bar'}, writable ? [this.save, this.drop] : h('button', {type: 'button', id: 'copy', onclick: () => this.editor?.copy()}, t('text.copy.now'))), this.said,
             h('div', {class: 'text-columns'}, h('div', null, this.box, h('section', {class: 'card'}, h('h2', null, t('text.problems')), this.counted, this.problems)),
                 h('div', null, h('section', {class: 'card'}, h('h2', null, t('text.changes')), this.changes),
                     h('section', {class: 'card'}, h('h2', null, t('text.plan')), this.plan), this.versions)));
@@ -58,6 +59,7 @@ class View {
             await load();
             this.editor = await Editor.in(this.box, draft.text, (now) => this.#typed(now), (now) => this.#judge(now));
             if (draft.line) this.editor.goTo(draft.line);
+            draft.line = null;
             this.#typed(draft.text);
             await this.#showVersions();
         } catch (error) {
@@ -72,7 +74,9 @@ class View {
 
     /** Asks what is wrong with a text, shows that beside it, and returns it for the marks. */
     async #judge(now) {
+        const turn = ++this.turn;
         const found = await check(now);
+        if (turn !== this.turn) return [];
         this.found = found;
         const faults = found.problems.filter((one) => one.severity === 'error').length;
         text(this.counted, faults ? t('text.faults', {count: faults}) : t('text.valid'));
@@ -81,7 +85,7 @@ class View {
             found.interruptions.map((cut) => h('li', {class: 'warning'}, h('code', null, cut.path), ': ', h('span', {lang: 'en'}, cut.what))));
         replace(this.plan, (found.plan.lines ?? []).map((line) => h('li', null, h('code', null, line.name), ': ', t('load', {percent: line.load_percent}),
             line.verdict === 'fine' ? null : h('span', {class: 'badge warn', lang: 'en'}, line.verdict))));
-        return found.problems.filter((one) => !one.file);
+        return found.problems.filter((one) => !one.file && one.line > 0);
     }
 
     async #save() {

@@ -44,11 +44,10 @@ export class Editor {
     constructor(CodeMirror, box, value, typed, judge) {
         const annotations = (text, update) => judge(text).then((problems) => update(problems.map((one) => this.#mark(one))), () => update([]));
         this.shown = CodeMirror(box, {
-            value, mode: 'yaml', lineNumbers: true, lineWrapping: false, indentUnit: 2, tabSize: 2, viewportMargin: 20, inputStyle: 'contenteditable', screenReaderLabel: t('nav.text'),
+            value, mode: 'yaml', lineNumbers: true, lineWrapping: false, indentUnit: 2, tabSize: 2, viewportMargin: 20, screenReaderLabel: t('nav.text'),
             gutters: ['CodeMirror-lint-markers', 'CodeMirror-linenumbers'], lint: {getAnnotations: annotations, async: true, delay: PAUSE, selfContain: true},
             extraKeys: {'Ctrl-Space': 'autocomplete', Tab: false, 'Shift-Tab': false}, hintOptions: {hint: hints, completeSingle: false},
         });
-        this.shown.getInputField().setAttribute('aria-multiline', 'true');
         this.shown.on('change', (editor) => typed(editor.getValue()));
         this.shown.on('inputRead', (editor, {text: [last]}) => { if (/^[a-z]$/.test(last)) editor.showHint(); });
     }
@@ -63,6 +62,13 @@ export class Editor {
     }
 
     set(value) { this.shown.setValue(value); }
+
+    /** Also where a browser has no clipboard for pages without TLS. */
+    copy() {
+        this.shown.focus();
+        this.shown.execCommand('selectAll');
+        document.execCommand('copy');
+    }
 
     judge() { this.shown.performLint(); }
 
