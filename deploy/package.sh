@@ -124,7 +124,7 @@ documents() {
         gzip -9n >"$build/documents/changelog.Debian.gz"
     gzip -9nc CHANGELOG.md >"$build/documents/changelog.gz"
     # What its libraries come from, and what is compiled into it
-    DPKG_ADMINDIR=$sysroot/var/lib/dpkg deploy/sbom.sh rows libboost1.81-dev libcli11-dev libjs-dygraphs \
+    DPKG_ADMINDIR=$sysroot/var/lib/dpkg deploy/sbom.sh rows libboost1.81-dev libcli11-dev libjs-dygraphs libjs-codemirror \
         $(sed 's/([^)]*)//g; s/,/ /g' <<<"$needed") | LC_ALL=C sort -u |
         deploy/sbom.sh cyclonedx "$version" >"$build/documents/sbom.cdx.json"
     deploy/manual/manual.py "$build/documents" "${run[@]}" "$build/panelgate"

@@ -11,8 +11,8 @@ NOT_RUN = {"/api/v1/events": "it goes on for as long as the client listens",
            "/api/v1/lines/{line}/incidents/{incident}": "it wants an incident",
            "/page/{file}": "a browser asks for it"}
 LONG = ("text/html", "x-pcapng", "/openapi.json")  # only their length is shown, and curl fails at a problem
-HEADING = {"reads": "Read", "writes": "Write", "points": "Points", "status": "Status", "probes": "Probes",
-           "pages": "Pages", "simulator": "Simulator"}
+HEADING = {"reads": "Read", "writes": "Write", "points": "Points", "status": "Status",
+           "configuration": "Configuration", "probes": "Probes", "pages": "Pages", "simulator": "Simulator"}
 
 
 def wrapped(text):
@@ -77,11 +77,14 @@ def example_of(content):
 def command(document, path, method, call, shortened):
     for one in map(document.at, call.get("parameters", [])):
         if one["in"] == "path":
-            path = path.replace("{" + one["name"] + "}", one["example"])
+            path = path.replace("{" + one["name"] + "}", str(one["example"]))
     words = ["curl -sf" if shortened else "curl -s", *([f"-X {method}"] if method != "GET" else [])]
+    words += [f"-H '{one['name']}: {one['example']}'" for one in map(document.at, call.get("parameters", []))
+              if one["in"] == "header" and one.get("required")]
     if "requestBody" in call:
-        [content] = call["requestBody"]["content"].values()
-        words.append(f"-d '{json.dumps(content['example'])}'")
+        [(kind, content)] = call["requestBody"]["content"].items()
+        words.append(f"-d '{json.dumps(content['example'])}'" if "example" in content
+                     else f"-H 'Content-Type: {kind}' --data-binary @panelgate.yaml")
     return " ".join([*words, DEMO + path])
 
 

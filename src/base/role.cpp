@@ -24,6 +24,7 @@ constexpr Role least_with(Right right) {
         case Right::simulator:
             return Role::engineer;
         case Right::reload:
+        case Right::configure:
             return Role::admin;
     }
     std::abort();
@@ -65,6 +66,8 @@ std::string_view label(Right right) {
             return "reload";
         case Right::acknowledge:
             return "acknowledge";
+        case Right::configure:
+            return "configure";
     }
     std::abort();
 }

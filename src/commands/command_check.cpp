@@ -126,11 +126,8 @@ void print_json(const std::string& file, const explain::Loaded& loaded, const Ju
     for (const std::string& warning : judged.warnings) warnings.emplace_back(warning);
     if (loaded.config && compared.loaded.config) {
         all["changes"] = to_json(explain::differences(*compared.loaded.config, *loaded.config));
-        json::array cuts;
-        for (const explain::Interruption& cut :
-             explain::interruptions(*compared.loaded.config, *loaded.config))
-            cuts.push_back(json::object{{"path", cut.path}, {"what", cut.what}});
-        all["interruptions"] = std::move(cuts);
+        all["interruptions"] =
+            to_json(explain::interruptions(*compared.loaded.config, *loaded.config));
     }
     json::array errors = errors_json(file, loaded.problems);
     for (json::value& error : errors_json(compared.file, compared.loaded.problems))

@@ -23,6 +23,7 @@
 #include "panelgate/base/time.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/explain/load.hpp"
+#include "panelgate/gateway/configuration_text.hpp"
 #include "panelgate/gateway/gateway.hpp"
 #include "panelgate/gateway/prepare.hpp"
 #include "panelgate/gateway/reloader.hpp"
@@ -166,6 +167,7 @@ struct Service {
     bool simulate = false;
     std::string file{};  ///< to read again on reload
     bool watch = false;  ///< reload as soon as the file has changed
+    std::string text{};  ///< of the configuration that is served first
 };
 
 void reload_file(gateway::Reloader& reloader, const std::string& cause) {
@@ -175,12 +177,13 @@ void reload_file(gateway::Reloader& reloader, const std::string& cause) {
 }
 
 /// Adapts the process to the configuration, and the configuration to the process.
-void fit(config::Config& config) {
+std::shared_ptr<const config::Config> fitted(config::Config config) {
     rt::set_up_log(config.log);
     for (const gateway::StartMessage& message : gateway::prepare(config))
         rt::log(rt::LogLevel::warn, message.event, {{"warning", message.text}});
     for (const std::string& refused : rt::be_punctual(config.realtime))
         rt::log(rt::LogLevel::warn, "not granted", {{"what", refused}});
+    return std::make_shared<const config::Config>(std::move(config));
 }
 
 std::string url_of(const config::Config& config, const gateway::Gateway& gateway) {
@@ -225,17 +228,18 @@ void stop(gateway::Gateway& gateway) {
 /// Runs the gateway until a signal ends it. `started` is called once it serves.
 ExitCode serve(config::Config config, const Service& service,
                const std::function<void(const gateway::Gateway&)>& started) {
-    fit(config);
-    auto shared = std::make_shared<const config::Config>(std::move(config));
+    auto shared = fitted(std::move(config));
     boost::asio::io_context io(1);
     rt::AsioClock clock(io.get_executor());
     const rt::LogDrain drain(clock, io.get_executor());
     rt::ServiceManager manager(clock);
     SignalLoop loop(io);
     gateway::Reloader reloader(io.get_executor(), clock, service.file);
+    gateway::MemoryKeeper keeper;
+    gateway::ConfigurationText text(io.get_executor(), reloader, keeper, service.text);
     const rt::Loop faces(kFacesNice);
     gateway::Gateway gateway({faces.get_executor(), io.get_executor()}, shared, service.simulate,
-                             &reloader);
+                             &reloader, &text);
     try {
         gateway.start();
     } catch (const std::runtime_error& error) {
@@ -312,19 +316,22 @@ ExitCode run(const std::string& file, bool simulate, bool watch) {
     }
     explain::Loaded loaded = explain::load_file(file);
     if (!loaded.config) return loaded.code;
-    return serve(std::move(*loaded.config), {simulate, file, watch}, log_dashboard);
+    return serve(std::move(*loaded.config), {simulate, file, watch, std::move(loaded.text)},
+                 log_dashboard);
 }
 
 ExitCode demo(const std::string& http, const std::string& modbus) {
-    explain::Loaded loaded = explain::load_text(shipped_demo().front().second, "demo.yaml");
+    const std::string_view text = shipped_demo().front().second;
+    explain::Loaded loaded = explain::load_text(text, "demo.yaml");
     if (!loaded.config) return loaded.code;
     config::Config& config = *loaded.config;
     if (!listen_on(http, *config.http) || !listen_on(modbus, config.modbus_tcp[0])) return kUsage;
     const config::Config shown = config;
-    return serve(std::move(config), {}, [&](const gateway::Gateway& gateway) {
-        log_dashboard(gateway);
-        print_demo_help(shown, gateway);
-    });
+    return serve(std::move(config), {.text = std::string(text)},
+                 [&](const gateway::Gateway& gateway) {
+                     log_dashboard(gateway);
+                     print_demo_help(shown, gateway);
+                 });
 }
 
 }  // namespace panelgate::commands

@@ -59,8 +59,8 @@ const Keys<OwnRole>& own_role_keys() {
                          return pattern + ")$";
                      }()},
                     "What it may do: read, write, broadcast, raw, discover, "
-                    "simulator, reload, acknowledge. A broadcast is also a write, and raw also a "
-                    "read or a write.");
+                    "simulator, reload, acknowledge, configure. A broadcast is also a write, and "
+                    "raw also a read or a write.");
     rights.required = true;
     static const auto kKeys =
         Keys<OwnRole>()

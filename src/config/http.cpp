@@ -213,7 +213,8 @@ const Keys<Token>& token_keys() {
             .value(
                 role_shape("role",
                            "viewer reads, operator writes, engineer also raw, broadcast, "
-                           "discover and simulator, admin also reload; or one of access.roles."),
+                           "discover and simulator, admin also reload and configure; or one of "
+                           "access.roles."),
                 [](Reader& in, Token& token) {
                     return read_role(in, "role", false, token.standing);
                 },
@@ -275,7 +276,7 @@ const Keys<web::Settings>& http_keys() {
                 role_shape("anonymous",
                            "Role without a token: none, viewer (reads), operator (reads and "
                            "writes), engineer (also raw, broadcast, discover, simulator), admin "
-                           "(also reload), or one of access.roles."),
+                           "(also reload, configure), or one of access.roles."),
                 [](Reader& in, Settings& http) {
                     return read_role(in, "anonymous", true, http.anonymous);
                 },

@@ -450,4 +450,11 @@ boost::json::array to_json(const std::vector<Change>& changes) {
     return made;
 }
 
+boost::json::array to_json(const std::vector<Interruption>& interruptions) {
+    boost::json::array made;
+    for (const Interruption& cut : interruptions)
+        made.push_back(boost::json::object{{"path", cut.path}, {"what", cut.what}});
+    return made;
+}
+
 }  // namespace panelgate::explain

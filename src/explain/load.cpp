@@ -6,6 +6,7 @@
 #include <iostream>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/yaml/document.hpp"
@@ -46,11 +47,13 @@ std::optional<std::string> environment(const std::string& name) {
 std::string path_of(const std::string& typed) { return typed == "-" ? "/dev/stdin" : typed; }
 
 Loaded read_file(const std::string& path) {
-    const auto text = config::RealFiles::read_any(path);
+    auto text = config::RealFiles::read_any(path);
     if (!text) {
         return {std::nullopt, kNoInput, {{path, {0, 0}, kCannotRead + why_unread(errno)}}, {}};
     }
-    return read_text(*text, path);
+    Loaded loaded = read_text(*text, path);
+    loaded.text = std::move(*text);
+    return loaded;
 }
 
 Loaded read_text(std::string_view text, const std::string& name) {

@@ -55,7 +55,9 @@ void AuditBook::deed(const web::Deed& deed) {
     const bool discovers = deed.path.ends_with("/discover");
     const bool simulates = deed.path.find("/simulator/") != deed.path.npos;
     Members details;
-    if (deed.status < 400 && (discovers || simulates)) {
+    if (deed.path.starts_with("/api/v1/configuration/") && !lacks_right) {
+        record_text(deed);
+    } else if (deed.status < 400 && (discovers || simulates)) {
         Members record = audit::record_of(discovers ? "discovery" : "simulator", rt::wall_now());
         add_who(record, deed.who);
         audit::add(record, place_of(deed));
@@ -66,7 +68,7 @@ void AuditBook::deed(const web::Deed& deed) {
     } else if (lacks_right && deed.status != 403 && deed.shown_token) {
         add_text(details, "path", deed.path);
         add_text(details, "why", text_in(deed.answer, "detail"));
-        record_refusal("login", deed.who, {{"outcome", "failed"}}, details);
+        record_or_count("login", deed.who, {{"outcome", "failed"}}, details);
     } else if (!is_told && !is_reload &&
                (lacks_right || deed.status == 409 || deed.status == 422)) {
         Members what = place_of(deed);
@@ -77,17 +79,30 @@ void AuditBook::deed(const web::Deed& deed) {
         what["status"] = deed.status;
         add_text(details, "body", deed.body);
         add_text(details, "why", text_in(deed.answer, "detail"));
-        record_refusal("refusal", deed.who, what, details);
+        record_or_count("refusal", deed.who, what, details);
     }
+}
+
+/// A call about the configuration's text, without the text.
+void AuditBook::record_text(const web::Deed& deed) {
+    Members what;
+    add_text(what, "method", deed.method);
+    add_text(what, "path", deed.path);
+    what["outcome"] = deed.status < 400 ? "done" : "refused";
+    what["status"] = deed.status;
+    Members details;
+    add_text(details, "why", text_in(deed.answer, "detail"));
+    record_or_count("configuration", deed.who, what, details);
 }
 
 audit::Members AuditBook::place_of(const web::Deed& deed) const {
     return snapshot_ ? members_of(asked_place(snapshot_->plant, deed.path, deed.body)) : Members();
 }
 
-/// Records a refusal before a bus, or counts it where the client repeats `what`.
-void AuditBook::record_refusal(std::string_view kind, const WhoRef& who, const Members& what,
-                               const Members& details) {
+/// Records what a client did or was refused before a bus, or counts it where the client repeats
+/// `what`.
+void AuditBook::record_or_count(std::string_view kind, const WhoRef& who, const Members& what,
+                                const Members& details) {
     if (is_repeat(who, kind, what)) return;
     Members record = audit::record_of(kind, rt::wall_now());
     add_who(record, who);
@@ -110,7 +125,7 @@ std::function<void(const TopicRefusal&)> AuditBook::topic_refusals() {
         add_text(what, "path", refusal.topic);
         what["outcome"] = "refused";
         what["status"] = refusal.why.status;
-        record_refusal("refusal", refusal.who, what, {{"why", refusal.why.detail}});
+        record_or_count("refusal", refusal.who, what, {{"why", refusal.why.detail}});
     };
 }
 
@@ -118,10 +133,10 @@ std::function<void(const WhoRef&, std::uint8_t, ByteView)> AuditBook::stray_writ
     return
         [this, life = std::weak_ptr(alive_)](const WhoRef& who, std::uint8_t unit, ByteView pdu) {
             if (life.expired() || !is_heard() || pdu.empty()) return;
-            record_refusal("refusal", who,
-                           {{"unit", unit}, {"function", pdu[0]}, {"outcome", "refused"}},
-                           {{"pdu", to_hex(pdu, "")},
-                            {"why", "the unit leads to no station that can be written"}});
+            record_or_count("refusal", who,
+                            {{"unit", unit}, {"function", pdu[0]}, {"outcome", "refused"}},
+                            {{"pdu", to_hex(pdu, "")},
+                             {"why", "the unit leads to no station that can be written"}});
         };
 }
 

@@ -82,11 +82,12 @@ std::shared_ptr<const web::Directory> directory_in(const std::shared_ptr<Snapsho
 }  // namespace
 
 Gateway::Gateway(web::Loops loops, std::shared_ptr<const config::Config> config, bool simulate,
-                 Reloader* reloads)
+                 Reloader* reloads, web::TextSource* text)
     : loops_(std::move(loops)),
       clock_(loops_.plant),
       simulate_(simulate),
       reloads_(reloads),
+      text_(text),
       events_(std::make_shared<web::EventHub>(new_epoch()), loops_.faces),
       servers_(loops_, clock_, audit_.stray_writes()),
       northbound_(loops_, clock_, audit_.topic_refusals()) {
@@ -353,6 +354,7 @@ web::Providers Gateway::providers() {
     providers.discovery = discoveries_.get();
     providers.alarms = &alarms_;
     providers.reload = reloads_;
+    providers.text = text_;
     providers.record = audit_.deeds();
     providers.ask_store = [this](std::function<void(const store::Database*)> read,
                                  std::function<void()> done) {

@@ -14,6 +14,7 @@
 #include "panelgate/gateway/gateway.hpp"
 #include "panelgate/gateway/prepare.hpp"
 #include "panelgate/gateway/servers.hpp"
+#include "panelgate/gateway/text_file.hpp"
 #include "panelgate/rt/log.hpp"
 
 namespace panelgate::gateway {
@@ -120,6 +121,8 @@ struct Reloader::Job {
     std::vector<ServedCertificate> certificates;     ///< in use
     std::shared_ptr<const config::Config> next;      ///< null: there is none
     web::SharedText shown;
+    std::string text;       ///< of the file
+    std::string read_only;  ///< why the file cannot be written
     web::ReloadVerdict verdict;
     std::atomic<bool> is_late = false;  ///< nobody waits for it any more
 
@@ -166,6 +169,8 @@ void Reloader::Job::read() try {
         }
     } else {
         explain::Loaded loaded = explain::read_file(file);
+        text = std::move(loaded.text);
+        read_only = why_read_only(file);
         for (const yaml::Problem& problem : loaded.problems)
             verdict.faults.push_back(fault_of(problem));
         if (!loaded.config) {
@@ -218,7 +223,18 @@ Reloader::Reloader(boost::asio::any_io_executor executor, rt::Clock& clock, std:
       file_(std::move(file)),
       worker_(std::move(executor)) {
     counters_.last_success_unix = unix_now();
+    read_only_ = no_file();
+    if (read_only_.empty()) read_only_ = why_read_only(file_);
 }
+
+std::string Reloader::no_file() const {
+    if (file_.empty()) return "this gateway runs the built-in demo, which is no file";
+    if (file_ == "-")
+        return "the configuration was read from standard input, which is read only once";
+    return {};
+}
+
+std::shared_ptr<const config::Config> Reloader::running() const { return gateway_->config(); }
 
 void Reloader::serve(Gateway& gateway) { gateway_ = &gateway; }
 
@@ -227,10 +243,7 @@ std::string Reloader::barred(bool rollback) const {
     if (waiting_.size() >= kWaiting) return "too many wait for a reload; try again";
     if (rollback)
         return before_ ? "" : "nothing else has run since the start, so there is no way back";
-    if (file_.empty()) return "this gateway runs the built-in demo, which is no file";
-    if (file_ == "-")
-        return "the configuration was read from standard input, which is read only once";
-    return {};
+    return no_file();
 }
 
 void Reloader::reload(web::ReloadWish wish, std::string cause, Handler handler) {
@@ -279,6 +292,7 @@ void Reloader::give_up() {
 
 /// Runs in one turn of the loop.
 void Reloader::apply(const std::shared_ptr<Job>& job) {
+    if (!job->rollback) read_only_ = job->read_only;
     if (stopping_) {
         job->verdict.outcome = ReloadOutcome::failed;
         job->verdict.why = kStopping;
@@ -306,6 +320,7 @@ void Reloader::end(web::ReloadVerdict& verdict) {
     if (good) counters_.last_success_unix = unix_now();
     log_verdict(verdict);
     gateway_->record(verdict);
+    if (good && !job->rollback && ran_) ran_(job->text, verdict.cause);
     last_ = std::make_shared<const web::ReloadVerdict>(std::move(verdict));
     if (step_) step_(false);
     for (Waiting& one : std::exchange(served_, {})) one.handler(last_);

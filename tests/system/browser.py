@@ -18,7 +18,7 @@ except ImportError:
 
 SCREENSHOTS = harness.ROOT / "build/screenshots"
 WIDE, NARROW = (1280, 900), (390, 844)
-VIEWS = ("", "scope", "latency", "points", "relays", "clients", "request", "discovery", "settings", "station/press")
+VIEWS = ("", "scope", "latency", "points", "relays", "clients", "request", "discovery", "text", "settings", "station/press")
 
 
 def missing():

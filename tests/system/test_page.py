@@ -288,7 +288,7 @@ class Looks(Browser):
     def settle(self, view):
         self.open(view)
         ready = {"scope": "canvas.scope[data-frames]", "latency": ".plot canvas", "points": "tr[data-point='oven/temperature'] .spark",
-                 "relays": "tbody tr", "clients": "tbody tr", "station/press": ".plot canvas"}
+                 "relays": "tbody tr", "text": "#plan li", "clients": "tbody tr", "station/press": ".plot canvas"}
         self.wait(lambda: self.all(ready.get(view, "h1")))
         if view == "points":
             self.find('tr[data-point="oven/temperature"] button').click()

@@ -16,7 +16,7 @@ enum class Role : std::uint8_t {
     viewer,     ///< reads
     operator_,  ///< writes, acknowledges alarms
     engineer,   ///< raw requests, broadcasts, discoveries, simulated faults
-    admin,      ///< reload and rollback
+    admin,      ///< reload and rollback, and the text of the configuration
 };
 /// Returns its name in the configuration.
 std::string_view label(Role role);
@@ -31,26 +31,27 @@ enum class Right : std::uint8_t {
     simulator,
     reload,       ///< and rollback
     acknowledge,  ///< alarms
+    configure,    ///< read, judge and write the configuration's text, which includes all else
 };
-inline constexpr std::array kAllRights{Right::read,   Right::write,      Right::broadcast,
-                                       Right::raw,    Right::discover,   Right::simulator,
-                                       Right::reload, Right::acknowledge};
+inline constexpr std::array kAllRights{Right::read,   Right::write,       Right::broadcast,
+                                       Right::raw,    Right::discover,    Right::simulator,
+                                       Right::reload, Right::acknowledge, Right::configure};
 /// Returns its name in the configuration.
 std::string_view label(Right right);
 
 /// A set of them.
 class Rights {
   public:
-    constexpr void add(Right right) { bits_ = static_cast<std::uint8_t>(bits_ | bit(right)); }
+    constexpr void add(Right right) { bits_ = static_cast<std::uint16_t>(bits_ | bit(right)); }
     constexpr bool has(Right right) const { return (bits_ & bit(right)) != 0; }
     constexpr bool empty() const { return bits_ == 0; }
     friend bool operator==(const Rights&, const Rights&) = default;
 
   private:
-    static constexpr std::uint8_t bit(Right right) {
-        return static_cast<std::uint8_t>(1U << static_cast<unsigned>(right));
+    static constexpr std::uint16_t bit(Right right) {
+        return static_cast<std::uint16_t>(1U << static_cast<unsigned>(right));
     }
-    std::uint8_t bits_ = 0;
+    std::uint16_t bits_ = 0;
 };
 
 /// A role of the configuration, besides the default ones.

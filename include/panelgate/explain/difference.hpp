@@ -56,6 +56,9 @@ struct Interruption {
 /// it. Pure.
 std::vector<Interruption> interruptions(const config::Config& before, const config::Config& after);
 
+/// {"path", "what"} each.
+boost::json::array to_json(const std::vector<Interruption>& interruptions);
+
 /// Units of a listener or serial master by which a client would now reach another panel: the line
 /// of their station was taken away, its id or its alias has changed, stations are swapped. One
 /// sentence each. Units that reach nobody now are not listed, nor a panel that only has another

@@ -39,6 +39,7 @@ struct Loaded {
     /// 0).
     std::vector<yaml::Problem> problems;
     std::string error_text;  ///< the same as text for stderr; empty for an unreadable file
+    std::string text = {};   ///< of a file, as it was read
 };
 
 /// The path to read; `-` is standard input.

@@ -96,8 +96,9 @@ class AuditBook {
     void wait_for_repeats();
     void add_before(Members& record, const Station& station, const modbus::Span& items) const;
     Members place_of(const web::Deed& deed) const;
-    void record_refusal(std::string_view kind, const WhoRef& who, const Members& what,
-                        const Members& details);
+    void record_text(const web::Deed& deed);
+    void record_or_count(std::string_view kind, const WhoRef& who, const Members& what,
+                         const Members& details);
     void record_token(const web::Token& token, std::string_view event);
     void tell(const audit::Notice& notice) const;
 

@@ -39,9 +39,10 @@ class Reloader;
 /// brings a new one. An object of the plant's loop.
 class Gateway {
   public:
-    /// `reloads` serves the reload requests of REST and outlives this, as both loops do.
+    /// `reloads` serves the reload requests of REST, `text` those about the configuration's text.
+    /// Both outlive this, as both loops do.
     Gateway(web::Loops loops, std::shared_ptr<const config::Config> config, bool simulate,
-            Reloader* reloads);
+            Reloader* reloads, web::TextSource* text = nullptr);
     ~Gateway();
     Gateway(const Gateway&) = delete;
     Gateway& operator=(const Gateway&) = delete;
@@ -110,6 +111,7 @@ class Gateway {
     explain::Doors doors_;  ///< lines ask it until they are destroyed
     bool simulate_;
     Reloader* reloads_;
+    web::TextSource* text_;
     web::EventOutlet events_;  ///< buses publish by it until they are destroyed
     /// The current snapshot, never null.
     std::shared_ptr<Snapshot> snapshot_;

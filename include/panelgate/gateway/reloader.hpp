@@ -65,6 +65,10 @@ class Reloader final : public web::ReloadSource {
     void serve(Gateway& gateway);
     /// `step` is called at the beginning of each reload, and at its end.
     void on_step(std::function<void(bool begins)> step) { step_ = std::move(step); }
+    /// `ran` is called with each text that is served from now on, and who caused that.
+    void on_ran(std::function<void(const std::string& text, const std::string& cause)> ran) {
+        ran_ = std::move(ran);
+    }
 
     /// The program ends: a running reload is not applied, and no other one starts.
     void stop() { stopping_ = true; }
@@ -74,6 +78,11 @@ class Reloader final : public web::ReloadSource {
     std::shared_ptr<const web::ReloadVerdict> last() const override { return last_; }
     const config::ReloadCounters& counters() const { return counters_; }
     const std::string& file() const { return file_; }
+    /// Why there is no file to be read; empty: there is.
+    std::string no_file() const;
+    /// Why the file could not be written when it was read last; empty: it could.
+    const std::string& read_only() const { return read_only_; }
+    std::shared_ptr<const config::Config> running() const;
 
   private:
     struct Job;
@@ -97,6 +106,8 @@ class Reloader final : public web::ReloadSource {
     std::vector<Waiting> waiting_;
     std::vector<Waiting> served_;  ///< by the running reload
     std::function<void(bool)> step_;
+    std::function<void(const std::string&, const std::string&)> ran_;
+    std::string read_only_;
     bool stopping_ = false;
     std::shared_ptr<const web::ReloadVerdict> last_;
     config::ReloadCounters counters_;

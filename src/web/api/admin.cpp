@@ -126,11 +126,20 @@ json::array rights_list(const Who& who) {
     return list;
 }
 
+/// For who may write the text: whether and why not.
+std::string text_state(const Api& api, const Who& who) {
+    if (api.providers.text == nullptr || !who.standing.may(Right::configure)) return {};
+    const std::string why = api.providers.text->read_only();
+    json::object text{{"writable", why.empty()}};
+    if (!why.empty()) text["why"] = why;
+    return ",\"text\":" + json_text(text);
+}
+
 std::string configuration_text(const Api& api, const Who& who, const std::string& configuration) {
     return "{\"version\":" + json_text(boost::json::value(api.providers.version)) +
            ",\"role\":" + json_text(boost::json::value(who.standing.name())) +
-           ",\"rights\":" + json_text(rights_list(who)) + ",\"configuration\":" + configuration +
-           ",\"rest\":" + json_text(offered()) + "}\n";
+           ",\"rights\":" + json_text(rights_list(who)) + text_state(api, who) +
+           ",\"configuration\":" + configuration + ",\"rest\":" + json_text(offered()) + "}\n";
 }
 
 /// The configuration of the stations that may be seen. "whole": traces of the line may be, too.

@@ -68,6 +68,15 @@ constexpr Row kRows[] = {
     {"GET", "/metrics", get_metrics, kSee},
     {"GET", "/api/v1/version", get_version, kSee},
     {"GET", "/api/v1/configuration", get_configuration, kSee},
+    {"GET", "/api/v1/configuration/text", get_configuration_text, kAdmin},
+    {"PUT", "/api/v1/configuration/text", put_configuration_text, kAdmin},
+    {"POST", "/api/v1/configuration/check", post_configuration_check, kAdmin},
+    {"POST", "/api/v1/configuration/insert", post_configuration_insert, kAdmin},
+    {"GET", "/api/v1/configuration/versions", get_configuration_versions, kAdmin},
+    {"GET", "/api/v1/configuration/versions/{}", get_configuration_version, kAdmin},
+    {"GET", "/api/v1/configuration/schema", get_configuration_schema, kAdmin},
+    {"POST", "/api/v1/configuration/rollback", post_configuration_rollback, kAdmin, kShowsNone,
+     kOnce},
     {"GET", "/api/v1/reload", get_reload, kSee},
     {"POST", "/api/v1/reload", post_reload, kAdmin, kShowsNone, kOnce, "rollback weaker"},
     {"GET", "/api/v1/lines", get_lines, kSee, kShowsNone, kTagged},
@@ -117,8 +126,11 @@ constexpr Row kRows[] = {
     {"PUT", "/api/v1/stations/{}/{}/{}", put_table, kChange, kShowsNone, kWrites},
 };
 
+bool configures(const Row& row) { return row.pattern.starts_with("/api/v1/configuration/"); }
+
 /// The right that a role of the configuration needs for the route.
 Right right_for(const Row& row) {
+    if (configures(row)) return Right::configure;
     if (row.needed == kSee) return Right::read;
     if (row.pattern.ends_with("/acknowledge")) return Right::acknowledge;
     if (row.needed == kChange) return Right::write;
@@ -257,7 +269,8 @@ std::vector<Route> routes(std::shared_ptr<const Api> api) {
         };
         const bool face = std::ranges::find(kOfFaces, row.handler) != std::end(kOfFaces);
         made.push_back({row.verb, row.pattern, row.needed, call, words_of(row.queries), row.probe,
-                        face, row.handler == get_metrics, right_for(row), other_right_for(row)});
+                        face, row.handler == get_metrics, right_for(row), other_right_for(row),
+                        configures(row)});
     }
     return made;
 }

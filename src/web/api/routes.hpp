@@ -83,6 +83,15 @@ Handling get_usage(HttpRequest request, const Api* api);
 Handling get_reload(HttpRequest request, const Api* api);
 Handling post_reload(HttpRequest request, const Api* api);
 
+Handling get_configuration_text(HttpRequest request, const Api* api);
+Handling put_configuration_text(HttpRequest request, const Api* api);
+Handling post_configuration_check(HttpRequest request, const Api* api);
+Handling post_configuration_insert(HttpRequest request, const Api* api);
+Handling get_configuration_versions(HttpRequest request, const Api* api);
+Handling get_configuration_version(HttpRequest request, const Api* api);
+Handling get_configuration_schema(HttpRequest request, const Api* api);
+Handling post_configuration_rollback(HttpRequest request, const Api* api);
+
 Handling get_simulated(HttpRequest request, const Api* api);
 Handling put_simulated(HttpRequest request, const Api* api);
 

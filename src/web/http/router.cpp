@@ -115,18 +115,18 @@ Problem unauthorized(std::string detail) {
     return made;
 }
 
-/// Media types are case-insensitive (RFC 9110 8.3.1).
-bool is_json(std::string_view content_type) {
+/// True for a type that no form can send. Media types are case-insensitive (RFC 9110 8.3.1).
+bool is_of_script(std::string_view content_type) {
     std::string_view type = content_type.substr(0, content_type.find(';'));
     while (type.ends_with(' ') || type.ends_with('\t')) type.remove_suffix(1);
-    return to_lower(type) == "application/json";
+    return to_lower(type) == "application/json" || to_lower(type) == "text/yaml";
 }
 
 /// True for what a form of any site could send. Forms have no DELETE.
 bool is_foreign_form(const HttpRequest& request) {
     if (request.method == "GET" || request.method == "HEAD" || request.method == "DELETE")
         return false;
-    return !header(request, "origin").empty() && !is_json(header(request, "content-type"));
+    return !header(request, "origin").empty() && !is_of_script(header(request, "content-type"));
 }
 
 /// A default role has the rights of the least role that is needed; a role of the configuration has
@@ -363,9 +363,10 @@ class Witness {
   public:
     using Record = std::function<void(const Deed&)>;
 
-    Witness(const HttpRequest& request, Record record)
+    /// `told`: recorded whatever it does.
+    Witness(const HttpRequest& request, Record record, bool told = false)
         : record_(std::move(record)),
-          changes_(request.method != "GET" && request.method != "HEAD"),
+          changes_(told || (request.method != "GET" && request.method != "HEAD")),
           who_(request.caller->who()) {
         if (!record_) return;
         method_ = request.method;
@@ -392,8 +393,9 @@ class Witness {
 };
 
 /// Carries out a request, and records what it has changed. Of the plant's loop.
-Handling witnessed(HttpRequest request, Crossing::Handler handler, Witness::Record record) {
-    const Witness witness(request, std::move(record));
+Handling witnessed(HttpRequest request, Crossing::Handler handler, Witness::Record record,
+                   bool told) {
+    const Witness witness(request, std::move(record), told);
     Handling handling = handler(std::move(request));
     HttpResponse response = co_await std::move(handling);
     witness.record(response);
@@ -412,13 +414,12 @@ void take_figures(const std::shared_ptr<const Site>& site, const Shared& shared)
 Handling carry_out(HttpRequest request, const Route* route, Shared* shared) {
     const std::shared_ptr<const Site> site = shared->site;
     if (route->face || !site->crossing)
-        return witnessed(std::move(request), route->handler, site->record);
+        return witnessed(std::move(request), route->handler, site->record, route->configures);
     if (route->figures) take_figures(site, *shared);
     return site->crossing->ask(
         std::move(request),
-        [handler = route->handler, record = site->record](HttpRequest asked) {
-            return witnessed(std::move(asked), handler, record);
-        },
+        [handler = route->handler, record = site->record, told = route->configures](
+            HttpRequest asked) { return witnessed(std::move(asked), handler, record, told); },
         route->probe);
 }
 
@@ -435,6 +436,13 @@ void record_refusal(const HttpRequest& request, const HttpResponse& response, co
 }
 
 }  // namespace
+
+std::size_t longest_body(HttpRequest head, Shared& shared) {
+    const Route* route = find_route(head, shared.site->routes).route;
+    if (shared.site->wall) head.at = shared.site->wall();
+    const bool may = route != nullptr && route->configures && !admit(head, *route, shared);
+    return may ? kLongBody : shared.site->settings.max_body;
+}
 
 Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> barred) {
     const std::shared_ptr<const Site> site = shared->site;

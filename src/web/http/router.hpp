@@ -34,6 +34,9 @@ std::string token_name(const HttpRequest& request, const Settings& settings);
 /// How long the token of this name ("": none) still counts, at most `most`; zero: it has expired.
 Duration time_of_token(const std::string& name, const Site& site, Duration most);
 
+/// Bytes that the body of a request with this head may have. Counts a wrong token.
+std::size_t longest_body(HttpRequest head, Shared& shared);
+
 /// Calls the route's handler if the request may use it. 404 for an unknown path, 405 with Allow for
 /// a method the path lacks. HEAD is answered like GET; the sender omits the body. `barred`, if set,
 /// is the reply to everything but probes. `shared` must outlive it; the site, only until the caller

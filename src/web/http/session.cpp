@@ -238,7 +238,7 @@ void HttpSession::send_interim() { stream_.write_aside(asio::buffer(kContinue));
 asio::awaitable<boost::system::error_code> HttpSession::receive() {
     parser_.emplace();
     parser_->header_limit(kHeaderLimit);
-    parser_->body_limit(shared_->site->settings.max_body);
+    parser_->body_limit(kLongBody);
     ErrorCode error;
     if (buffer_.size() == 0) {
         const Settings& settings = shared_->site->settings;
@@ -257,11 +257,26 @@ asio::awaitable<boost::system::error_code> HttpSession::receive() {
                                      asio::redirect_error(asio::use_awaitable, error));
     if (!error && !has_sound_framing(parser_->get())) error = http::error::bad_transfer_encoding;
     if (error || parser_->is_done()) co_return error;
+    if (!limit_body()) co_return http::error::body_limit;
     // Beast would merge the trailer, whose fields must not count (RFC 9110 6.5.1).
     http::request_header<> head = parser_->get().base();
     error = co_await receive_body();
     parser_->get().base() = std::move(head);
     co_return error;
+}
+
+/// False for a body that is too long. A long one is waited for only of who may send it.
+bool HttpSession::limit_body() {
+    std::size_t most = shared_->site->settings.max_body;
+    const std::uint64_t length = parser_->content_length().value_or(0);
+    auto target = length > most ? target_of(parser_->get()) : std::nullopt;
+    if (target) {
+        HttpRequest head = to_request(BeastRequest(parser_->get()), std::move(*target), {});
+        head.caller = caller_;
+        most = longest_body(std::move(head), *shared_);
+    }
+    parser_->body_limit(most);
+    return length <= most;
 }
 
 /// True, and logged, for the first bytes of a TLS handshake.

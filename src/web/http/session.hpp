@@ -91,6 +91,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     boost::asio::awaitable<ErrorCode> receive();
     bool speaks_tls() const;
     std::string head_of_events(const HttpResponse& response) const;
+    bool limit_body();
     boost::asio::awaitable<ErrorCode> receive_body();
     boost::asio::awaitable<bool> serve_one();
     boost::asio::awaitable<HttpResponse> answer(BeastRequest message);

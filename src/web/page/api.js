@@ -4,7 +4,7 @@ import {EventText} from './event_text.js';
 let token = null;
 try { token = sessionStorage.getItem('panelgate.token'); } catch { /* private window */ }
 
-export const gateway = {configuration: null, role: 'viewer', rights: ['read']};
+export const gateway = {configuration: null, role: 'viewer', rights: ['read'], text: {writable: false}};
 
 /** An answer that is none: RFC 9457 with its members, or a gateway that does not answer. */
 export class Refused extends Error {
@@ -73,6 +73,17 @@ export const post = (path, body) => ask('POST', path, body, patience());
 /** An answer as a file, for a link carries no token. */
 export const getFile = (target, accept) => send(target, accept ? {headers: {Accept: accept}} : {}, (response) => response.ok ? response.blob() : parsedOf(response), LONG);
 
+/** A text, and the ETag that names it. */
+export function getText(target) {
+    return send(target, {}, async (response) => response.ok ? {text: await response.text(), etag: response.headers.get('ETag')} : parsedOf(response));
+}
+
+/** Sends a text; what is answered, and the ETag of that. The check of a long one takes a while. */
+export function sendText(method, target, body, headers = {}) {
+    return send(target, {method, body, headers: {'Content-Type': 'text/yaml', ...headers}},
+        async (response) => ({...await parsedOf(response), etag: response.headers.get('ETag')}), LONG);
+}
+
 /**
  * Server-sent events: told(type, data) for each, ended() when there are no more; close() ends them
  * without a word. EventSource would not do, for it carries no token.
@@ -107,13 +118,16 @@ export const seesWhole = (line) => gateway.configuration?.lines.find((one) => on
 const may = (right) => gateway.rights.includes(right);
 export const mayWrite = () => may('write');
 export const mayAcknowledge = () => may('acknowledge');
+/** May change the text of the configuration. */
+export const mayConfigure = () => may('configure') && offers('PUT /api/v1/configuration/text');
 export const mayDiscover = () => may('discover');
 /** May set faults of simulated panels. */
 export const maySimulate = () => may('simulator');
 
 /** Learns what is configured, and what we may do. */
 export async function introduce() {
-    const {configuration, rest, rights, role, version} = await get(path('configuration'));
+    const {configuration, rest, rights, role, text, version} = await get(path('configuration'));
+    gateway.text = text ?? {writable: false};
     gateway.configuration = {...configuration, rest, version};
     gateway.role = role;
     gateway.rights = rights;

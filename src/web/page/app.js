@@ -1,8 +1,9 @@
 // The page: what is shown where, in which language and theme.
 import {alarms, alarmsView} from './alarms.js';
-import {forgetToken, gateway, hasToken, introduce, offers} from './api.js';
+import {forgetToken, gateway, hasToken, introduce, mayConfigure, offers} from './api.js';
 import {attribute, choice, h, replace, text} from './dom.js';
 import {clockTime, language, languages, store, stored, t, zone} from './language.js';
+import {configurationView} from './configuration.js';
 import {discoveryView} from './discovery.js';
 import {helpLink} from './help.js';
 import {historyView} from './history.js';
@@ -19,14 +20,15 @@ import {stationView} from './station.js';
 import {roleButton, signIn} from './token.js';
 
 const VIEWS = {'': overviewView, alarms: alarmsView, journal: journalView, history: historyView, scope: scopeView, latency: latencyView, points: pointsView, relays: relaysView,
-    clients: clientsView, request: requestView, discovery: discoveryView, settings: settingsView, station: stationView};
+    clients: clientsView, request: requestView, discovery: discoveryView, text: configurationView, settings: settingsView, station: stationView};
 const NAMED = {'': 'overview', alarms: 'alarms', journal: 'journal', history: 'history', scope: 'scope', latency: 'latency', points: 'points', relays: 'relays', clients: 'clients',
-    request: 'request', discovery: 'discovery', settings: 'settings'};
+    request: 'request', discovery: 'discovery', text: 'text', settings: 'settings'};
 /** Sections of the manual's page on this page: what the view is called in English. */
-const EXPLAINED = {...NAMED, '': 'overview', journal: 'events', scope: 'bus-scope', settings: 'configuration', station: 'a-station'};
-/** Views that a gateway may not have the paths for. */
-const NEEDS = {alarms: 'GET /api/v1/alarms', journal: 'GET /api/v1/journal', history: 'GET /api/v1/journal',
-    discovery: 'POST /api/v1/lines/{}/discover'};
+const EXPLAINED = {...NAMED, '': 'overview', journal: 'events', scope: 'bus-scope', text: 'the-configuration-file', settings: 'configuration', station: 'a-station'};
+/** Views that not everybody has: the gateway may lack the paths, and who looks the right. */
+const NEEDS = {alarms: () => offers('GET /api/v1/alarms'), journal: () => offers('GET /api/v1/journal'), history: () => offers('GET /api/v1/journal'),
+    discovery: () => offers('POST /api/v1/lines/{}/discover'), text: mayConfigure};
+const has = (name) => VIEWS[name] && (NEEDS[name]?.() ?? true);
 const THEMES = ['auto', 'light', 'dark'];
 
 const main = document.getElementById('main');
@@ -49,11 +51,14 @@ function tools(...who) {
         choice(t('theme'), THEMES.map((name) => [name, t('theme.' + name)]), stored('theme') ?? 'auto', theme), help.node);
 }
 
+function link() {
+    replace(document.getElementById('nav'), Object.entries(NAMED).filter(([name]) => has(name)).map(([name, key]) =>
+        h('a', {href: `#/${name}`, 'data-view': name}, t('nav.' + key))));
+}
+
 function build() {
     const nav = document.getElementById('nav');
-    const links = Object.entries(NAMED).filter(([name]) => !NEEDS[name] || offers(NEEDS[name])).map(([name, key]) =>
-        h('a', {href: `#/${name}`, 'data-view': name}, t('nav.' + key)));
-    replace(nav, links);
+    link();
     const menu = document.getElementById('menu');
     menu.addEventListener('click', () => open(nav.hidden || !nav.classList.contains('open')));
     const open = (yes) => {
@@ -87,7 +92,7 @@ function warn() {
 
 function show() {
     const [, name = '', ...parts] = location.hash.split('/');
-    const view = VIEWS[name] ? name : '';
+    const view = has(name) ? name : '';
     const [argument, detail] = parts.map((part) => part === '' ? undefined : decodeURIComponent(part));
     shown?.stop?.();
     shown = VIEWS[view]({argument, detail});
@@ -149,7 +154,7 @@ async function start() {
     alarms.addEventListener('change', entitle);
     alarms.start();
     window.addEventListener('hashchange', () => { show(); main.focus(); });
-    document.addEventListener('role', show);
+    document.addEventListener('role', () => { link(); show(); });
     show();
     performance.mark('shown');
 }

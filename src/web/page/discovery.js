@@ -1,5 +1,6 @@
 // Looks for stations that nobody has listed, on a line that runs.
-import {gateway, get, mayDiscover, path, post, remove} from './api.js';
+import {gateway, get, mayConfigure, mayDiscover, path, post, remove} from './api.js';
+import {insert} from './configuration_draft.js';
 import {refusal} from './confirm.js';
 import {choice, h, replace, table, text} from './dom.js';
 import {duration, t} from './language.js';
@@ -82,6 +83,14 @@ class Discovery {
         this.start.disabled = false;
     }
 
+    /** Puts a station into the text of the configuration, and shows it there. */
+    #adder({id, profiles: [profile]}) {
+        if (!mayConfigure()) return null;
+        const item = {id, name: `${this.line}-${id}`, ...profile && {profile}};
+        const add = () => insert(`lines/${this.line}/stations`, item).catch((error) => replace(this.result, refusal(error)));
+        return h('td', null, h('button', {type: 'button', class: 'add', onclick: add}, t('text.add.station')));
+    }
+
     #show(report) {
         if (report.state === 'never') return text(this.said, t('discovery.never'));
         this.#goes(report);
@@ -89,9 +98,9 @@ class Discovery {
         if (report.state === 'running') return null;
         this.progress.hidden = true;
         if (report.stations.length === 0) return replace(this.result, h('p', {class: 'empty'}, t('discovery.none')));
-        const shown = table(t('nav.discovery'), [[t('id'), 'number'], [t('profile')], [t('discovery.evidence')]]);
+        const shown = table(t('nav.discovery'), [[t('id'), 'number'], [t('profile')], [t('discovery.evidence')], ...mayConfigure() ? [['']] : []]);
         shown.body.append(...report.stations.map((one) => h('tr', null, h('td', {class: 'number'}, String(one.id)),
-            h('td', null, one.profiles.join(', ') || t('no.profile')), h('td', {lang: 'en'}, [one.evidence].flat().join('; ')))));
+            h('td', null, one.profiles.join(', ') || t('no.profile')), h('td', {lang: 'en'}, [one.evidence].flat().join('; ')), this.#adder(one))));
         return replace(this.result, shown.node, h('section', {class: 'card'}, h('h2', null, t('discovery.paste')),
             h('pre', {class: 'yaml', tabindex: 0, 'aria-label': 'YAML', role: 'region'}, report.yaml)));
     }

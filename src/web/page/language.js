@@ -1,9 +1,10 @@
 // The language of the page, from the one table of words.
+import {words as texts} from './configuration_words.js';
 import {words as day} from './day_words.js';
 import {words as findings} from './finding_words.js';
 import {words as others} from './words.js';
 
-const words = {...others, ...findings, ...day};
+const words = {...others, ...findings, ...day, ...texts};
 
 export const languages = [['en', 'English'], ['de', 'Deutsch'], ['ko', '한국어'], ['ja', '日本語']];
 const column = Object.fromEntries(languages.map(([name], index) => [name, index]));

@@ -1,5 +1,6 @@
 // The request box: any notation of any panel. Shows the frame before it goes, and explains the answer.
-import {costOf, get, getFromPanel, mayWrite, offers, path} from './api.js';
+import {costOf, get, getFromPanel, mayConfigure, mayWrite, offers, path} from './api.js';
+import {insert} from './configuration_draft.js';
 import {choice, h, replace, table} from './dom.js';
 import {confirmMemory, planView, refusal} from './confirm.js';
 import {notations} from './frame_view.js';
@@ -115,7 +116,16 @@ class Box {
             h('td', {class: 'number mono'}, typeof value === 'number' && value >= 0 ? value.toString(16).toUpperCase().padStart(4, '0') : ''))));
         const source = body.source === 'cache' ? t('from.cache', {age: duration(body.age_ms)}) : t('from.bus', {took: duration(took)});
         return h('div', null, h('p', null, `${body.station} · ${body.table} ${body.address} · `, source,
-            body.transactions > 1 ? ' · ' + t('more.requests', {count: body.transactions}) : '', onTheWire(body)), shown.node, this.#everyType(body));
+            body.transactions > 1 ? ' · ' + t('more.requests', {count: body.transactions}) : '', onTheWire(body)), shown.node, h('div', {class: 'bar'}, this.#point(body)), this.#everyType(body));
+    }
+
+    /** Puts a point at what was read into the text of the configuration, and shows it there. */
+    #point({station, notation}) {
+        const listed = live.stations.find((one) => one.name === station);
+        if (!mayConfigure() || !listed || !notation) return null;
+        const item = {name: notation.toLowerCase().replace(/[^a-z0-9]+/g, '-'), at: notation};
+        const add = () => insert(`lines/${listed.line}/stations/${station}/points`, item).catch((error) => this.#say(refusal(error)));
+        return h('button', {type: 'button', id: 'make-point', onclick: add}, t('text.add.point'));
     }
 
     /** Of a few registers on demand, because it asks the panel once more: what they are as each type. */

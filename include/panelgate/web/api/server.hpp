@@ -46,6 +46,7 @@ class DiscoverySource;
 class HttpListener;
 class KeyBook;
 class ReloadSource;
+class TextSource;
 struct Site;
 
 /// What the server shows besides the directory. All functions but now() and wall() are called from
@@ -72,6 +73,7 @@ struct Providers {
     DiscoverySource* discovery = nullptr;  ///< null only without lines; outlives the server
     AlarmSource* alarms = nullptr;         ///< null: there are no alarms; outlives the server
     ReloadSource* reload = nullptr;        ///< null: reload is not available; outlives the server
+    TextSource* text = nullptr;            ///< null: there is no text; outlives the server
     SharedText configuration;  ///< the active one, a JSON object without secrets; null: not shown
     /// Told of what clients change or are refused, for an audit; may be empty.
     std::function<void(const Deed&)> record{};

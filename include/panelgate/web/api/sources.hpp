@@ -1,5 +1,7 @@
 #pragma once
 
+#include <boost/json/array.hpp>
+#include <boost/json/object.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -138,6 +140,68 @@ class ReloadSource {
     virtual void reload(ReloadWish wish, std::string cause, Handler handler) = 0;
     /// The result of the last reload; null: there was none.
     virtual std::shared_ptr<const ReloadVerdict> last() const = 0;
+};
+
+/// A text of the configuration that ran.
+struct TextVersion {
+    std::uint64_t version = 0;  ///< from 1
+    WallTime time{};            ///< since when it ran
+    std::string who;            ///< as ReloadVerdict::cause
+    std::string sha256;         ///< 64 hex digits
+};
+
+/// What came of a text that was to be written.
+struct TextVerdict {
+    enum class State : std::uint8_t {
+        written,      ///< and it runs
+        stale,        ///< the file is another one than expected
+        invalid,      ///< `problems` has its faults
+        read_only,    ///< the file cannot be written
+        not_written,  ///< the disk has not taken it
+        not_applied,  ///< it could not be served, so the file was put back
+    };
+    State state = State::not_written;
+    std::string sha256;                             ///< of the file as it is now, where it was read
+    boost::json::array problems{};                  ///< as TextSource::judge() has them
+    boost::json::array changes{};                   ///< from what ran, likewise
+    std::string why;                                ///< why it is not written, or does not run
+    std::shared_ptr<const ReloadVerdict> reload{};  ///< of State::written
+};
+
+/// The text of the configuration: a file, which stays the truth. One thread; but functions that it
+/// returns take long, and run in any thread.
+class TextSource {
+  public:
+    struct File {
+        std::optional<std::string> text;  ///< nothing: it cannot be read
+        std::string sha256;
+        std::string why;  ///< why it cannot be read, or written; empty: both can be
+    };
+    struct Inserted {
+        std::optional<std::string> text;
+        int line = 0;     ///< where the item begins, from 1
+        std::string why;  ///< why there is no text
+    };
+    using Handler = std::function<void(TextVerdict)>;
+    virtual ~TextSource() = default;
+    /// Why the file could not be written at the last reload; empty: it could.
+    virtual std::string read_only() const = 0;
+    virtual std::function<File()> reader() const = 0;
+    /// {"valid", "problems", "changes", "interruptions", "plan"} of a text that might run next.
+    virtual std::function<boost::json::object(const std::string& text)> judge() const = 0;
+    /// The JSON Schema of the configuration.
+    virtual std::function<boost::json::object()> schema() const = 0;
+    /// Puts an item into this text, or into the file's (yaml::insert()).
+    virtual std::function<Inserted(const std::optional<std::string>& text, const std::string& into,
+                                   const boost::json::object& item)>
+    inserter() const = 0;
+    /// Writes a valid text and reloads, where `expected` (an If-Match) names the file's SHA-256.
+    /// The handler is called once, from the loop.
+    virtual void write(std::string text, std::string expected, std::string who,
+                       Handler handler) = 0;
+    /// The last texts that ran, the newest first.
+    virtual std::vector<TextVersion> versions() const = 0;
+    virtual std::optional<std::string> version(std::uint64_t version) const = 0;
 };
 
 }  // namespace panelgate::web

@@ -127,7 +127,8 @@ inline constexpr const char* kHeadersRead[] = {
     "authorization",  "origin",         "content-type",    "content-encoding", "sec-fetch-site",
     "sec-fetch-mode", "sec-fetch-dest", "idempotency-key", "last-event-id"};
 /// … and list headers: repeated fields are joined (RFC 9110 5.3).
-inline constexpr const char* kListsRead[] = {"accept", "accept-encoding", "if-none-match"};
+inline constexpr const char* kListsRead[] = {"accept", "accept-encoding", "if-none-match",
+                                             "if-match"};
 
 /// A body shared by several responses, in memory once.
 using SharedText = std::shared_ptr<const std::string>;
@@ -164,7 +165,12 @@ struct Route {
     bool figures = false;  ///< the response shows the server's counters
     Right right = Right::read;  ///< that an own role has to have; none is needed where `needed` is
     std::optional<Right> or_right{};  ///< one that is enough for an own role, too
+    /// Of the configuration's text: who may use the route may send a long body, and the audit
+    /// knows each use.
+    bool configures = false;
 };
+/// Bytes of a body that such a route takes.
+inline constexpr std::size_t kLongBody = 4 * 1024 * 1024;
 
 /// What a client changed or was refused: for an audit. Valid for the call only.
 struct Deed {

@@ -43,8 +43,8 @@ struct Refused : std::exception {
     throw Refused(problem);
 }
 
-/// Makes a problem. `status`: 400-405, 409, 413, 415, 421, 422, 429, 431, 500 or 502-504. `kind`:
-/// "": by status.
+/// Makes a problem. `status`: 400-405, 409, 412, 413, 415, 421, 422, 428, 429, 431, 500 or
+/// 502-504. `kind`: "": by status.
 Problem problem(unsigned status, std::string detail, std::string_view kind = {});
 /// Throws such a problem as Refused.
 [[noreturn]] void refuse(unsigned status, std::string detail, std::string_view kind = {});

@@ -172,7 +172,7 @@ TEST_F(ApiManners, EveryPathTellsWhatItUnderstandsAndNothingToOtherSites) {
         {"OPTIONS", "/api/v1/stations/press/devices/UW1", 204, "GET, HEAD, PUT, OPTIONS"},
         {"OPTIONS", "/api/v1/read", 204, "POST, OPTIONS"},
         {"OPTIONS", "/openapi.json", 204, "GET, HEAD, OPTIONS"},
-        {"OPTIONS", "*", 204, "GET, HEAD, POST, DELETE, PUT, OPTIONS"},
+        {"OPTIONS", "*", 204, "GET, HEAD, PUT, POST, DELETE, OPTIONS"},
         {"POST", "/api/v1/stations", 405, "GET, HEAD"},
         {"DELETE", "/api/v1/stations/press/coils/1", 405, "GET, HEAD, PUT"},
         {"GET", kRaw, 405, "POST"},

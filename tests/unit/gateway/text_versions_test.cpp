@@ -1,0 +1,51 @@
+#include "panelgate/gateway/text_versions.hpp"
+
+#include <gmock/gmock.h>
+
+#include <chrono>
+#include <string>
+
+#include "panelgate/rt/clock.hpp"
+
+namespace panelgate::gateway::text_versions_test {
+namespace {
+
+using ::testing::Each;
+using ::testing::Field;
+using ::testing::SizeIs;
+
+const WallTime kNow{std::chrono::microseconds(1'700'000'000'123'456)};
+
+TEST(TextVersions, KeepTheLastTenThatDiffer) {
+    MemoryKeeper keeper;
+    TextVersions versions(keeper);
+    for (int i = 1; i <= 12; ++i) {
+        versions.add("text " + std::to_string(i), "ops", kNow);
+        versions.add("text " + std::to_string(i), "again", kNow);
+    }
+    const auto list = versions.list();
+    ASSERT_THAT(list, SizeIs(TextVersions::kMost));
+    EXPECT_EQ(list.front().version, 12U);
+    EXPECT_EQ(list.back().version, 3U);
+    EXPECT_THAT(list, Each(Field(&web::TextVersion::who, "ops")));
+    EXPECT_EQ(versions.text(3), "text 3");
+    EXPECT_EQ(versions.text(2), std::nullopt);
+}
+
+TEST(TextVersions, GoOnWhereTheKeeperEnds) {
+    MemoryKeeper keeper;
+    TextVersions(keeper).add("lines:\n  - a\n", "http 10.0.0.9 token \"ops\"\n", kNow);
+    keeper.keep("configuration/7", "damaged");
+    keeper.keep("other/1", "of somebody else");
+    TextVersions versions(keeper);
+    versions.add("lines:\n  - a\n", "start", kNow);
+    ASSERT_THAT(versions.list(), SizeIs(1));
+    EXPECT_EQ(versions.list()[0].who, "http 10.0.0.9 token \"ops\"\n");
+    EXPECT_EQ(versions.list()[0].time, kNow);
+    EXPECT_EQ(versions.text(1), "lines:\n  - a\n");
+    versions.add("lines: []\n", "start", kNow);
+    EXPECT_EQ(versions.list()[0].version, 2U);
+}
+
+}  // namespace
+}  // namespace panelgate::gateway::text_versions_test
