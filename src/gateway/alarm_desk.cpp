@@ -23,7 +23,7 @@ store::Kind kind_of(alarms::Change::Kind kind) {
     return store::Kind::alarm_acknowledged;
 }
 
-std::string text_of(const alarms::Settings& alarm) {
+std::string shown_text(const alarms::Settings& alarm) {
     return alarm.text.empty() ? alarm.name : alarm.text;
 }
 
@@ -67,8 +67,12 @@ std::optional<double> value_of(const Station& station, const points::Point& poin
 
 }  // namespace
 
-AlarmDesk::AlarmDesk(rt::Clock& clock, Journal& journal, Listener tell)
-    : clock_(clock), journal_(journal), tell_(std::move(tell)), alarm_(clock.make_alarm()) {}
+AlarmDesk::AlarmDesk(rt::Clock& clock, Journal& journal, Findings findings, Listener tell)
+    : clock_(clock),
+      journal_(journal),
+      findings_(std::move(findings)),
+      tell_(std::move(tell)),
+      alarm_(clock.make_alarm()) {}
 
 alarms::Alarms::Time AlarmDesk::time() const { return {clock_.now(), rt::wall_now()}; }
 
@@ -108,11 +112,13 @@ void AlarmDesk::look() {
 }
 
 bool AlarmDesk::is_finding(std::string_view cause) const {
+    const auto is_meant = [&](const auto& finding) {
+        return cause == "any" || finding.cause == cause;
+    };
+    if (std::ranges::any_of(findings_(), is_meant)) return true;
     return std::ranges::any_of(plant_->lines(), [&](const Line& line) {
         const auto findings = line.bus->status().findings;
-        return std::ranges::any_of(findings, [&](const bus::LineFinding& finding) {
-            return cause == "any" || finding.cause == cause;
-        });
+        return std::ranges::any_of(findings, is_meant);
     });
 }
 
@@ -160,7 +166,7 @@ void AlarmDesk::on_change(const std::optional<alarms::Change>& change) {
     entry.point = alarm.point;
     entry.line = alarm.line;
     if (const Station* const station = plant_->find(alarm.station)) entry.line = station->line;
-    entry.text = text_of(alarm);
+    entry.text = shown_text(alarm);
     if (change->kind == alarms::Change::Kind::acknowledged) entry.who = change->now.by;
     json::object data;
     data["alarm"] = alarm.name;

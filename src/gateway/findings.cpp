@@ -58,6 +58,18 @@ Finding audit(const std::string& file, bool writes_stop) {
         .evidence = {}};
 }
 
+Finding store(const std::string& file, const std::string& why) {
+    return {
+        .cause = "store-fails",
+        .line = {},
+        .name = file,
+        .text = "Events and history cannot be written to " + file + ": they are lost meanwhile.",
+        .advice =
+            "A full disk, a folder that is not there, or rights: mend it, or name another "
+            "file in `store`.",
+        .evidence = why};
+}
+
 std::string why_of(const web::ReloadVerdict& verdict) {
     if (verdict.faults.empty()) return verdict.why;
     const auto& fault = verdict.faults.front();
@@ -104,6 +116,11 @@ void log_change(const Finding& finding, bool is_new) {
 }
 
 }  // namespace
+
+void Findings::tell(const Finding& finding, bool is_new) const {
+    log_change(finding, is_new);
+    if (tell_) tell_(finding, is_new);
+}
 
 const Finding* Findings::find(const Finding& like) const {
     const auto found = std::ranges::find_if(
@@ -156,6 +173,7 @@ void Findings::judge(TimePoint now, WallTime wall, const State& state) {
         if (auto finding = overload(usage)) found.push_back(std::move(*finding));
     if (is_broker_away(now, state.broker_away)) found.push_back(broker(state.broker_away));
     if (!state.audit_fails.empty()) found.push_back(audit(state.audit_fails, state.writes_stop));
+    if (!state.store_fails.empty()) found.push_back(store(state.store_fails, state.store_why));
     if (state.refused) found.push_back(reload(*state.refused));
     const auto seconds = static_cast<std::int64_t>(wall_seconds_of(wall));
     for (const Certificate& one : state.certificates)
@@ -164,12 +182,12 @@ void Findings::judge(TimePoint now, WallTime wall, const State& state) {
     for (Finding& finding : found) {
         const Finding* const before = find(finding);
         finding.since = before != nullptr ? before->since : wall;
-        if (before == nullptr) log_change(finding, true);
+        if (before == nullptr) tell(finding, true);
     }
     for (const Finding& before : list_)
         if (std::ranges::none_of(
                 found, [&](const Finding& one) { return is_about_the_same(one, before); }))
-            log_change(before, false);
+            tell(before, false);
     list_ = std::move(found);
 }
 

@@ -19,7 +19,6 @@
 #include "panelgate/gateway/running_line.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/rt/loop.hpp"
-#include "panelgate/tls/judge.hpp"
 #include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::gateway {
@@ -373,6 +372,8 @@ void Gateway::start() {
     lag_.start();
     audit_.apply(snapshot_->config->audit);
     journal_.apply(snapshot_->config->store);
+    findings_.on_change(
+        [this](const web::Finding& finding, bool is_new) { on_finding(finding, is_new); });
     audit_.on_record([this](const audit::Members& record) { journal_.on_record(record); });
     hook_.apply(snapshot_->config->webhook);
     alarms_.apply(snapshot_->config->alarms, plant_in(snapshot_));
@@ -430,81 +431,6 @@ void Gateway::stop() {
     hook_.stop();
     journal_.add({.kind = store::Kind::stop});
     journal_.close();
-}
-
-/// Takes what the lines have counted, for the last minute.
-void Gateway::look_for_findings() {
-    for (const auto& line : snapshot_->lines) line->record_minute();
-    looked_ = {};
-    findings();
-    looking_->arm(clock_.now() + bus::LastMinute::kStep, [this] { look_for_findings(); });
-}
-
-std::vector<web::LineUsage> Gateway::usage() const {
-    std::vector<web::LineUsage> usage;
-    for (std::size_t i = 0; i < snapshot_->lines.size(); ++i)
-        usage.push_back({snapshot_->config->lines[i].name, snapshot_->lines[i]->last_minute()});
-    return usage;
-}
-
-Findings::State Gateway::state() const {
-    const config::Config& config = *snapshot_->config;
-    Findings::State state;
-    state.lines = usage();
-    const auto broker = northbound_.counters();
-    if (broker && !broker->connected && config.mqtt) state.broker_away = config.mqtt->broker();
-    if (audit_.is_kept() && audit_.counters().failing) state.audit_fails = config.audit->file;
-    state.writes_stop = audit_.refuses_writes();
-    if (!reloads_->counters().last_succeeded) state.refused = reloads_->last();
-    for (const ServedCertificate& one : certificates())
-        if (const std::int64_t end = tls::summary_of(one.settings.material.certificate).end;
-            end > 0)
-            state.certificates.push_back({one.listener, end});
-    return state;
-}
-
-/// As they are now, but for a second.
-const std::vector<web::Finding>& Gateway::findings() {
-    constexpr Duration kRest = 1s;
-    if (clock_.now() - looked_ >= kRest) {
-        looked_ = clock_.now();
-        findings_.judge(looked_, rt::wall_now(), state());
-    }
-    return findings_.list();
-}
-
-/// All figures but those of points, and of the process.
-metrics::Snapshot Gateway::figures() {
-    metrics::Snapshot figures;
-    for (const auto& line : snapshot_->lines) figures.lines.push_back(line->bus().report());
-    for (const web::Finding& one : findings())
-        figures.findings.push_back({one.line, one.cause, one.name});
-    figures.relays = relay_samples(relays_->status());
-    servers_.copy_figures(figures);
-    figures.mqtt = northbound_.counters();
-    figures.store = journal_.counters();
-    for (const web::AlarmView& alarm : alarms_.list())
-        figures.alarms.push_back(
-            {alarm.settings.name, alarm.settings.severity, alarm.status.is_active()});
-    if (certificates_) figures.renewals = certificates_->renewals();
-    if (audit_.is_kept()) figures.audit = audit_.counters();
-    if (reloads_->barred(false).empty()) figures.reloads = reloads_->counters();
-    figures.version = PANELGATE_VERSION;
-    figures.commit = build_commit();
-    figures.compiler = build_compiler();
-    figures.runtime.log_lines_dropped = rt::log_lines_dropped();
-    figures.runtime.loop_lag = lag_.seconds();
-    return figures;
-}
-
-std::function<std::string()> Gateway::metrics_text() {
-    const auto copy = std::make_shared<metrics::Snapshot>(figures());
-    return [copy, points = seen_points(snapshot_->plant, clock_.now()),
-            snapshot = rt::lend(loops_.plant, std::shared_ptr<const Snapshot>(snapshot_))] {
-        copy->points = samples_of(points);
-        copy->process = metrics::read_process_facts();
-        return metrics::exposition(*copy);
-    };
 }
 
 }  // namespace panelgate::gateway

@@ -311,7 +311,7 @@ void Reloader::apply(const std::shared_ptr<Job>& job) {
 
 void Reloader::end(web::ReloadVerdict& verdict) {
     late_->cancel();
-    job_.reset();
+    const std::shared_ptr<Job> job = std::exchange(job_, nullptr);
     verdict.at = rt::wall_now();
     const bool good =
         verdict.outcome == ReloadOutcome::applied || verdict.outcome == ReloadOutcome::unchanged;
@@ -320,7 +320,7 @@ void Reloader::end(web::ReloadVerdict& verdict) {
     if (good) counters_.last_success_unix = unix_now();
     log_verdict(verdict);
     gateway_->record(verdict);
-    if (good && !job->rollback && ran_) ran_(job->text, verdict.cause);
+    if (good && !verdict.rollback && ran_) ran_(job->text, verdict.cause);
     last_ = std::make_shared<const web::ReloadVerdict>(std::move(verdict));
     if (step_) step_(false);
     for (Waiting& one : std::exchange(served_, {})) one.handler(last_);

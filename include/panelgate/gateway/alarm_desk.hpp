@@ -23,9 +23,11 @@ namespace panelgate::gateway {
 class AlarmDesk : public web::AlarmSource {
   public:
     using Listener = std::function<void(const alarms::Change&)>;
+    /// The findings of the gateway itself, as they are now.
+    using Findings = std::function<const std::vector<web::Finding>&()>;
 
     /// Clock and journal outlive the desk. `tell` gets each change.
-    AlarmDesk(rt::Clock& clock, Journal& journal, Listener tell);
+    AlarmDesk(rt::Clock& clock, Journal& journal, Findings findings, Listener tell);
     AlarmDesk(const AlarmDesk&) = delete;
     AlarmDesk& operator=(const AlarmDesk&) = delete;
 
@@ -49,6 +51,7 @@ class AlarmDesk : public web::AlarmSource {
 
     rt::Clock& clock_;
     Journal& journal_;
+    Findings findings_;
     Listener tell_;
     std::unique_ptr<rt::Alarm> alarm_;
     std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);

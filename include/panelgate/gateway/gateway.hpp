@@ -84,6 +84,7 @@ class Gateway {
     void on_points(const std::string& line, std::uint8_t station,
                    const std::vector<std::size_t>& wants);
     void on_alarm(const alarms::Change& change);
+    void on_finding(const web::Finding& finding, bool is_new);
     Lines lines_of(const config::Config& config);
     void apply_lines(const config::Config& config, const Lines& lines);
     void rest_wires(const config::Config& config, const Lines& lines);
@@ -107,7 +108,9 @@ class Gateway {
     AuditBook audit_{loops_.plant, clock_};  ///< lines record in it until they are destroyed
     Journal journal_{loops_.plant, clock_};  ///< lines tell it until they are destroyed
     AlarmHook hook_{loops_.plant, clock_};
-    AlarmDesk alarms_{clock_, journal_, [this](const alarms::Change& change) { on_alarm(change); }};
+    AlarmDesk alarms_{clock_, journal_,
+                      [this]() -> const std::vector<web::Finding>& { return findings(); },
+                      [this](const alarms::Change& change) { on_alarm(change); }};
     explain::Doors doors_;  ///< lines ask it until they are destroyed
     bool simulate_;
     Reloader* reloads_;

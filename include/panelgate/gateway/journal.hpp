@@ -58,6 +58,7 @@ class Journal {
     void flush(const std::string& point);
     /// Nothing before apply().
     std::optional<store::Counters> counters() const;
+    const std::string& file() const { return settings_.file; }
     /// Why nothing can be written; "": writes are taken.
     std::string why() const { return store_ ? store_->why() : ""; }
 

@@ -11,6 +11,7 @@
 #include "answer.hpp"
 #include "panelgate/base/text.hpp"
 #include "panelgate/store/database.hpp"
+#include "panelgate/web/http/json_text.hpp"
 #include "routes.hpp"
 #include "sight.hpp"
 
@@ -23,8 +24,8 @@ namespace {
 
 using std::chrono::seconds;
 
-constexpr std::string_view kColumns[] = {"id",      "time",  "kind", "severity", "line",
-                                         "station", "point", "who",  "text",     "data"};
+constexpr std::string_view kEntryColumns[] = {"id",      "time",  "kind", "severity", "line",
+                                              "station", "point", "who",  "text",     "data"};
 constexpr std::string_view kSampleColumns[] = {"time", "min", "max", "mean", "count"};
 
 /// The text of a query; "" if the query is not given.
@@ -196,7 +197,7 @@ Handling get_journal(HttpRequest request, const Api* api) {
     auto page = co_await std::move(reading);
     if (!page) refuse_without_store();
     const std::int64_t next = page->next;
-    Table table = table_of("entries", kColumns, std::move(page->entries));
+    Table table = table_of("entries", kEntryColumns, std::move(page->entries));
     table.behind["next"] = nullptr;
     if (next != 0) table.behind["next"] = next;
     co_return table_answer(request, std::move(table));
