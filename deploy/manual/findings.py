@@ -24,6 +24,9 @@ OF_THE_GATEWAY = {
     "audit-fails": ("the audit cannot be written", "the file takes no record; with `on_failure: refuse_writes` "
                     "every write is refused",
                     "`audit fails` in the log says why: a full disk, a folder that is not there, or rights."),
+    "store-fails": ("events and history cannot be written to `store`'s file, and are lost meanwhile",
+                    "the disk takes no event and no value; `evidence` has the reason",
+                    "A full disk, a folder that is not there, or rights: mend it, or name another file in `store`."),
     "reload-refused": ("the running configuration is not that of the file",
                        "the last reload was refused; `evidence` has the first fault",
                        "Mend the file (`panelgate check`), and reload. A restart would fail with the file as it is."),
