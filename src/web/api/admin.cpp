@@ -151,8 +151,8 @@ std::string seen_configuration(const std::string& text, const Directory& directo
         json::object shown{{"stations", seen("stations", "name")},
                            {"polls", seen("polls", "station")}};
         if (shown["stations"].as_array().empty()) continue;
-        const auto line = find_line(directory, name);
-        shown["whole"] = line && sight.whole(**line);
+        const auto entry = find_line(directory, name);
+        shown["whole"] = entry && sight.whole(**entry);
         for (const char* key : {"name", "device", "mode", "serial", "unlisted_stations"})
             if (const json::value* own = object.if_contains(key)) shown[key] = *own;
         lines.push_back(std::move(shown));
