@@ -43,6 +43,15 @@ class Outage(Browser):
         self.screenshot("outage-latency-wide-light")
         self.assertEqual(self.complaints(), [])
 
+    def test_a_polled_block_is_no_longer_good_when_its_panel_is_dead(self):
+        self.open("station/filler")
+        self.wait(lambda: "good" in self.text("ul.plain"))
+        self.program.rest("PUT", "/api/v1/simulator/filler", {"dead": 1})
+        try:
+            self.wait(lambda: re.search("stale|bad", self.text("ul.plain")))
+        finally:
+            self.program.rest("PUT", "/api/v1/simulator/filler", {})
+
     def test_its_tile_ticks_and_boasts_of_no_latency(self):
         self.open()
         self.wait(lambda: self.text(tile("oven") + " .figure").startswith("panel "))

@@ -11,6 +11,8 @@ import {latency, plotted} from './timeline.js';
 import {traceOf} from './trace.js';
 import {live} from './live.js';
 
+const ASK = 2000;  // ms between two looks at the polled blocks
+
 function facts(station) {
     const rows = [[t('line'), `${station.line}:${station.id}`], [t('profile'), station.profile ?? t('no.profile')],
         [t('unit'), station.unit ?? '–'], [t('access'), word('access', station.read_only ? 'read_only' : 'read_write')],
@@ -51,8 +53,14 @@ export function stationView({argument}) {
                 h('a', {class: 'button', href: `#/scope/${first.line}`}, t('nav.scope')))),
         h('section', {class: 'card'}, graph.node, figures)),
         h('h2', null, t('nav.points')), points.node, polled, faults.node);
-    get(path('stations', first.name)).then((body) => replace(polled, polls(body)), () => {});
+    let asked = -Infinity;
+    const look = () => {
+        if (performance.now() - asked < ASK) return;
+        asked = performance.now();
+        get(path('stations', first.name)).then((body) => replace(polled, polls(body)), () => {});
+    };
     const update = () => {
+        look();
         const station = live.station(first.name);
         if (!station) return;
         state.update(station.state);
