@@ -164,7 +164,8 @@ void add_status(Adder& adder) {
         "are findings; 64 usage; 66 the token file cannot be read; 69 no gateway answers.");
     adder.on_call(command, [typed] { return status(typed->at, typed->format == "json"); });
     const auto shown = std::make_shared<Typed>();
-    command = adder.add("top", "show load, clients and slow panels, again each second", shown);
+    command = adder.add(
+        "top", "show load, clients and slow panels of the last minute, drawn each second", shown);
     command->add_flag("--once", shown->once, "one look, as on a pipe");
     adder.on_call(command, [shown] { return top(shown->at, shown->once); });
 }

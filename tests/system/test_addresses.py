@@ -97,12 +97,13 @@ class BothKinds(unittest.TestCase):
 
 class OneNetwork(unittest.TestCase):
     """A host has as many addresses of its /64 as it likes: they count as one."""
-    NETWORK, OTHER = "2001:db8:1:2::", "2001:db8:1:3::"
+    NETWORK = [f"2001:db8:1:2::{host:x}" for host in range(1, 14)]
+    OTHER = "2001:db8:1:3::1"
 
     def setUp(self):
-        for network in (self.NETWORK, self.OTHER):
-            ip("-6", "route", "add", "local", f"{network}/64", "dev", "lo")
-            self.addCleanup(ip, "-6", "route", "del", "local", f"{network}/64", "dev", "lo")
+        for address in (*self.NETWORK, self.OTHER):
+            ip("-6", "address", "add", f"{address}/128", "dev", "lo", "nodad")
+            self.addCleanup(ip, "-6", "address", "del", f"{address}/128", "dev", "lo")
 
     def test_wrong_tokens_of_a_network_bar_it_alone(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -116,10 +117,10 @@ class OneNetwork(unittest.TestCase):
                     with contextlib.closing(connection):
                         connection.request("GET", "/api/v1/lines", headers={"Authorization": f"Bearer {text}"})
                         return connection.getresponse().status
-                tried = [status(f"{self.NETWORK}{host:x}", "wrong") for host in range(1, 13)]
+                tried = [status(address, "wrong") for address in self.NETWORK[:12]]
                 self.assertEqual(tried, [401] * 10 + [429] * 2)
-                self.assertEqual(status(f"{self.NETWORK}ffff", "0123456789abcdef"), 429)
-                self.assertEqual(status(f"{self.OTHER}1", "0123456789abcdef"), 200)
+                self.assertEqual(status(self.NETWORK[12], "0123456789abcdef"), 429)
+                self.assertEqual(status(self.OTHER, "0123456789abcdef"), 200)
 
     def test_places_are_a_networks(self):
         modbus = 'listen: "[::]:0", max_connections_per_address: 2'
@@ -130,9 +131,9 @@ class OneNetwork(unittest.TestCase):
                 one.sendall(harness.adu(1, 31, read_registers(0)))
                 self.assertNotEqual(one.recv(64), b"")
                 return one
-            first, second = client(f"{self.NETWORK}1"), client(f"{self.NETWORK}2")
-            client(f"{self.OTHER}1")
-            client(f"{self.NETWORK}3")
+            first, second = client(self.NETWORK[0]), client(self.NETWORK[1])
+            client(self.OTHER)
+            client(self.NETWORK[2])
             self.assertEqual(first.recv(1), b"", "the longest idle one of its network gives way")
             second.sendall(harness.adu(2, 31, read_registers(0)))
             self.assertNotEqual(second.recv(64), b"")
