@@ -4,7 +4,7 @@ import {check, current, draft, isChanged, load, save} from './configuration_draf
 import {confirm, dialog, refusal} from './confirm.js';
 import {h, list, replace, table, text} from './dom.js';
 import {Editor} from './editor.js';
-import {t} from './language.js';
+import {number, t} from './language.js';
 import {live} from './live.js';
 import {difference, excerpt} from './text_difference.js';
 
@@ -58,8 +58,8 @@ class View {
         try {
             await load();
             this.editor = await Editor.in(this.box, draft.text, (now) => this.#typed(now), (now) => this.#judge(now));
-            if (draft.line) this.editor.goTo(draft.line);
-            draft.line = null;
+            if (draft.place) this.editor.goTo(...draft.place);
+            draft.place = null;
             this.#typed(draft.text);
             await this.#showVersions();
         } catch (error) {
@@ -83,7 +83,7 @@ class View {
         replace(this.problems, found.problems.map((one) => problemRow(one, ({line, column}) => this.editor.goTo(line, column))));
         replace(this.changes, found.valid && found.changes.length === 0 ? h('li', {class: 'muted'}, t('text.same')) : found.changes.map(changeRow),
             found.interruptions.map((cut) => h('li', {class: 'warning'}, h('code', null, cut.path), ': ', h('span', {lang: 'en'}, cut.what))));
-        replace(this.plan, (found.plan.lines ?? []).map((line) => h('li', null, h('code', null, line.name), ': ', t('load', {percent: line.load_percent}),
+        replace(this.plan, (found.plan.lines ?? []).map((line) => h('li', null, h('code', null, line.name), ': ', t('load', {percent: number(line.load_percent, 1)}),
             line.verdict === 'fine' ? null : h('span', {class: 'badge warn', lang: 'en'}, line.verdict))));
         return found.problems.filter((one) => !one.file && one.line > 0);
     }
@@ -135,10 +135,10 @@ class View {
 
     async #showVersions() {
         const {versions} = await get(path('configuration', 'versions'));
-        const shown = table(t('text.versions'), [[t('text.version'), 'number'], [t('time')], [t('text.who')], ['']]);
-        list(shown.body, versions, (one) => one.version, (one) => ({node: h('tr', {'data-version': one.version}, h('td', {class: 'number'}, one.version),
-            h('td', null, new Date(one.time).toLocaleString()), h('td', {lang: 'en'}, one.who),
-            h('td', null, h('button', {type: 'button', onclick: () => this.#compare(one.version)}, t('text.compare'))))}));
+        const shown = table(t('text.versions'), [[''], [t('time')], [t('text.who')]]);
+        list(shown.body, versions, (one) => one.version, (one) => ({node: h('tr', {'data-version': one.version},
+            h('td', null, h('button', {type: 'button', onclick: () => this.#compare(one.version)}, t('text.compare'))),
+            h('td', null, new Date(one.time).toLocaleString()), h('td', {class: 'who', lang: 'en'}, one.who))}));
         replace(this.versions, h('h2', null, t('text.versions')), shown.node);
     }
 
