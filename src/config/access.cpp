@@ -58,7 +58,7 @@ const Keys<OwnRole>& own_role_keys() {
                                                (pattern.empty() ? "^(" : "|") + std::string(name);
                                        return pattern + ")$";
                                    }()},
-                                  "Rights of the role: read, write, broadcast, raw, discover, "
+                                  "What it may do: read, write, broadcast, raw, discover, "
                                   "simulator, reload. A broadcast is also a write, and raw also a "
                                   "read or a write.");
     rights.required = true;
