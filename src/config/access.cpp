@@ -233,7 +233,7 @@ const Keys<Rule>& rule_keys() {
             .weaker(By::any)
             .example("[read, write]")
             .value(
-                acts_shape("deny", "What it denies; a rule has allow or deny."),
+                acts_shape("deny", "What the rule denies; a rule has allow or deny."),
                 [](Reader& in, Rule& rule) { return read_acts(in, "deny", false, rule); },
                 [](const Rule& rule) { return acts_text(rule, false); })
             .weaker(By::any)
@@ -319,7 +319,7 @@ const Keys<access::Settings>& access_keys() {
     static const auto kKeys =
         Keys<Settings>()
             .word("default", &Settings::allow_by_default, kDefaults,
-                  "What is done where no rule matches: allow or deny.")
+                  "What happens if no rule matches: allow or deny.")
             .weaker(By::coming, "allow")
             .example("allow")
             .maps(

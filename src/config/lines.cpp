@@ -123,7 +123,7 @@ const Keys<Line>& line_keys() {
             .duration(
                 "connect_pause", [](auto& line) -> auto& { return line.arbiter.connect_pause; },
                 0ms, 1min,
-                "Of a tcp:// line: pause behind each connecting, for a device server that ignores "
+                "Pause behind each connecting of a tcp:// line, for a device server that ignores "
                 "what comes at once.")
             .shown_if([](const Line& line) { return line.kind == Line::Kind::tcp; })
             .word("mode", &Line::listens, kModes,
@@ -209,7 +209,7 @@ const Keys<Line>& line_keys() {
             .weaker(By::leaving, "refuse")
             .map(
                 "simulate", [](auto& line) -> auto& { return line; }, fault_keys, "{echo: true}",
-                "Of a simulated line: what its adapter does wrong.")
+                "What the adapter of a simulated line does wrong.")
             .change_needs(kOpensPort)
             .below(
                 shape_of("stations", Kind::list, "Panels on this line."),

@@ -137,7 +137,7 @@ const Keys<Master>& master_keys() {
             .weaker(By::leaving, "deny")
             .initially("silent")
             .word("on_failure", &Master::on_failure, kFailures,
-                  "What the master gets where a panel does not answer.")
+                  "What the master gets if a panel does not answer.")
             .word("echo", &Master::echo, kEchoes,
                   "Whether the adapter hears what it sends; auto: found out.")
             .change_needs(kOpensPort)

@@ -88,11 +88,11 @@ const Keys<Point>& point_keys() {
     const auto numbers = words_of(is_number);
     const std::string string(label(Type::string));
     constexpr std::string_view kNumbers = "is for numbers";
-    KeyShape labels = shape_of("labels", Kind::map,
-                               "Of integers: texts of raw numbers, such as {0: off, 1: on}.");
+    KeyShape labels =
+        shape_of("labels", Kind::map, "Texts of raw integers, such as {0: off, 1: on}.");
     labels.keys = yaml::kIntegerPattern;
     KeyShape no_value =
-        shape_of("no_value", Kind::list, "Of numbers: raw ones that mean that there is no value.");
+        shape_of("no_value", Kind::list, "Raw numbers that mean that there is no value.");
     no_value.holds_integers = true;
     no_value.most_entries = points::kMaxNoValues;
     static const auto kKeys =
@@ -128,21 +128,22 @@ const Keys<Point>& point_keys() {
                   "Order of the bytes of values in registers, not of bits; ABCD: high word first.")
             .weaker(By::any)
             .only_with("type", words_of(is_of_registers), "is for values of registers", true)
-            .number("scale", &Point::scale, "Of numbers: value = raw * scale + offset; not 0.")
+            .number("scale", &Point::scale,
+                    "Factor of a number: value = raw * scale + offset; not 0.")
             .weaker(By::any)
             .in_schema([](KeyShape& shape) { shape.never = 0; })
             .example("0.1")
             .only_with("type", numbers, kNumbers, true)
-            .number("offset", &Point::offset, "Of numbers: value = raw * scale + offset.")
+            .number("offset", &Point::offset, "Offset of a number: value = raw * scale + offset.")
             .weaker(By::any)
             .only_with("type", numbers, kNumbers, true)
             .value(shape_of("unit", Kind::text, "Unit, as people write it."), read_unit,
                    [](const Point& point) { return point.unit; })
             .example("celsius")
-            .number("min", &Point::min, "Of numbers: smallest value that may be written.")
+            .number("min", &Point::min, "Smallest number that may be written.")
             .weaker(By::falling)
             .only_with("type", numbers, kNumbers, true)
-            .number("max", &Point::max, "Of numbers: largest value that may be written.")
+            .number("max", &Point::max, "Largest number that may be written.")
             .weaker(By::growing)
             .only_with("type", numbers, kNumbers, true)
             .boolean("writable", &Point::writable, "Clients may write it.")

@@ -130,9 +130,9 @@ const Keys<SerialFormat>& serial_keys() {
                    read_data_bits,
                    [](const Format& format) { return std::to_string(format.data_bits); })
             .initially("")
-            .word("parity", &Format::parity, kParityWords, "Of each character.")
+            .word("parity", &Format::parity, kParityWords, "Parity of each character.")
             .example("none")
-            .integer("stop_bits", &Format::stop_bits, 1, 2, "Of each character.");
+            .integer("stop_bits", &Format::stop_bits, 1, 2, "Stop bits of each character.");
     return kKeys;
 }
 

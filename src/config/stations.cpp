@@ -216,7 +216,7 @@ const Keys<StationBody, StationView>& station_keys() {
                 &points::Poll::read, "Blocks that are polled, to answer clients (max_age).")
             .map(
                 "simulate", [](auto& of) -> auto& { return of.station.faults; }, fault_keys,
-                "{dead: true}", "Of a simulated panel: what it does wrong.")
+                "{dead: true}", "What a simulated panel does wrong.")
             .change_needs(kOpensPort)
             .maps(
                 "points", [](auto& of) -> auto& { return of.station.points; }, point_keys,
