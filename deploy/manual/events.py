@@ -37,6 +37,7 @@ MEANINGS = {
     "certificate not renewed": "new files of a `tls` map cannot be used; the former contents stay in use",
     "certificate renewed": "new files of a `tls` map are in use for new connections; it says which, and whose certificate it is",
     "certificate without a role": "the role in a client's certificate does not count, so it only reads",
+    "client without a unit id": "a client asks unit 0 or 255, where nothing is: none may be set in it; once a client",
     "collision": "another unit sent at the same time, or an echo is missing",
     "configuration": "what `check` would say of the file that is served",
     "configuration changed": "a reload took this change over",
