@@ -191,7 +191,7 @@ RawRange label_range(Type type) {
     if (type == Type::bcd32) return {0, 99'999'999};
     if (!is_integer(type)) return signed_range(64);
     const unsigned bits = points::bits_of(type);
-    return label(type).starts_with('u') ? unsigned_range(bits) : signed_range(bits);
+    return points::is_signed(type) ? signed_range(bits) : unsigned_range(bits);
 }
 
 /// Range for no_value: 65535 and -1 are the same register.

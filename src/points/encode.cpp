@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <string>
 #include <utility>
@@ -40,45 +39,19 @@ Limits limits_of() {
 
 /// Range of the raw number.
 Limits limits_of(Type type) {
-    switch (type) {
-        case Type::boolean:
-            return {0, 1};
-        case Type::u8h:
-        case Type::u8l:
-            return {0, 255};
-        case Type::i8h:
-        case Type::i8l:
-            return {-128, 127};
-        case Type::u16:
-            return {0, 65535};
-        case Type::i16:
-            return {-32768, 32767};
-        case Type::u32:
-            return {0, std::int64_t{4294967295}};
-        case Type::i32:
-            return limits_of<int>();
-        case Type::u48:
-            return {0, (std::int64_t{1} << 48) - 1};
-        case Type::i48:
-            return {-(std::int64_t{1} << 47), (std::int64_t{1} << 47) - 1};
-        case Type::u64:
-            return limits_of<std::uint64_t>();
-        case Type::i64:
-            return limits_of<std::int64_t>();
-        case Type::bcd16:
-            return {0, 9999};
-        case Type::bcd32:
-            return {0, 99999999};
-        case Type::f16:
-            return {-65504, 65504};
-        case Type::f32:
-            return {as_printed(std::numeric_limits<float>::lowest()),
-                    as_printed(std::numeric_limits<float>::max())};
-        case Type::f64:
-        case Type::string:
-            return limits_of<double>();
-    }
-    std::abort();
+    if (type == Type::boolean) return {0, 1};
+    if (type == Type::u64) return limits_of<std::uint64_t>();
+    if (type == Type::i64) return limits_of<std::int64_t>();
+    if (type == Type::bcd16) return {0, 9999};
+    if (type == Type::bcd32) return {0, 99999999};
+    if (type == Type::f16) return {-65504, 65504};
+    if (type == Type::f32)
+        return {as_printed(std::numeric_limits<float>::lowest()),
+                as_printed(std::numeric_limits<float>::max())};
+    if (!is_integer(type)) return limits_of<double>();
+    const std::int64_t half = std::int64_t{1} << (bits_of(type) - 1);
+    if (is_signed(type)) return {-half, half - 1};
+    return {0, 2 * half - 1};
 }
 
 /// "u16, scale 0.1"

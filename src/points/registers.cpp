@@ -184,7 +184,7 @@ float from_half(std::uint16_t bits) {
 std::uint16_t to_half(double number) {
     int exponent = 0;
     std::frexp(number, &exponent);
-    exponent = std::max(exponent + kHalfBias - kHalfDigits - 1, 1);
+    exponent = number == 0 ? 1 : std::max(exponent + kHalfBias - kHalfDigits - 1, 1);
     const double units = std::nearbyint(std::ldexp(std::abs(number), kHalfBias - exponent));
     const unsigned bits =
         static_cast<unsigned>(exponent - 1) * kHidden + static_cast<unsigned>(units);

@@ -66,9 +66,8 @@ Words split_words(std::uint64_t raw, unsigned count);
 std::optional<std::int64_t> from_bcd(std::uint64_t raw, unsigned digits);
 std::uint64_t to_bcd(std::uint64_t value);
 
-/// IEEE 754 binary16. to_half() rounds to the nearest, ties to even; `number` is at most
-/// kMostOfHalf in size.
-inline constexpr float kMostOfHalf = 65504;
+/// IEEE 754 binary16. to_half() rounds to the nearest, ties to even; `number` is at most 65504 in
+/// size.
 float from_half(std::uint16_t bits);
 std::uint16_t to_half(double number);
 

@@ -56,6 +56,8 @@ unsigned bits_of(Type type);
 unsigned registers_of(Type type);
 /// True for half a register. A write of such a value leaves the other half as it is.
 inline bool is_byte(Type type) { return type >= Type::u8h && type <= Type::i8l; }
+/// True for an integer that may be below 0.
+inline bool is_signed(Type type) { return label(type).starts_with('i'); }
 inline bool is_float(Type type) { return type >= Type::f16 && type <= Type::f64; }
 inline bool is_integer(Type type) {
     return type != Type::boolean && type != Type::string && !is_float(type);

@@ -176,7 +176,7 @@ TEST(Encode, AFractionTakesTheNearestFloatAndAWholeNumberIsMeantExactly) {
         {point, 16777216, "16777216"},
         {point, 16777217, "16777216", kNearest},
         {point, of("16777217.5"), "16777218", kNearest},
-        {point_of(Type::f16), 0.1, "0.09997559"},
+        {point_of(Type::f16), 0.1, "0.099975586"},
         {point_of(Type::f16), 2049,
          "x cannot be exactly 2049 (f16); the nearest that it can be is 2048"},
         {point_of(Type::f16), 2049, "2048", kNearest},

@@ -40,7 +40,7 @@ const Vector kVectors[] = {
     {f16, badc, {0x003C}, 1.0},
     {f16, abcd, {0xFBFF}, -65504.0},
     {f16, abcd, {0x0001}, 5.9604645e-8},  // the smallest
-    {f16, abcd, {0x03FF}, 6.0975552e-5},  // the largest below the normal ones
+    {f16, abcd, {0x03FF}, 6.097555e-5},   // the largest below the normal ones
     {u32, abcd, {0x0102, 0x0304}, 0x01020304},
     {u32, cdab, {0x0304, 0x0102}, 0x01020304},
     {u32, badc, {0x0201, 0x0403}, 0x01020304},
