@@ -277,9 +277,9 @@ void Outbox::count_damaged(const Attempt& attempt) {
     } else {
         ++symptoms.damaged_long;
     }
-    // A good frame except for the order of the CRC's bytes.
     if (modbus::crc_ok(bytes, other(orders_.of(group.station)))) ++symptoms.crc_swapped;
     if (modbus::ends_in_lower_case(bytes)) ++symptoms.lower_case;
+    if (modbus::has_other_delimiters(bytes, expected.value_or(0))) ++symptoms.delimited;
     if (head) ++symptoms.damaged_heads;
     if (attempt.lost_beginning()) ++symptoms.beheaded;
     if (expected.value_or(bytes.size()) >= Symptoms::kLongReply) ++symptoms.long_damaged;

@@ -13,7 +13,9 @@
 #include "panelgate/bus/line_history.hpp"
 #include "panelgate/line/line.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/rt/log.hpp"
 
 namespace panelgate::bus {
@@ -161,6 +163,27 @@ void Bus::State::act(arbiter::StationEvent& event) {
     log_event(settings, event);
     if (event.kind != Kind::offline && event.kind != Kind::online) observe(settings, event);
     tell_health(event.station);
+}
+
+/// A write that gives a panel another address may be confirmed from there, which answers nothing
+/// here (minimalmodbus#101): the value written is the address that answers.
+void Bus::State::look_for_new_address(const arbiter::Note& note) {
+    if (direction_of(note.kind) == FrameDirection::sent) {
+        const bool writes = !modbus::is_pure_read(modbus::pdu_of(note.bytes));
+        return last_write.assign(note.bytes.begin(),
+                                 writes ? note.bytes.end() : note.bytes.begin());
+    }
+    if (note.kind != FrameKind::foreign || last_write.empty()) return;
+    const ByteView asked = modbus::pdu_of(last_write);
+    const std::uint8_t station = note.bytes[0];
+    if (station == last_write[0] || asked.back() != station ||
+        !modbus::answers(asked, modbus::pdu_of(note.bytes)))
+        return;
+    rt::log(rt::LogLevel::warn, "write answered by another address",
+            {{"line", settings.name},
+             {"station", name_of(settings.stations, last_write[0])},
+             {"hint", "station " + std::to_string(station) +
+                          " has answered with this very write: is that its new address?"}});
 }
 
 /// While the line is down take_down() has told all. Addresses of a search have no health.

@@ -67,6 +67,7 @@ struct Bus::State final : public LineRecords, public line::Line::Events {
     }
     void act(arbiter::Finish& finish);
     void act(arbiter::Note& note) {
+        look_for_new_address(note);
         ClientName client = names.name(note.why.client);
         book.note(std::move(note), std::move(client));
     }
@@ -80,6 +81,7 @@ struct Bus::State final : public LineRecords, public line::Line::Events {
     }
     void act(arbiter::StationEvent& event);
     void tell_health(std::uint8_t station);
+    void look_for_new_address(const arbiter::Note& note);
     void act(const arbiter::Written& written) {
         observe(settings,
                 WriteEvent{written.station, written.items, written.ended, written.client});
@@ -124,6 +126,7 @@ struct Bus::State final : public LineRecords, public line::Line::Events {
         bool posted = false;                          ///< change_line() is posted
     };
     std::optional<Change> change;
+    Bytes last_write;  ///< the frame sent last, if it writes; else empty
     std::shared_ptr<bool> alive = std::make_shared<bool>(true);
     int calls = 0;               ///< clients' calls in progress
     std::uint64_t up_count = 0;  ///< how often the line came up

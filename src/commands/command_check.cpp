@@ -193,7 +193,8 @@ ExitCode check(const std::string& file, const CheckOptions& options) {
     return loaded.code != kFine ? loaded.code : compared.loaded.code;
 }
 
-ExitCode import_conf(const std::string& file) {
+ExitCode import_conf(const std::string& file, const OutputFile& output) {
+    if (const ExitCode refused = may_write(output); refused != kFine) return refused;
     const std::string path = explain::path_of(file);
     const auto text = config::RealFiles::read_any(path);
     if (!text) {
@@ -206,7 +207,10 @@ ExitCode import_conf(const std::string& file) {
         std::cerr << problems.text();
         return kBadConfig;
     }
-    std::cout << imported->yaml << std::flush;
+    if (output.file.empty())
+        std::cout << imported->yaml << std::flush;
+    else if (!write(output, imported->yaml))
+        return cannot_write(output);
     for (const std::string& note : imported->notes) std::cerr << note << '\n';
     return kFine;
 }

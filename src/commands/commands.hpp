@@ -153,8 +153,9 @@ struct OutputFile {
 };
 /// The `yaml` option is ignored.
 ExitCode init(const ScanOptions& options, const OutputFile& output);
-/// Converts another gateway's configuration; "-" for standard input.
-ExitCode import_conf(const std::string& file);
+/// Converts another gateway's configuration; "-" for standard input. Nothing is written of a file
+/// that has faults.
+ExitCode import_conf(const std::string& file, const OutputFile& output);
 /// Lists all profiles, or describes one; `dir` as in address().
 ExitCode profiles(const std::string& name, const std::string& dir);
 /// Judges a file that describes a panel as loading it does; "-" for standard input.

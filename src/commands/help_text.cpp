@@ -53,7 +53,9 @@ constexpr std::array kExamples{
     Example{"get", "config get -c panelgate.yaml lines.floor1.stations.press.retries"},
     Example{"keys", "config keys lines.stations.points"},
     Example{"schema", "schema > panelgate.schema.json"},
-    Example{"import", "import /etc/mbusd.conf > panelgate.yaml"},
+    Example{"import",
+            "import /etc/mbusd.conf -o panelgate.yaml\n"
+            "import /etc/systemd/system/mbusd.service -o panelgate.yaml"},
     Example{"address", "address panasonic-gt GDT108\naddress autonics-gplp-s coil/288"},
     Example{"cert",
             "cert new-ca\ncert new-server gateway.plant 10.0.0.5\n"

@@ -344,8 +344,7 @@ class CommandLine {
         CLI::App* command = cli_.add_subcommand(
             "init", "scan a line, and write a configuration of it with comments");
         add_search(command);
-        command->add_option("-o,--output", output_.file, "write this file, not standard output");
-        command->add_flag("--force", output_.force, "write over a file that is there");
+        add_output(command);
         command->footer(
             "Exit codes: 0 it is written; 64 usage, or the file is there; 69 as of scan: nothing "
             "was found, the device cannot be used, another master is talking, the scan was "
@@ -353,13 +352,25 @@ class CommandLine {
         command->callback([this] { code_ = init(scan_, output_); });
     }
 
+    void add_output(CLI::App* command) {
+        command->add_option("-o,--output", output_.file, "write this file, not standard output");
+        command->add_flag("--force", output_.force, "write over a file that is there");
+    }
+
     void add_import() {
         CLI::App* command = cli_.add_subcommand(
-            "import", "make a configuration of another gateway's: of mbusd's mbusd.conf");
-        command->add_option("FILE", imported_, "its configuration, - for standard input")
+            "import",
+            "make a configuration of another gateway's: of mbusd's mbusd.conf or command line");
+        command
+            ->add_option("FILE", imported_,
+                         "its mbusd.conf, or the unit or script that starts it with options; - for "
+                         "standard input")
             ->required();
-        command->footer("Exit codes: 0 fine; 66 the file cannot be read; 78 it has faults.");
-        command->callback([this] { code_ = import_conf(imported_); });
+        add_output(command);
+        command->footer(
+            "Exit codes: 0 fine; 64 usage, or the output is there; 66 the file cannot be read; 70 "
+            "the output cannot be written; 78 the file has faults.");
+        command->callback([this] { code_ = import_conf(imported_, output_); });
     }
 
     void add_schema() {

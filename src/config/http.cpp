@@ -284,7 +284,7 @@ const Keys<web::Settings>& http_keys() {
             .list("hosts", &Settings::hosts,
                   {"[gw.plant.example]", "the machine's names", "^\\[?[A-Za-z0-9._:-]+\\]?$", true},
                   read_host,
-                  "Its names in URLs, besides its addresses and localhost; another name is "
+                  "Its names in URLs, besides addresses and localhost; another name is "
                   "answered 421. Without it the machine's name.")
             .weaker(By::more)
             .example("[gateway.plant.example]")

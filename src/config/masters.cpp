@@ -156,7 +156,6 @@ std::optional<Master> load_master(Reader& root, const Node& node) {
               "{name: plc, device: /dev/ttyUSB1, lines: [floor1]}");
     in.elsewhere(kKeysElsewhere);
     Master settings;
-    settings.access.diagnostics_unit.reset();
     settings.access.framing = Framing::rtu;
     settings.access.broadcast = BroadcastMode::silent;
     settings.device.serial.mode = mode_of(node);

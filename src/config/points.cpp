@@ -50,13 +50,15 @@ std::vector<std::string> words_of(Fits fits) {
     return words;
 }
 
-constexpr auto kTypeWords = [] {
-    Words<Type, std::size(points::kTypes)> words{};
-    constexpr std::array<std::string_view, std::size(points::kTypes)> kNames{
-        "bool", "u16", "i16", "u32", "i32", "u64", "i64", "f32", "f64", "bcd16", "bcd32", "string"};
-    for (std::size_t i = 0; i < words.size(); ++i) words[i] = {kNames[i], points::kTypes[i]};
-    return words;
-}();
+const Words<Type, std::size(points::kTypes)>& type_words() {
+    static const auto kWords = [] {
+        Words<Type, std::size(points::kTypes)> words{};
+        for (std::size_t i = 0; i < words.size(); ++i)
+            words[i] = {label(points::kTypes[i]), points::kTypes[i]};
+        return words;
+    }();
+    return kWords;
+}
 
 /// float32be, uint32_le
 std::string order_hint(std::string_view typed) {
@@ -113,7 +115,7 @@ const Keys<Point>& point_keys() {
             .example("UW100")
             .integer("bit", &Point::bit, 0, 15, "One bit of a register; the type is bool then.")
             .weaker(By::any)
-            .word("type", &Point::type, kTypeWords,
+            .word("type", &Point::type, type_words(),
                   "Type of the value. Without it u16; of a bit bool.", order_hint)
             .weaker(By::any)
             .needs("string", "length", "string needs its length: add length: 1 to 250 characters")
@@ -186,26 +188,11 @@ RawRange unsigned_range(unsigned bits) {
 
 /// Range for labels; unlimited for other than integer types.
 RawRange label_range(Type type) {
-    switch (type) {
-        case Type::bcd16:
-            return {0, 9'999};
-        case Type::bcd32:
-            return {0, 99'999'999};
-        case Type::i16:
-        case Type::i32:
-        case Type::i64:
-            return signed_range(16 * points::registers_of(type));
-        case Type::u16:
-        case Type::u32:
-        case Type::u64:
-            return unsigned_range(16 * points::registers_of(type));
-        case Type::boolean:
-        case Type::f32:
-        case Type::f64:
-        case Type::string:
-            return signed_range(64);
-    }
-    std::abort();
+    if (type == Type::bcd16) return {0, 9'999};
+    if (type == Type::bcd32) return {0, 99'999'999};
+    if (!is_integer(type)) return signed_range(64);
+    const unsigned bits = points::bits_of(type);
+    return points::is_signed(type) ? signed_range(bits) : unsigned_range(bits);
 }
 
 /// Range for no_value: 65535 and -1 are the same register.
@@ -213,8 +200,8 @@ RawRange no_value_range(Type type) {
     RawRange range = label_range(type);
     const bool is_bcd = type == Type::bcd16 || type == Type::bcd32;
     if (!is_integer(type) || is_bcd) return range;
-    range.low = signed_range(16 * points::registers_of(type)).low;
-    range.high = unsigned_range(16 * points::registers_of(type)).high;
+    range.low = signed_range(points::bits_of(type)).low;
+    range.high = unsigned_range(points::bits_of(type)).high;
     return range;
 }
 
@@ -245,8 +232,8 @@ ValueRange value_range(const Point& point) {
         low = -high;
         return {low, high};
     }
-    if (point.type == Type::f32) {
-        high = as_printed(std::numeric_limits<float>::max());
+    if (is_float(point.type)) {
+        high = point.type == Type::f16 ? 65504 : as_printed(std::numeric_limits<float>::max());
         low = -high;
     } else {
         const RawRange range = label_range(point.type);
@@ -331,15 +318,26 @@ bool read_labels(Reader& in, Point& point) {
     return true;
 }
 
+/// A whole number, also 0x8000 as the manuals have it.
+std::optional<std::int64_t> parse_raw(std::string_view text) {
+    if (!text.starts_with("0x")) return yaml::parse_integer(text);
+    std::uint64_t value = 0;
+    const auto [end, error] =
+        std::from_chars(text.data() + 2, text.data() + text.size(), value, 16);
+    const bool whole = error == std::errc() && end == text.data() + text.size();
+    return whole ? std::optional(static_cast<std::int64_t>(value)) : std::nullopt;
+}
+
 bool read_no_value(Reader& in, Point& point) {
     const auto list = in.entries("no_value", {}, points::kMaxNoValues);
     if (!is_number(point.type)) return false;
     const RawRange range = no_value_range(point.type);
     for (const Node& item : list) {
         const bool plain = item.kind == Node::Kind::scalar && !item.is_text();
-        const auto raw = plain ? yaml::parse_integer(item.scalar) : std::nullopt;
+        const auto raw = plain ? parse_raw(item.scalar) : std::nullopt;
         if (!raw) {
-            in.problems().add(item.mark, "no_value is a list of raw numbers, such as [-32768]");
+            in.problems().add(item.mark,
+                              "no_value is a list of raw numbers, such as [-32768] or [0x8000]");
         } else if (!range.contains(*raw)) {
             in.problems().add(item.mark, "no_value of type " + std::string(label(point.type)) +
                                              " must be from " + range.text() + ", not " +

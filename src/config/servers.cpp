@@ -21,6 +21,7 @@ namespace {
 
 using modbus::Framing;
 using tcp_server::BroadcastMode;
+using tcp_server::Exceptions;
 using tcp_server::Retransmissions;
 using tcp_server::Settings;
 using yaml::Node;
@@ -92,8 +93,14 @@ std::string line_hint(const Config& config, const std::string& station) {
     return "";
 }
 
-/// Parses "floor1/31" or "floor1/press" into line and station; problems at `mark`.
-std::optional<tcp_server::UnitTarget> unit_target(Loading& loading, const Node& node) {
+/// Where a unit leads, before its station is looked up.
+struct UnitPlace {
+    const Line* line = nullptr;
+    std::string station;
+};
+
+/// Splits "floor1/31", "floor1/press" or "floor1/1-31"; problems at `node`.
+std::optional<UnitPlace> unit_place(Loading& loading, const Node& node) {
     const std::size_t slash = node.scalar.find('/');
     if (slash == std::string::npos) {
         loading.problems.add(node.mark, "a unit points to LINE/STATION such as floor1/31, not " +
@@ -101,67 +108,120 @@ std::optional<tcp_server::UnitTarget> unit_target(Loading& loading, const Node& 
                                             line_hint(loading.config, node.scalar));
         return std::nullopt;
     }
-    const std::string name = node.scalar.substr(0, slash);
-    const std::string text = node.scalar.substr(slash + 1);
-    const Line* line = find_line(loading, node.mark, name);
+    const Line* line = find_line(loading, node.mark, node.scalar.substr(0, slash));
     if (line == nullptr) return std::nullopt;
     if (line->listens) warn_of_refusals(loading, node.mark, *line);
-    const auto station = find_station(*line, text);
-    if (station && *station != 0) warn_of_unlisted(loading, node.mark, *line, *station);
-    if (station) return tcp_server::UnitTarget{name, *station};
+    return UnitPlace{line, node.scalar.substr(slash + 1)};
+}
+
+/// Looks up the station, by id or name; problems at `mark`.
+std::optional<tcp_server::UnitTarget> unit_target(Loading& loading, yaml::Mark mark,
+                                                  const UnitPlace& place) {
+    const Line& line = *place.line;
+    const auto station = find_station(line, place.station);
+    if (station && *station != 0) warn_of_unlisted(loading, mark, line, *station);
+    if (station) return tcp_server::UnitTarget{line.name, *station};
     if (loading.names_missing) return std::nullopt;
     std::vector<std::string_view> names;
-    names.reserve(line->stations.size());
-    for (const Station& known : line->stations) names.push_back(known.name);
-    loading.problems.add(node.mark, "line '" + name + "' has no station " + yaml::quote(text) +
-                                        did_you_mean(text, names, "stations"));
+    names.reserve(line.stations.size());
+    for (const Station& known : line.stations) names.push_back(known.name);
+    loading.problems.add(mark, "line '" + line.name + "' has no station " +
+                                   yaml::quote(place.station) +
+                                   did_you_mean(place.station, names, "stations"));
     return std::nullopt;
+}
+
+/// A number, or "201-231": the first and the last one.
+struct Numbers {
+    std::int64_t first = 0;
+    std::int64_t last = 0;
+    std::int64_t count() const { return last - first + 1; }
+};
+
+std::optional<Numbers> parse_numbers(std::string_view text, std::int64_t most) {
+    const std::size_t dash = text.find('-');
+    const auto first = yaml::parse_integer(text.substr(0, dash));
+    const auto last = dash == text.npos ? first : yaml::parse_integer(text.substr(dash + 1));
+    if (!first || !last || *first < 0 || *last < *first || *last > most) return std::nullopt;
+    return Numbers{*first, *last};
+}
+
+/// Returns the first station of "floor1/1-31", which goes with as many units; problems at `mark`.
+std::optional<std::int64_t> first_station(Loading& loading, yaml::Mark mark,
+                                          const std::string& typed, const Numbers& units) {
+    const auto stations = parse_numbers(typed, modbus::kMaxStation);
+    if (stations && stations->first > 0 && stations->count() == units.count())
+        return stations->first;
+    loading.problems.add(
+        mark, std::to_string(units.count()) + " units lead to as many stations, such as floor1/1-" +
+                  std::to_string(units.count()) + ", not to " + yaml::quote(typed));
+    return std::nullopt;
+}
+
+void read_unit(Reader& in, const yaml::Entry& entry, Settings& settings) {
+    const auto units = parse_numbers(entry.key, 255);
+    if (!units)
+        return in.problems().add(entry.mark,
+                                 "a unit id is a number from 0 to 255, or a range such "
+                                 "as 201-231, not " +
+                                     yaml::quote(entry.key));
+    auto place = unit_place(in.loading, entry.value);
+    if (!place) return;
+    std::optional<std::int64_t> station;
+    if (units->count() > 1) {
+        station = first_station(in.loading, entry.value.mark, place->station, *units);
+        if (!station) return;
+    }
+    for (std::int64_t unit = units->first; unit <= units->last; ++unit) {
+        if (station) place->station = std::to_string((*station)++);
+        const auto target = unit_target(in.loading, entry.value.mark, *place);
+        if (!target) return;
+        if (!settings.units.emplace(static_cast<std::uint8_t>(unit), *target).second)
+            return in.problems().add(entry.mark,
+                                     "unit " + std::to_string(unit) + " is in 'units' twice");
+    }
 }
 
 bool read_units(Reader& in, Settings& settings) {
     const Node* map = in.map("units", "{101: floor1/31}");
     if (map == nullptr) return false;
-    for (const yaml::Entry& entry : map->entries) {
-        const auto unit = yaml::parse_integer(entry.key);
-        if (!unit || *unit < 0 || *unit > 255)
-            in.problems().add(entry.mark,
-                              "a unit id is a number from 0 to 255, not " + yaml::quote(entry.key));
-        else if (const auto target = unit_target(in.loading, entry.value))
-            settings.units[static_cast<std::uint8_t>(*unit)] = *target;
-    }
+    for (const yaml::Entry& entry : map->entries) read_unit(in, entry, settings);
     return true;
 }
 
 KeyShape units_shape(std::int64_t first, std::int64_t last) {
     KeyShape shape = shape_of("units", Kind::map,
                               "Further unit ids (0 to 255, of a serial master 1 to 247), each to "
-                              "LINE/STATION; needed where two lines have the same station id.");
-    shape.keys = '^' + yaml::integer_pattern(first, last) + '$';
+                              "LINE/STATION, or a range to as many stations, such as "
+                              "201-231: floor2/1-31; needed where two lines have the same station "
+                              "id.");
+    const std::string number = yaml::integer_pattern(first, last);
+    shape.keys = '^' + number + "(-" + number + ")?$";
     shape.weaker.by = By::any;
     shape.pattern = "^[^/]+/.";
     shape.may_be_number = false;
     return shape;
 }
 
-/// The gateway's own unit must not hide a station; the default one gives way to an alias and to a
-/// station.
-void check_diagnostics(Reader& in, Settings& settings) {
+/// Returns the station of the listener's lines with this id; nullptr if there is none.
+const Station* station_with_id(const Config& config, const tcp_server::Settings& settings,
+                               std::int64_t id) {
+    for (const std::string& name : settings.lines) {
+        const std::vector<Station>& stations = find_line(config, name)->stations;
+        const auto found = std::ranges::find(stations, id, &Station::id);
+        if (found != stations.end()) return &*found;
+    }
+    return nullptr;
+}
+
+/// The gateway's own unit must not hide a station.
+void check_diagnostics(Reader& in, const Settings& settings) {
     if (!settings.diagnostics_unit) return;
     const std::uint8_t unit = *settings.diagnostics_unit;
     const std::string number = std::to_string(unit);
-    const Station* hidden = nullptr;
-    for (const std::string& name : settings.lines) {
-        const std::vector<Station>& stations = find_line(in.loading.config, name)->stations;
-        const auto found = std::ranges::find(stations, unit, &Station::id);
-        if (found != stations.end() && hidden == nullptr) hidden = &*found;
-    }
-    if (!in.has("diagnostics_unit")) {
-        if (settings.units.contains(unit) || hidden != nullptr) settings.diagnostics_unit.reset();
-        return;
-    }
     if (settings.units.contains(unit))
         in.problem("diagnostics_unit", "unit " + number + " is in 'units' already");
-    if (hidden != nullptr)
+    if (const Station* hidden = station_with_id(in.loading.config, settings, unit))
         in.problem("diagnostics_unit",
                    "diagnostics_unit " + number + " hides station '" + hidden->name + '\'');
 }
@@ -274,17 +334,6 @@ void check_overlap(Reader& in, const Settings& settings) {
     }
 }
 
-/// Returns the station of the listener's lines with this id; nullptr if there is none.
-const Station* station_with_id(const Config& config, const tcp_server::Settings& settings,
-                               std::int64_t id) {
-    for (const std::string& name : settings.lines) {
-        const std::vector<Station>& stations = find_line(config, name)->stations;
-        const auto found = std::ranges::find(stations, id, &Station::id);
-        if (found != stations.end()) return &*found;
-    }
-    return nullptr;
-}
-
 const Keys<Settings>& listener_keys() {
     static constexpr Words<Framing, 3> kFramings{
         {{"tcp", Framing::tcp}, {"rtu", Framing::rtu}, {"ascii", Framing::ascii}}};
@@ -293,8 +342,11 @@ const Keys<Settings>& listener_keys() {
                                                           {"deny", BroadcastMode::deny}}};
     static constexpr Words<Retransmissions, 2> kRetransmissions{
         {{"join", Retransmissions::join}, {"pass", Retransmissions::pass}}};
+    static constexpr Words<Exceptions, 3> kExceptions{
+        {{"all", Exceptions::all}, {"own", Exceptions::own}, {"none", Exceptions::none}}};
     KeyShape diagnostics =
-        integers("diagnostics_unit", 1, 255, "Unit id of the gateway's own registers; null: none.");
+        integers("diagnostics_unit", 1, 255,
+                 "Unit id of the gateway's own registers, such as 255; null: none.");
     diagnostics.may_be_null = true;
     diagnostics.weaker = {By::leaving, "null", {}};
     static const auto kKeys =
@@ -334,6 +386,10 @@ const Keys<Settings>& listener_keys() {
                   "bytes) before its answer: join has one frame and one answer, pass takes it "
                   "for another one. Without it writes are joined.")
             .initially("")
+            .word("exceptions", &Settings::exceptions, kExceptions,
+                  "What clients get of failures: all; own: exceptions of panels, and silence in "
+                  "place of the gateway's own (06, 0A, 0B ...), for clients that take a device "
+                  "offline for 0B; none: silence in place of every exception.")
             .value(diagnostics, read_diagnostics,
                    [](const Settings& settings) {
                        const auto& unit = settings.diagnostics_unit;

@@ -48,7 +48,7 @@ constexpr Counts kUnanswered{&S::silent, &S::disturbed};
 /// The bytes of all are wrong.
 constexpr Causes kFormat = causes(wrong_baud, wrong_parity);
 /// The frames are right, in another encoding.
-constexpr Causes kEncoding = causes(wrong_crc_order, ascii_lower_case);
+constexpr Causes kEncoding = causes(wrong_crc_order, ascii_lower_case, ascii_delimiters);
 /// Others send.
 constexpr Causes kSenders = causes(echo, other_master, collision);
 
@@ -64,6 +64,7 @@ constexpr Row kRows[] = {
     line(overrun, {}, {}, find_overrun),
     station(wrong_crc_order, {&S::crc_swapped}, {}, find_crc_order),
     station(ascii_lower_case, {&S::lower_case}, {}, find_lower_case),
+    station(ascii_delimiters, {&S::delimited}, {}, find_delimiters),
     line(wrong_baud, kDamage, causes(echo, telnet), find_all_damaged),
     line(trailing_bytes, {&S::trailed}, causes(echo, telnet, other_master), find_trailing_bytes),
     station(wrong_exception, {&S::wrong_exceptions}, {}, find_wrong_exception),

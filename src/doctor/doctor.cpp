@@ -20,7 +20,7 @@ constexpr std::array kCounts = {
     &Symptoms::wrong,         &Symptoms::requests,         &Symptoms::crc_swapped,
     &Symptoms::trailed,       &Symptoms::wrong_exceptions, &Symptoms::broadcast_replies,
     &Symptoms::lower_case,    &Symptoms::beheaded,         &Symptoms::misaddressed,
-    &Symptoms::repeated,      &Symptoms::silences,
+    &Symptoms::repeated,      &Symptoms::silences,         &Symptoms::delimited,
 };
 constexpr std::size_t kOthers = 2;  // mute_in_a_row, worst_lateness
 static_assert(sizeof(Symptoms) ==

@@ -12,7 +12,7 @@ namespace panelgate::doctor {
 namespace {
 
 /// In the order of Cause.
-constexpr std::array<std::string_view, 24> kCodes{
+constexpr std::array<std::string_view, 25> kCodes{
     "echo",
     "telnet",
     "no-answer-at-all",
@@ -26,6 +26,7 @@ constexpr std::array<std::string_view, 24> kCodes{
     "trailing-bytes",
     "wrong-crc-order",
     "ascii-lower-case",
+    "ascii-delimiters",
     "wrong-exception",
     "wrong-reply",
     "answers-broadcasts",

@@ -305,6 +305,20 @@ void find_lower_case(Case& c, std::uint8_t station, const Symptoms& s) {
           {{"lower_case", s.lower_case}, {"damaged", s.damaged()}, {"right", s.answered}});
 }
 
+void find_delimiters(Case& c, std::uint8_t station, const Symptoms& s) {
+    const Bar bar{c, Cause::ascii_delimiters, named(station)};
+    if (c.facts.serial.mode != SerialMode::ascii) return;
+    if (s.delimited < bar.enough(3) || s.delimited * 2 <= s.damaged()) return;
+    c.add(Cause::ascii_delimiters, named(station),
+          "The replies of " + station_text(c, station) +
+              " do not begin with ':' and end with CR LF, as the standard has it.",
+          "Set the panel to the standard's delimiters, or to RTU. An end that function 08 03 has "
+          "changed is LF again behind the raw request 08 00 03 0A 00.",
+          share_text(s.delimited, s.damaged(), "damaged replies") +
+              " are right but for their first or last characters",
+          {{"delimited", s.delimited}, {"damaged", s.damaged()}});
+}
+
 void find_all_damaged(Case& c) {
     const Symptoms s = unexplained(c);
     if (!is_all_damaged(c, s)) return;

@@ -60,7 +60,8 @@ struct Bar {
 
 /// True if its damage is explained: the frames are right, in another encoding.
 inline bool explained_by_frames(const Case& c, std::uint8_t station) {
-    return c.has(Cause::wrong_crc_order, station) || c.has(Cause::ascii_lower_case, station);
+    return c.has(Cause::wrong_crc_order, station) || c.has(Cause::ascii_lower_case, station) ||
+           c.has(Cause::ascii_delimiters, station);
 }
 
 /// True if most damaged replies have only lost their first bytes.
@@ -98,6 +99,7 @@ void find_overrun(Case& c);
 void find_trailing_bytes(Case& c);
 void find_crc_order(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_lower_case(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
+void find_delimiters(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_all_damaged(Case& c);
 void find_noise(Case& c);
 void find_tcp_framing(Case& c);

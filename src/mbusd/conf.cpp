@@ -77,6 +77,136 @@ std::vector<Line> lines_of(std::string_view text, yaml::Problems& problems) {
     return lines;
 }
 
+/// What a file of another program holds, and no mbusd.conf.
+struct Foreign {
+    std::string_view sign;
+    std::string_view program;
+    std::string_view page;
+};
+constexpr std::string_view kOthers = "docs/start/from-other-programs";
+constexpr auto kForeign = std::to_array<Foreign>({
+    {"[[inputs.modbus", "Telegraf", kOthers},
+    {"metricType:", "modbus_exporter", kOthers},
+    {"bytesize:", "Home Assistant", kOthers},
+    {"rtuovertcp", "Home Assistant", kOthers},
+    {"input_type:", "Home Assistant", kOthers},
+    {"accepter:", "ser2net", "docs/start/from-ser2net"},
+    {":raw:", "ser2net", "docs/start/from-ser2net"},
+    {":telnet:", "ser2net", "docs/start/from-ser2net"},
+});
+
+/// Tells whose file this is, where it is none of mbusd. One problem then says more than one a line.
+bool is_foreign(std::string_view text, yaml::Problems& problems) {
+    for (const auto& [sign, program, page] : kForeign) {
+        const std::size_t at = text.find(sign);
+        if (at == text.npos) continue;
+        const auto line = 1 + std::ranges::count(text.substr(0, at), '\n');
+        problems.add({static_cast<int>(line), 1}, "this is a file of " + std::string(program) +
+                                                      ", and import reads those of mbusd; " +
+                                                      std::string(page) +
+                                                      " says which key is which here");
+        return true;
+    }
+    return false;
+}
+
+/// An option of mbusd's command line (main.c, getopt()) and the setting that it stands for.
+struct Option {
+    char letter;
+    std::string_view name;   ///< of the setting; "" none
+    std::string_view value;  ///< "" the option's argument
+    bool takes_argument = value.empty();
+};
+constexpr auto kOptions = std::to_array<Option>({
+    {'p', "device", ""},
+    {'s', "speed", ""},
+    {'m', "mode", ""},
+    {'A', "address", ""},
+    {'P', "port", ""},
+    {'C', "maxconn", ""},
+    {'N', "retries", ""},
+    {'R', "pause", ""},
+    {'W', "wait", ""},
+    {'T', "timeout", ""},
+    {'v', "loglevel", ""},
+    {'L', "logfile", ""},
+    {'c', "", ""},
+    {'S', "enable_rs485", "yes"},
+    {'t', "trx_control", "rts_1"},
+    {'r', "trx_control", "rts_0"},
+    {'y', "trx_control", "sysfs_1", true},
+    {'Y', "trx_control", "sysfs_0", true},
+    {'b', "replyonbroadcast", "yes"},
+    {'d', "", "no"},
+});
+
+struct Word {
+    std::string text;
+    yaml::Mark mark;
+};
+
+/// The words of a line, without quotes around them.
+std::vector<Word> words_of(std::string_view line, int number) {
+    constexpr std::string_view kBlanks = " \t\r";
+    std::vector<Word> words;
+    for (std::size_t at = line.find_first_not_of(kBlanks); at < line.size();
+         at = line.find_first_not_of(kBlanks, at)) {
+        const std::size_t end = std::min(line.find_first_of(kBlanks, at), line.size());
+        std::string word(line.substr(at, end - at));
+        std::erase_if(word, [](char c) { return c == '"' || c == '\''; });
+        words.push_back({std::move(word), {number, static_cast<int>(at) + 1}});
+        at = end;
+    }
+    return words;
+}
+
+/// The words behind "mbusd" where it is started, as by a shell, or by ExecStart= of systemd; else
+/// nothing. A line may go on behind a backslash.
+std::vector<Word> command_line(std::string text) {
+    for (std::size_t at = 0; (at = text.find("\\\n", at)) != text.npos;) text.replace(at, 2, "  ");
+    int number = 0;
+    for (std::string_view rest = text; !rest.empty();) {
+        const std::string_view line = rest.substr(0, rest.find('\n'));
+        rest.remove_prefix(std::min(line.size() + 1, rest.size()));
+        std::vector<Word> words = words_of(line, ++number);
+        const auto is_mbusd = [](const Word& word) {
+            return word.text.substr(word.text.find_last_of("/=") + 1) == "mbusd";
+        };
+        const auto found = std::ranges::find_if(words, is_mbusd);
+        if (found == words.end() || words[0].text.starts_with('#')) continue;
+        words.erase(words.begin(), found + 1);
+        if (!words.empty() && words[0].text.starts_with('-')) return words;
+    }
+    return {};
+}
+
+/// Returns the settings that mbusd's options stand for. Adds unknown options to `problems`.
+std::vector<Line> lines_of(const std::vector<Word>& words, yaml::Problems& problems) {
+    std::vector<Line> lines;
+    for (auto word = words.begin(); word != words.end(); ++word) {
+        const std::string& text = word->text;
+        const char letter = text.size() > 1 && text[0] == '-' ? text[1] : ' ';
+        const auto* const option = std::ranges::find(kOptions, letter, &Option::letter);
+        if (option == kOptions.end()) {
+            problems.add(word->mark, "mbusd has no option " + yaml::quote(text));
+            continue;
+        }
+        std::string argument = option->takes_argument ? text.substr(2) : "";
+        if (option->takes_argument && argument.empty() && word + 1 != words.end())
+            argument = (++word)->text;
+        if (letter == 'c')
+            problems.add(word->mark,
+                         "the settings are in " + yaml::quote(argument) + ": import that file");
+        else if (letter == 'p' && !argument.starts_with('/'))
+            argument.insert(0, "/dev/");
+        if (option->name.empty()) continue;
+        lines.push_back({std::string(option->name),
+                         option->value.empty() ? argument : std::string(option->value), word->mark,
+                         word->mark});
+    }
+    return lines;
+}
+
 /// mbusd's settings, with its defaults (cfg.c, cfg_init(); README).
 struct Settings {
     std::string device = "/dev/ttyS0";
@@ -192,7 +322,8 @@ class Reader {
     void device() {
         const std::string& path = mbusd_.device = line_->value;
         const bool is_tty = path.starts_with("/dev/tty");
-        const bool more = is_tty && path.find_first_of(":,;# ") != path.npos;
+        // systemd's %i stands for what the unit is started with.
+        const bool more = is_tty && path.find_first_of(":,;# %") != path.npos;
         if (path[0] != '/' || more || as_ascii(path) != path)
             wrong_value("the absolute path of a device alone, such as /dev/ttyS0");
     }
@@ -326,8 +457,11 @@ std::string yaml_of(const Settings& mbusd, const std::vector<std::string>& notes
 }  // namespace
 
 std::optional<Imported> import_conf(std::string_view text, yaml::Problems& problems) {
+    if (is_foreign(text, problems)) return std::nullopt;
     Reader reader(problems);
-    for (const Line& line : lines_of(text, problems)) reader.take(line);
+    const std::vector<Word> words = command_line(std::string(text));
+    for (const Line& line : words.empty() ? lines_of(text, problems) : lines_of(words, problems))
+        reader.take(line);
     if (!problems.empty()) return std::nullopt;
     return Imported{yaml_of(reader.mbusd(), reader.notes()), reader.notes()};
 }

@@ -160,6 +160,33 @@ constexpr std::size_t kLongest = kMaxLongRequestPdu + 2;
 
 }  // namespace
 
+namespace {
+
+/// A line of text that is a frame, but for its first character.
+bool begins_otherwise(ByteView text) {
+    if (text.size() < kMinAsciiAdu) return false;
+    AsciiReader reader(HexDigits::any_case, kLongest);
+    AsciiReader::Step step = reader.take(kBegin);
+    for (const std::uint8_t character : text.subspan(1)) step = reader.take(character);
+    return step == AsciiReader::Step::whole;
+}
+
+}  // namespace
+
+/// Ends of the field: LF alone, CR CR LF, a blank before CR LF. Of a frame that ends with CR alone
+/// the LRC is not given, because no end has come.
+bool has_other_delimiters(ByteView damaged, std::size_t expected) {
+    if (damaged.size() + 2 == expected) return true;
+    constexpr std::size_t kLongestEnd = 3;
+    constexpr std::string_view kEnds = "\r\n ";
+    for (std::size_t end = 1; end <= kLongestEnd && damaged.size() >= kMinBytes + end; ++end) {
+        const std::uint8_t last = damaged[damaged.size() - end];
+        if (kEnds.find(static_cast<char>(last)) == kEnds.npos) break;
+        if (lrc(damaged.first(damaged.size() - end)) == 0) return true;
+    }
+    return begins_otherwise(damaged);
+}
+
 Bytes to_ascii(ByteView adu) { return encode_ascii(adu[0], pdu_of(adu)); }
 
 AsciiTranscript::AsciiTranscript(HexDigits digits, Duration pause)

@@ -164,6 +164,7 @@ struct Client::State : std::enable_shared_from_this<Client::State> {
     void accepted();
     void take_commands(const std::vector<Connection::Received>& received);
     void lost(const std::string& why);
+    void judge_session();
     void retry();
     void pump();
     void wake();
@@ -193,7 +194,9 @@ struct Client::State : std::enable_shared_from_this<Client::State> {
     bool running = false;
     bool accepted_once = false;
     bool connected = false;
-    bool awake = false;  ///< a pump() is posted
+    TimePoint connected_since{};
+    int short_sessions = 0;  ///< in a row
+    bool awake = false;      ///< a pump() is posted
     bool writing = false;
     std::uint64_t published = 0;
     std::uint64_t reconnects = 0;
@@ -292,6 +295,7 @@ void Client::State::digest() {
 void Client::State::accepted() {
     connack_due.reset();
     connected = true;
+    connected_since = clock.now();
     if (accepted_once) ++reconnects;
     accepted_once = true;
     rt::log(rt::LogLevel::info, "mqtt connected",
@@ -317,9 +321,24 @@ void Client::State::take_commands(const std::vector<Connection::Received>& recei
     }
 }
 
+/// Two clients with one id take the session from each other without an end (MQTT.js#684): each
+/// connection is closed as soon as the other client has come back.
+void Client::State::judge_session() {
+    constexpr int kEnough = 3;
+    constexpr Duration kShort = 5s;
+    if (!connected) return;
+    short_sessions = clock.now() - connected_since < kShort ? short_sessions + 1 : 0;
+    if (short_sessions == kEnough)
+        rt::log(rt::LogLevel::warn, "mqtt sessions end at once",
+                {{"broker", settings.broker()},
+                 {"hint", "is another client connected as " + settings.client_id +
+                              "? Each needs a client_id of its own"}});
+}
+
 void Client::State::lost(const std::string& why) {
     rt::log(rt::LogLevel::warn, "mqtt not connected",
             {{"broker", settings.broker()}, {"why", why}});
+    judge_session();
     ++attempt;
     // A broker that knows MQTT 3.1.1 alone may refuse a later one, or close without a word.
     const bool falls_back = connack_due.has_value() || std::exchange(is_too_new, false);

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <string>
 #include <utility>
@@ -40,33 +39,19 @@ Limits limits_of() {
 
 /// Range of the raw number.
 Limits limits_of(Type type) {
-    switch (type) {
-        case Type::boolean:
-            return {0, 1};
-        case Type::u16:
-            return {0, 65535};
-        case Type::i16:
-            return {-32768, 32767};
-        case Type::u32:
-            return {0, std::int64_t{4294967295}};
-        case Type::i32:
-            return limits_of<int>();
-        case Type::u64:
-            return limits_of<std::uint64_t>();
-        case Type::i64:
-            return limits_of<std::int64_t>();
-        case Type::bcd16:
-            return {0, 9999};
-        case Type::bcd32:
-            return {0, 99999999};
-        case Type::f32:
-            return {as_printed(std::numeric_limits<float>::lowest()),
-                    as_printed(std::numeric_limits<float>::max())};
-        case Type::f64:
-        case Type::string:
-            return limits_of<double>();
-    }
-    std::abort();
+    if (type == Type::boolean) return {0, 1};
+    if (type == Type::u64) return limits_of<std::uint64_t>();
+    if (type == Type::i64) return limits_of<std::int64_t>();
+    if (type == Type::bcd16) return {0, 9999};
+    if (type == Type::bcd32) return {0, 99999999};
+    if (type == Type::f16) return {-65504, 65504};
+    if (type == Type::f32)
+        return {as_printed(std::numeric_limits<float>::lowest()),
+                as_printed(std::numeric_limits<float>::max())};
+    if (!is_integer(type)) return limits_of<double>();
+    const std::int64_t half = std::int64_t{1} << (bits_of(type) - 1);
+    if (is_signed(type)) return {-half, half - 1};
+    return {0, 2 * half - 1};
 }
 
 /// "u16, scale 0.1"
@@ -150,10 +135,16 @@ Encoded<Words> check_written(const Point& point, const Value& value, Words words
                    to_string(*written));
 }
 
-/// `raw` is within the type's range.
+/// Returns the bits of a register that a byte has.
+std::uint64_t byte_mask(Type type) {
+    return type == Type::u8h || type == Type::i8h ? 0xFF00 : 0x00FF;
+}
+
+/// `raw` is within the type's range. The other half of a byte's register is 0.
 Words words_of(const Point& point, const Decimal& raw) {
     const auto i = raw.as_int64();
-    const std::uint64_t bits = i ? static_cast<std::uint64_t>(*i) : raw.as_uint64().value_or(0);
+    std::uint64_t bits = i ? static_cast<std::uint64_t>(*i) : raw.as_uint64().value_or(0);
+    if (is_byte(point.type)) bits = (bits << 8 | (bits & 0xFF)) & byte_mask(point.type);
     return reordered(split_words(is_bcd(point.type) ? to_bcd(bits) : bits, point.count()),
                      point.word_order, false);
 }
@@ -186,17 +177,18 @@ Decimal as_shown(float number) { return as_printed(number); }
 Decimal as_shown(double number) { return number; }
 
 /// True if `number`, the nearest float, may stand for the value. Fractions need not be exact to the
-/// last bit. Integers must be, and fractions where floats have none; a value other than 0 must not
-/// become 0 or lose most of its digits.
+/// last bit. Integers must be, and fractions where floats have none (from `whole` on); a value
+/// other than 0 must not become 0 or lose most of its digits (below `normal`).
 template <class Float>
-bool float_holds(const Point& point, const Value& value, Float number) {
+bool float_holds(const Point& point, const Value& value, Float number,
+                 Float normal = std::numeric_limits<Float>::min(),
+                 Float whole = 1 / std::numeric_limits<Float>::epsilon()) {
     if (!is_plain(point)) return true;
     const Decimal given = decimal_of(value);
     const auto held = static_cast<double>(number);
     if (given == Decimal::exactly(held) || given == as_shown(number)) return true;
-    constexpr Float kWhole = 1 / std::numeric_limits<Float>::epsilon();
     const Float size = std::abs(number);
-    return !given.is_whole() && size >= std::numeric_limits<Float>::min() && size < kWhole;
+    return !given.is_whole() && size >= normal && size < whole;
 }
 
 /// Names this float and the next one on the other side of the value.
@@ -219,6 +211,16 @@ Encoded<Words> encode_f32(const Point& point, const Value& value, double raw, Ro
     return check_written(point, value, reordered(split_words(bits, 2), point.word_order, false));
 }
 
+Encoded<Words> encode_f16(const Point& point, const Value& value, double raw, Rounding rounding) {
+    const std::uint16_t bits = to_half(raw);
+    const float number = from_half(bits);
+    constexpr float kNormal = 1.0F / (1 << 14);
+    constexpr float kWhole = 1 << 10;
+    if (rounding == Rounding::exact && !float_holds(point, value, number, kNormal, kWhole))
+        return inexact(point, value, {as_shown(number).nearest(), {}});
+    return check_written(point, value, reordered(Words{bits}, point.word_order, false));
+}
+
 Encoded<Words> encode_number(const Point& point, const Value& value, Rounding rounding) {
     const double number = *number_of(value);
     if (!std::isfinite(number)) return refusal(point.name + " takes finite numbers only");
@@ -227,6 +229,7 @@ Encoded<Words> encode_number(const Point& point, const Value& value, Rounding ro
     if (!std::isfinite(raw) || !within_type(point.type, raw)) return beyond_type(point, value);
     if (rounding == Rounding::exact && !within_limits(point, value))
         return beyond_limits(point, value);
+    if (point.type == Type::f16) return encode_f16(point, value, raw, rounding);
     if (point.type == Type::f32) return encode_f32(point, value, raw, rounding);
     if (rounding == Rounding::exact && !float_holds(point, value, raw))
         return inexact_float(point, value, raw);
@@ -329,6 +332,16 @@ const profile::Area* bit_view(const profile::PanelProfile& profile, const Point&
     return nullptr;
 }
 
+/// Writes the bits of `mask`, and leaves the others of the register.
+Bytes write_part(std::uint16_t address, unsigned mask, unsigned bits) {
+    return Writer()
+        .u8(modbus::kMaskWriteRegister)
+        .u16(address)
+        .u16(~mask & 0xFFFFu)
+        .u16(bits)
+        .take();
+}
+
 /// Requires one of the two ways.
 Bytes write_bit(const profile::PanelProfile& profile, const Point& point, bool on) {
     if (bit_view(profile, point) != nullptr) {
@@ -336,20 +349,16 @@ Bytes write_bit(const profile::PanelProfile& profile, const Point& point, bool o
         return write_coil(profile, coil, on);
     }
     const unsigned mask = 1u << *point.bit;
-    return Writer()
-        .u8(modbus::kMaskWriteRegister)
-        .u16(point.address)
-        .u16(~mask & 0xFFFFu)
-        .u16(on ? mask : 0)
-        .take();
+    return write_part(point.address, mask, on ? mask : 0);
 }
 
-std::optional<std::string> why_no_bit(const profile::PanelProfile& profile, const Point& point) {
-    if (bit_view(profile, point) != nullptr) return std::nullopt;
+std::optional<std::string> why_no_part(const profile::PanelProfile& profile, const Point& point) {
+    if (point.bit && bit_view(profile, point) != nullptr) return std::nullopt;
     if (profile.has_function(modbus::kMaskWriteRegister)) return std::nullopt;
-    return profile.name + " can write no single bit of " + point.at +
-           ": it has neither function 22 nor a bit view of it, and reading, changing and writing "
-           "the word would undo what changes in between";
+    return profile.name + " can write no single " +
+           (point.bit ? "bit of " + point.at + ": it has neither function 22 nor a bit view of it"
+                      : "byte of " + point.at + ": it has no function 22") +
+           ", and reading, changing and writing the word would undo what changes in between";
 }
 
 std::optional<std::string> why_no_registers(const profile::PanelProfile& profile, unsigned count) {
@@ -369,6 +378,11 @@ Bytes pdu_of(const profile::PanelProfile& profile, const Point& point,
     if (point.table == modbus::Table::coils)
         return write_coil(profile, point.address, items.front() != 0);
     if (point.bit) return write_bit(profile, point, items.front() != 0);
+    if (is_byte(point.type)) {
+        const auto mask = static_cast<std::uint16_t>(byte_mask(point.type));
+        return write_part(point.address, reordered(Words{mask}, point.word_order, false).front(),
+                          items.front());
+    }
     if (items.size() == 1 && profile.has_function(modbus::kWriteSingleRegister))
         return modbus::encode_write_register(point.address, items.front());
     return modbus::encode_write_registers(point.address, items);
@@ -390,7 +404,7 @@ std::optional<std::string> why_unwritable(const profile::PanelProfile& profile,
     }
     if (point.table != modbus::Table::holding_registers)
         return point.at + " is in a table that cannot be written";
-    if (point.bit) return why_no_bit(profile, point);
+    if (point.bit || is_byte(point.type)) return why_no_part(profile, point);
     return why_no_registers(profile, point.count());
 }
 
@@ -415,7 +429,8 @@ std::vector<Interpretation> interpretations(std::span<const std::uint16_t> regis
             if (type == Type::string) point.length = static_cast<unsigned>(registers.size() * 2);
             const unsigned size = point.count();
             const bool words_matter = size > 1 && type != Type::string;
-            const bool turned = order == WordOrder::cdab || order == WordOrder::dcba;
+            const bool turned = order == WordOrder::cdab || order == WordOrder::dcba ||
+                                (order == WordOrder::badc && is_byte(type));
             if (size == 0 || size > registers.size() || (turned && !words_matter)) continue;
             Interpretation made{type, order, {}};
             for (std::size_t i = 0; i + size <= registers.size(); i += size) {

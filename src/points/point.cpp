@@ -26,9 +26,20 @@ struct Raw {
 std::optional<Raw> raw_of(Type type, std::uint64_t bits) {
     switch (type) {
         case Type::boolean:
+        case Type::u8l:
+            return Raw{false, static_cast<std::uint8_t>(bits), 0};
+        case Type::i8l:
+            return Raw{false, static_cast<std::int8_t>(bits), 0};
+        case Type::u8h:
+            return raw_of(Type::u8l, bits >> 8);
+        case Type::i8h:
+            return raw_of(Type::i8l, bits >> 8);
         case Type::u16:
         case Type::u32:
+        case Type::u48:
             return Raw{false, static_cast<std::int64_t>(bits), 0};
+        case Type::i48:
+            return Raw{false, static_cast<std::int64_t>(bits << 16) >> 16, 0};
         case Type::i16:
             return Raw{false, static_cast<std::int16_t>(bits), 0};
         case Type::i32:
@@ -43,6 +54,7 @@ std::optional<Raw> raw_of(Type type, std::uint64_t bits) {
             if (!value) return std::nullopt;
             return Raw{false, *value, 0};
         }
+        case Type::f16:
         case Type::f32:
         case Type::f64:
         case Type::string:
@@ -101,6 +113,8 @@ std::optional<Value> decode(const Point& point, std::span<const std::uint16_t> i
         reordered(items.first(point.count()), point.word_order, point.type == Type::string);
     if (point.type == Type::string) return Value(text_of_words(words, point.length));
     const std::uint64_t bits = join_words(words);
+    if (point.type == Type::f16)
+        return decode_float(point, from_half(static_cast<std::uint16_t>(bits)));
     if (point.type == Type::f32)
         return decode_float(point, std::bit_cast<float>(static_cast<std::uint32_t>(bits)));
     if (point.type == Type::f64) return decode_double(point, std::bit_cast<double>(bits));
@@ -137,20 +151,27 @@ namespace {
 /// A row for each Type.
 struct TypeRow {
     std::string_view word;
-    unsigned registers;
+    unsigned bits;
 };
-constexpr std::array<TypeRow, std::size(kTypes)> kTypeRows{{{"bool", 1},
-                                                            {"u16", 1},
-                                                            {"i16", 1},
-                                                            {"u32", 2},
-                                                            {"i32", 2},
-                                                            {"u64", 4},
-                                                            {"i64", 4},
-                                                            {"f32", 2},
-                                                            {"f64", 4},
-                                                            {"bcd16", 1},
-                                                            {"bcd32", 2},
-                                                            {"string", 1}}};
+constexpr std::array<TypeRow, std::size(kTypes)> kTypeRows{{{"bool", 16},
+                                                            {"u8h", 8},
+                                                            {"u8l", 8},
+                                                            {"i8h", 8},
+                                                            {"i8l", 8},
+                                                            {"u16", 16},
+                                                            {"i16", 16},
+                                                            {"u32", 32},
+                                                            {"i32", 32},
+                                                            {"u48", 48},
+                                                            {"i48", 48},
+                                                            {"u64", 64},
+                                                            {"i64", 64},
+                                                            {"f16", 16},
+                                                            {"f32", 32},
+                                                            {"f64", 64},
+                                                            {"bcd16", 16},
+                                                            {"bcd32", 32},
+                                                            {"string", 16}}};
 constexpr std::array<std::string_view, std::size(kOrders)> kOrderWords{"ABCD", "BADC", "CDAB",
                                                                        "DCBA"};
 
@@ -158,7 +179,9 @@ constexpr std::array<std::string_view, std::size(kOrders)> kOrderWords{"ABCD", "
 
 std::string_view label(Type type) { return kTypeRows.at(static_cast<std::size_t>(type)).word; }
 
-unsigned registers_of(Type type) { return kTypeRows.at(static_cast<std::size_t>(type)).registers; }
+unsigned bits_of(Type type) { return kTypeRows.at(static_cast<std::size_t>(type)).bits; }
+
+unsigned registers_of(Type type) { return (bits_of(type) + 15) / 16; }
 
 std::string_view label(WordOrder order) { return kOrderWords.at(static_cast<std::size_t>(order)); }
 

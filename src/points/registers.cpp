@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include "panelgate/base/text.hpp"
 
@@ -158,6 +159,38 @@ std::uint64_t to_bcd(std::uint64_t value) {
     return raw;
 }
 
+namespace {
+
+constexpr int kHalfDigits = 10;  // of the fraction
+constexpr int kHalfBias = 25;    // of the exponent, with the fraction as a whole number
+constexpr unsigned kHidden = 1u << kHalfDigits;
+constexpr unsigned kHalfSign = 0x8000;
+
+}  // namespace
+
+float from_half(std::uint16_t bits) {
+    const int exponent = bits >> kHalfDigits & 0x1F;
+    const unsigned fraction = bits % kHidden;
+    float size = std::ldexp(static_cast<float>(fraction), 1 - kHalfBias);
+    if (exponent == 0x1F)
+        size = fraction == 0 ? std::numeric_limits<float>::infinity()
+                             : std::numeric_limits<float>::quiet_NaN();
+    else if (exponent > 0)
+        size = std::ldexp(static_cast<float>(kHidden + fraction), exponent - kHalfBias);
+    return (bits & kHalfSign) != 0 ? -size : size;
+}
+
+/// A fraction that is rounded up to the next power of two carries into the exponent.
+std::uint16_t to_half(double number) {
+    int exponent = 0;
+    std::frexp(number, &exponent);
+    exponent = number == 0 ? 1 : std::max(exponent + kHalfBias - kHalfDigits - 1, 1);
+    const double units = std::nearbyint(std::ldexp(std::abs(number), kHalfBias - exponent));
+    const unsigned bits =
+        static_cast<unsigned>(exponent - 1) * kHidden + static_cast<unsigned>(units);
+    return static_cast<std::uint16_t>(std::signbit(number) ? kHalfSign | bits : bits);
+}
+
 double from_raw(const Point& point, double raw) {
     if (is_plain(point)) return raw;
     // What Scaling does, but cheaper.
@@ -166,7 +199,7 @@ double from_raw(const Point& point, double raw) {
 }
 
 bool is_no_value(const Point& point, std::uint64_t number) {
-    const unsigned unused = 64 - 16 * registers_of(point.type);
+    const unsigned unused = 64 - bits_of(point.type);
     return std::ranges::any_of(point.no_value, [&](std::int64_t none) {
         return (static_cast<std::uint64_t>(none) ^ number) << unused == 0;
     });

@@ -66,6 +66,11 @@ Words split_words(std::uint64_t raw, unsigned count);
 std::optional<std::int64_t> from_bcd(std::uint64_t raw, unsigned digits);
 std::uint64_t to_bcd(std::uint64_t value);
 
+/// IEEE 754 binary16. to_half() rounds to the nearest, ties to even; `number` is at most 65504 in
+/// size.
+float from_half(std::uint16_t bits);
+std::uint16_t to_half(double number);
+
 inline bool is_bcd(Type type) { return type == Type::bcd16 || type == Type::bcd32; }
 /// True without scale and offset.
 inline bool is_plain(const Point& point) { return point.scale == 1 && point.offset == 0; }

@@ -133,7 +133,9 @@ Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const
     const Result<Target> target = units.route(unit);
     if (request && target && !broadcast) return Forward{*target, std::move(*request)};
     std::vector<Target> targets = targets_of(unit, units);
-    if (targets.empty()) return refuse(Fault::not_routed);
+    // Nothing has the address 0, so a read of it has no path: mostly no unit id is set.
+    if (targets.empty() || (broadcast && !writes))
+        return refuse(Fault::not_routed, std::move(targets));
     if (broadcast)
         return decide_broadcast(pdu[0], std::move(request), settings, std::move(targets), who);
     // A valid request is refused by the bus itself.

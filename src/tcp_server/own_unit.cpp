@@ -48,7 +48,7 @@ constexpr std::size_t kBasicObjects = 3;
 constexpr std::size_t kLongest = 60;  // characters of an object: all objects fit one reply
 
 constexpr std::string_view kText =
-    R"(gateway: its own unit, on each Modbus listener (diagnostics_unit, default 255)
+    R"(gateway: its own unit, on each Modbus listener that has diagnostics_unit, such as 255
 
 Input and holding registers 0..4999 (03 and 04), the same in both; every read inside succeeds, and
 what nothing stands at is 0. Two registers: the high word first.

@@ -21,19 +21,8 @@ struct Overloaded : T... {
     using T::operator()...;
 };
 
-Bytes exception_reply(std::uint8_t function, Fault fault) {
-    return modbus::encode_exception(function, modbus::to_exception(fault));
-}
-
-/// Converts a bus's answer to a reply PDU. One too long for an MBAP frame becomes the same
-/// exception as a malformed reply.
-Bytes reply_pdu(std::uint8_t function, Result<Bytes> pdu) {
-    if (!pdu) return exception_reply(function, pdu.error());
-    if (pdu->empty() || pdu->size() > modbus::kMaxPdu) {
-        return exception_reply(function, Fault::malformed);
-    }
-    return std::move(*pdu);
-}
+/// Clients without a unit id that are remembered. Beyond them a client may be told of again.
+constexpr std::size_t kMostWithoutUnit = 1000;
 
 /// True if `request` could change what `read` returns. Units may be aliases, so they are not
 /// compared.
@@ -59,11 +48,12 @@ struct BroadcastOutcome {
             failed = std::move(answer);  // prefer the one with unknown outcome
         }
     }
-    /// Returns the reply; nullopt if the mode is silent and a frame may have been sent (TBC-06).
-    std::optional<Bytes> reply(std::uint8_t function, BroadcastMode mode) const {
+    /// Returns what to answer; nullopt if the mode is silent and a frame may have been sent
+    /// (TBC-06).
+    std::optional<Result<Bytes>> result(BroadcastMode mode) const {
         const bool silent = mode == BroadcastMode::silent;
         if (silent && (sent || failed->transmitted)) return std::nullopt;
-        return reply_pdu(function, sent ? Result<Bytes>(*sent) : failed->pdu);
+        return sent ? Result<Bytes>(*sent) : failed->pdu;
     }
 };
 
@@ -144,16 +134,18 @@ void Pipeline::serve(Ticket ticket) {
     std::visit(Overloaded{
                    [&](const Refuse& refusal) {
                        if (refusal.asked.empty()) tell_stray(adu);
+                       tell_no_unit(adu, refusal.code);
                        for (const Target& target : refusal.asked)
                            caller_.count_refused(target.bus, target.station, adu.pdu);
-                       answer(ticket, [function, code = refusal.code] {
-                           return modbus::encode_exception(function, code);
+                       answer(ticket, [this, function, code = refusal.code] {
+                           return exception(function, code);
                        });
                    },
                    [&](const Diagnose&) {
                        tell_stray(adu);
-                       answer(ticket, [pdu = adu.pdu, shared = shared_.get(), who = caller_.who()] {
-                           return answer_diagnostics(pdu, own_state(*shared, who));
+                       answer(ticket, [this, pdu = adu.pdu] {
+                           return reply_pdu(
+                               pdu[0], answer_diagnostics(pdu, own_state(*shared_, caller_.who())));
                        });
                    },
                    [&](Forward forwarding) { forward(ticket, function, std::move(forwarding)); },
@@ -169,6 +161,36 @@ void Pipeline::tell_stray(const modbus::Adu& adu) const {
         shared_->stray(caller_.who(), adu.unit, adu.pdu);
 }
 
+/// Tells once of a client that asks unit 0 or 255 where nothing is: libmodbus and S7's MB_CLIENT
+/// have 255 without a unit id, Kepware and EasyModbus 0.
+void Pipeline::tell_no_unit(const modbus::Adu& adu, modbus::ExceptionCode code) const {
+    if (code != modbus::to_exception(Fault::not_routed)) return;
+    if (adu.unit != 0 && adu.unit != 255) return;
+    auto& known = shared_->without_unit;
+    if (known.size() >= kMostWithoutUnit) known.clear();
+    if (!known.insert(caller_.who()->address).second) return;
+    shared_->log(rt::LogLevel::warn, "client without a unit id",
+                 {{"client", client()},
+                  {"hint", "asks unit " + std::to_string(adu.unit) + ": is no unit id set?"}});
+}
+
+std::optional<Bytes> Pipeline::exception(std::uint8_t function, modbus::ExceptionCode code) const {
+    if (shared_->settings.exceptions != Exceptions::all) return std::nullopt;
+    return modbus::encode_exception(function, code);
+}
+
+/// Converts a bus's answer to a reply. A PDU too long for an MBAP frame becomes the same exception
+/// as a malformed reply.
+std::optional<Bytes> Pipeline::reply_pdu(std::uint8_t function, Result<Bytes> pdu) const {
+    if (!pdu) return exception(function, modbus::to_exception(pdu.error()));
+    if (pdu->empty() || pdu->size() > modbus::kMaxPdu)
+        return exception(function, modbus::to_exception(Fault::malformed));
+    if (shared_->settings.exceptions == Exceptions::none && modbus::exception_of(*pdu))
+        return std::nullopt;
+    return std::move(*pdu);
+}
+
+/// `pdu` is called while this object lives.
 void Pipeline::answer(Ticket ticket, OwnPdu pdu) {
     if (shared_->own_answers->try_acquire()) return put(ticket, pdu());
     shared_->own_answers->wait([weak = weak_from_this(), ticket, pdu = std::move(pdu)] {
@@ -180,17 +202,20 @@ void Pipeline::answer(Ticket ticket, OwnPdu pdu) {
 }
 
 void Pipeline::forward(Ticket ticket, std::uint8_t function, Forward forwarding) {
-    if (refusing_waiting_) return put(ticket, exception_reply(function, Fault::cancelled));
+    if (refusing_waiting_)
+        return put(ticket, exception(function, modbus::to_exception(Fault::cancelled)));
     caller_.transact(forwarding.target.bus, forwarding.target.station,
                      std::move(forwarding.request),
                      [weak = weak_from_this(), ticket, function](bus::Answer answer) {
                          const auto self = weak.lock();
-                         if (self) self->settle(ticket, reply_pdu(function, std::move(answer.pdu)));
+                         if (self)
+                             self->settle(ticket, self->reply_pdu(function, std::move(answer.pdu)));
                      });
 }
 
 void Pipeline::broadcast(Ticket ticket, std::uint8_t function, const Broadcast& broadcasting) {
-    if (refusing_waiting_) return put(ticket, exception_reply(function, Fault::cancelled));
+    if (refusing_waiting_)
+        return put(ticket, exception(function, modbus::to_exception(Fault::cancelled)));
     const auto outcome = std::make_shared<BroadcastOutcome>();
     outcome->open = broadcasting.lines.size();
     const auto on_answer = [weak = weak_from_this(), outcome, ticket,
@@ -198,7 +223,8 @@ void Pipeline::broadcast(Ticket ticket, std::uint8_t function, const Broadcast& 
         outcome->add(std::move(answer));
         const auto self = weak.lock();
         if (!self || outcome->open != 0) return;
-        self->settle(ticket, outcome->reply(function, self->shared_->settings.broadcast));
+        auto result = outcome->result(self->shared_->settings.broadcast);
+        self->settle(ticket, result ? self->reply_pdu(function, std::move(*result)) : std::nullopt);
     };
     for (bus::BusClient* line : broadcasting.lines)
         caller_.transact(line, 0, broadcasting.request, on_answer);

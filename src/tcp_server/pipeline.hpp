@@ -69,10 +69,14 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
     void admit();
     void serve(Ticket ticket);
     void tell_stray(const modbus::Adu& adu) const;
+    void tell_no_unit(const modbus::Adu& adu, modbus::ExceptionCode code) const;
+    /// Returns the exception, nullopt where the listener's clients get silence in its place.
+    std::optional<Bytes> exception(std::uint8_t function, modbus::ExceptionCode code) const;
+    std::optional<Bytes> reply_pdu(std::uint8_t function, Result<Bytes> pdu) const;
     void forward(Ticket ticket, std::uint8_t function, Forward forwarding);
     void broadcast(Ticket ticket, std::uint8_t function, const Broadcast& broadcasting);
     /// Gives the gateway's own answer, at once or when its turn comes (OwnAnswers).
-    using OwnPdu = InlineFunction<Bytes(), 48>;
+    using OwnPdu = InlineFunction<std::optional<Bytes>(), 48>;
     void answer(Ticket ticket, OwnPdu pdu);
     /// Answers a started request, once; nullopt: no reply. put() does not call on_answer.
     void put(Ticket ticket, std::optional<Bytes> pdu);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -59,6 +60,8 @@ struct Shared {
     std::shared_ptr<OwnAnswers> own_answers;        ///< never null
     std::shared_ptr<tls::Handshakes> handshakes{};  ///< null: no TLS
     StrayWrite stray{};                             ///< may be empty
+    /// Addresses of clients that asked unit 0 or 255 where nothing is, and were told of.
+    std::set<std::string> without_unit{};
 
     /// Logs one line for this listener.
     void log(rt::LogLevel level, std::string_view event, std::vector<rt::LogField> more = {}) const;

@@ -8,6 +8,7 @@ import time
 import unittest
 import urllib.request
 
+import config
 import harness
 from harness import read_registers
 from openapi import Document
@@ -106,7 +107,8 @@ class Viewer(unittest.TestCase):
 
     def test_the_own_registers_hide_what_may_not_be_read(self):
         hidden = """{rules: [{name: not-the-oven, deny: [read], faces: [modbus_tcp], stations: [oven]}]}"""
-        with plant(hidden) as program, program.client() as client:
+        with plant(hidden, modbus=config.FREE_PORT + ", diagnostics_unit: 255") as program, \
+                program.client() as client:
             registers = lambda unit: client.ask(255, read_registers(1000 + 16 * unit, 4))[2:]
             self.assertEqual(registers(31)[:6], bytes.fromhex("0002 0001 001F"), "online, on the first line, 31")
             self.assertEqual(registers(20), bytes(8))

@@ -389,7 +389,7 @@ class Refusing(Case):
         self.write_config()
         self.folder.mkdir()
         with self.gateway() as program, program.client() as client:
-            for unit, code in ((250, 0x0A), (255, 0x01)):
+            for unit, code in ((250, 0x0A), (255, 0x0A)):
                 for _ in range(3):
                     self.assertEqual(client.ask(unit, write_register(4, 5)), bytes([0x86, code]))
                 client.ask(unit, read_registers(1))

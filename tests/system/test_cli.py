@@ -279,7 +279,7 @@ class Files(unittest.TestCase):
               points: [{name: level, at: UW100, writable: true, min: 1, max: 2.5, unit: m}]},
               {id: 20, name: oven, profile: panasonic-gt, access: read_only}""",
                         unlisted_stations="refuse"),
-            modbus="listen: 127.0.0.1:502, units: {101: floor1/press}, broadcast: deny, "
+            modbus="listen: 127.0.0.1:502, units: {101: floor1/press}, broadcast: deny, diagnostics_unit: 254, "
                    "allow: [10.0.0.0/8]",
             http="listen: 127.0.0.1:8080, anonymous: none, hosts: [a.example], allow: ['::1']",
             relays="[{from: oven/GDT0, to: press/UW200, every: 3s, on_change: true}]"))
@@ -292,7 +292,7 @@ class Files(unittest.TestCase):
                       "longer; for 500ms set queue: {deadline: 450ms}",
                       "relay oven/GDT0 to press/UW200: every 3s, on_change true",
                       "modbus_tcp 127.0.0.1:502: floor1, read and write, for 10.0.0.0/8",
-                      "unit 101 is floor1/31", "unit 255 is the gateway itself",
+                      "unit 101 is floor1/31", "unit 254 is the gateway itself",
                       "broadcasts are refused",
                       "http 127.0.0.1:8080: without a token nothing, for ::1/128, as a.example"):
             self.assertIn(shown, text)
@@ -308,7 +308,7 @@ class Files(unittest.TestCase):
         self.assertEqual(line["stations"][0]["points"][0]["name"], "level")
         self.assertEqual(plan["relays"][0]["to"], "press/UW200")
         self.assertEqual(plan["modbus_tcp"][0]["units"], {"101": "floor1/31"})
-        self.assertEqual(plan["modbus_tcp"][0]["diagnostics_unit"], 255)
+        self.assertEqual(plan["modbus_tcp"][0]["diagnostics_unit"], 254)
         self.assertEqual(plan["modbus_tcp"][0]["broadcast"], "deny")
         self.assertEqual(plan["http"]["anonymous"], "none")
         self.assertEqual((plan["valid"], plan["errors"]), (True, []))
@@ -412,6 +412,12 @@ class Files(unittest.TestCase):
         self.assertEqual((ended.returncode, ended.stdout), (BAD_CONFIG, ""))
         self.assertIn(f"{conf}:1:1: a line must be NAME = VALUE", ended.stderr)
         self.assertIn(f"{conf}:2:8: port must be a whole number", ended.stderr)
+        out = self.file.with_name("out.yaml")
+        self.assertEqual(run("import", str(conf), "-o", str(out)).returncode, BAD_CONFIG)
+        self.assertFalse(out.exists(), "nothing is left behind")
+        conf.write_text("ExecStart=/usr/bin/mbusd -d -p /dev/ttyS5 -s 9600\n")
+        self.assertEqual(run("import", str(conf), "-o", str(out)).returncode, 0)
+        self.assertIn("device: '/dev/ttyS5'", out.read_text())
         gone = run("import", str(conf) + "x")
         self.assertEqual(gone.returncode, NO_INPUT)
         self.assertIn("No such file", gone.stderr)

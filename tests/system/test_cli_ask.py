@@ -50,7 +50,7 @@ class Asking(unittest.TestCase):
                 ("read pres UW0", "no station 'pres'; did you mean 'press'?"),
                 ("read press temprature", "no point 'temprature'; did you mean 'temperature'?"),
                 ("read press FOO1", "its points are temperature, setpoint, running"),
-                ("read press UW0 --type q16", "there are bool, u16"),
+                ("read press UW0 --type q16", "there are bool, u8h"),
                 ("write press UW0 5", "UW15 to UW6047; nothing was sent"),
                 ("write press/setpoint 99", "from 0 to 60, not 99"),
                 ("watch press FOO1", "is no notation"),

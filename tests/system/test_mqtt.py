@@ -35,8 +35,9 @@ class Mqtt(unittest.TestCase):
         self.assertRegex(said, rb'"state":"offline","time":.*\xe0\x00$')  # DISCONNECT
 
     def test_a_broker_that_ends_each_connection_is_tried_ever_more_seldom(self):
-        with Rude() as broker, harness.configured(plant(broker)):
+        with Rude() as broker, harness.configured(plant(broker)) as program:
             first, _, third = broker.pauses(3)[:3]
+            program.log.wait_for("mqtt sessions end at once .*is another client connected as gateway")
         self.assertGreater(third, 2 * first)
 
     def test_values_are_there_for_who_comes_later(self):

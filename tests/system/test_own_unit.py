@@ -21,7 +21,8 @@ class OwnUnit(unittest.TestCase):
     def setUpClass(cls):
         running = harness.configured(config.gateway(
             config.line(stations=f"{config.PRESS}, {SILENT}",
-                        timing="{response_timeout: 60ms}")))
+                        timing="{response_timeout: 60ms}"),
+            modbus=config.FREE_PORT + ", diagnostics_unit: 255"))
         cls.program = running.__enter__()
         cls.addClassCleanup(running.__exit__, None, None, None)
         cls.client = ModbusTcpClient("127.0.0.1", port=cls.program.modbus_port())

@@ -39,6 +39,7 @@ struct Symptoms {
     std::uint64_t requests = 0;           ///< good requests of another master
     std::uint64_t crc_swapped = 0;        ///< replies with swapped CRC bytes, otherwise right
     std::uint64_t lower_case = 0;         ///< damaged frames of ASCII in lower-case digits
+    std::uint64_t delimited = 0;          ///< ... with other characters around them
     std::uint64_t trailed = 0;            ///< replies followed by bytes or a duplicate
     std::uint64_t beheaded = 0;           ///< of all damaged: right but for lost first bytes
     std::uint64_t misaddressed = 0;       ///< of silent and disturbed: answered by another address
@@ -66,8 +67,7 @@ struct Symptoms {
 /// What happened on the wire, by station. Counted by the arbiter, read by metrics/.
 struct StationCounters {
     std::uint64_t retries = 0;
-    std::uint64_t late_frames =
-        0;  ///< outstanding replies that came after their request had failed
+    std::uint64_t late_frames = 0;     ///< replies that came after their request had failed
     std::uint64_t foreign_frames = 0;  ///< good frames of another station, or of unknown origin
     std::uint64_t damaged_frames = 0;  ///< bytes that never became a good frame
     std::uint64_t discarded_bytes = 0;

@@ -36,6 +36,7 @@ enum class Cause : std::uint8_t {
     trailing_bytes,      ///< bytes follow the replies
     wrong_crc_order,     ///< a panel's CRC byte order is not the configured one
     ascii_lower_case,    ///< a panel sends ASCII with lower-case digits, which are refused
+    ascii_delimiters,    ///< a panel's ASCII begins or ends with other characters
     wrong_exception,     ///< a panel's exceptions carry a function that was not asked
     wrong_reply,         ///< a panel's good frames do not answer what was asked
     answers_broadcasts,  ///< a panel answers broadcasts, which have no reply

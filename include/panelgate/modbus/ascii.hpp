@@ -29,6 +29,11 @@ enum class HexDigits : std::uint8_t { upper_only, any_case };
 /// was rejected because only upper case is taken.
 bool ends_in_lower_case(ByteView damaged);
 
+/// True if the damaged bytes, as transcribed, are a frame of ASCII that is right but for its
+/// delimiters: it begins with another character than ':', or does not end with CR LF alone.
+/// `expected`: bytes of the reply that was awaited, with its CRC; 0: unknown.
+bool has_other_delimiters(ByteView damaged, std::size_t expected);
+
 /// Parses frames character by character. A ':' always begins a frame. Pure; ignores time.
 class AsciiReader {
   public:

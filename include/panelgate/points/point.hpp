@@ -25,27 +25,42 @@ namespace panelgate::points {
 /// Type of a point's value.
 enum class Type : std::uint8_t {
     boolean,
+    u8h,  ///< the high byte of a register
+    u8l,  ///< the low byte
+    i8h,
+    i8l,
     u16,
     i16,
     u32,
     i32,
+    u48,
+    i48,
     u64,
     i64,
+    f16,
     f32,
     f64,
     bcd16,
     bcd32,
     string,
 };
-inline constexpr Type kTypes[] = {Type::boolean, Type::u16,   Type::i16,   Type::u32,
-                                  Type::i32,     Type::u64,   Type::i64,   Type::f32,
+inline constexpr Type kTypes[] = {Type::boolean, Type::u8h,   Type::u8l,   Type::i8h,   Type::i8l,
+                                  Type::u16,     Type::i16,   Type::u32,   Type::i32,   Type::u48,
+                                  Type::i48,     Type::u64,   Type::i64,   Type::f16,   Type::f32,
                                   Type::f64,     Type::bcd16, Type::bcd32, Type::string};
 /// Returns "bool", "u16", … as in the configuration.
 std::string_view label(Type type);
+/// Returns the bits of one raw number; those of a register for a bit and for a string.
+unsigned bits_of(Type type);
 /// Returns the registers of one value; for a string this depends on its length.
 unsigned registers_of(Type type);
+/// True for half a register. A write of such a value leaves the other half as it is.
+inline bool is_byte(Type type) { return type >= Type::u8h && type <= Type::i8l; }
+/// True for an integer that may be below 0.
+inline bool is_signed(Type type) { return label(type).starts_with('i'); }
+inline bool is_float(Type type) { return type >= Type::f16 && type <= Type::f64; }
 inline bool is_integer(Type type) {
-    return type >= Type::u16 && type != Type::f32 && type != Type::f64 && type != Type::string;
+    return type != Type::boolean && type != Type::string && !is_float(type);
 }
 
 /// Byte order of a value, A the most significant byte of the first register: ABCD is the standard's
@@ -124,8 +139,8 @@ struct PointWrite {
     std::optional<std::string> label;
 };
 /// Returns the single request that writes the value: 05 or 15 for a coil, 06 or 16 for registers,
-/// 22 or the panel's bit view for a bit of a word. Never read-modify-write: changes in between
-/// would be lost.
+/// 22 or the panel's bit view for a bit of a word, 22 for a byte. Never read-modify-write: changes
+/// in between would be lost.
 Encoded<PointWrite> write_request(const profile::PanelProfile& profile, const Point& point,
                                   const Value& value, Rounding rounding = Rounding::exact);
 

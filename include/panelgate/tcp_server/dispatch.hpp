@@ -80,10 +80,10 @@ using Decision = std::variant<Refuse, Forward, Broadcast, Diagnose>;
 
 /// Decides on a request in the order of EXC-08: function 0 or 128..255 is 01; a write through a
 /// read-only listener, or by a client that only reads, 01; an unrouted unit 0A; a write that its
-/// bus would refuse 01, before any other check; anything but a write (BC-02) to a broadcast unit
-/// 01; a PDU that is inconsistent with its function or cannot be answered 03. Queries the buses
-/// only for access rights. `who` asks: what goes to several lines is judged here, everything else
-/// where it is submitted.
+/// bus would refuse 01, before any other check; a read of a broadcast unit 0A, and anything else
+/// but a write (BC-02) to it 01; a PDU that is inconsistent with its function or cannot be answered
+/// 03. Queries the buses only for access rights. `who` asks: what goes to several lines is judged
+/// here, everything else where it is submitted.
 Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const UnitMap& units,
                 bool reads_only = false, const WhoRef& who = {});
 

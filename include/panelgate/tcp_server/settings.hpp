@@ -22,6 +22,14 @@ enum class BroadcastMode : std::uint8_t { reply, silent, deny };
 /// its one answer instead of using the bus again.
 enum class Retransmissions : std::uint8_t { join_writes, join, pass };
 
+/// Which exceptions a client gets; silence in place of the others, so that the client's own timeout
+/// decides (Citect takes a whole device offline for 0B, se.com FA209453).
+enum class Exceptions : std::uint8_t {
+    all,
+    own,   ///< those of panels; none of the gateway's own
+    none,  ///< nor those of panels
+};
+
 struct UnitTarget {
     std::string line;
     std::uint8_t station = 0;
@@ -39,12 +47,14 @@ struct Settings {
     modbus::HexDigits ascii_digits = modbus::HexDigits::upper_only;
     BroadcastMode broadcast = BroadcastMode::reply;  ///< with framing tcp; otherwise always silent
     Retransmissions retransmissions = Retransmissions::join_writes;
+    Exceptions exceptions = Exceptions::all;
     /// Also serve UDP on the same port (framing tcp only); there every retransmission is joined
     /// unless `retransmissions` is pass.
     bool udp = false;
     /// Ports with outstanding requests; at most half of max_connections, whatever this says.
     std::size_t udp_peers_per_address = 16;
-    std::optional<std::uint8_t> diagnostics_unit = 255;
+    /// The gateway's own registers. None by default: clients without a unit id ask 255 or 0.
+    std::optional<std::uint8_t> diagnostics_unit;
     bool read_only = false;
     std::vector<Network> allow;  ///< empty: all
     std::size_t max_connections = 1024;

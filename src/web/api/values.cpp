@@ -248,6 +248,10 @@ Parsed<std::vector<std::uint16_t>> typed_cells(points::Point type, bool has_leng
                                                const json::value& given) {
     const auto value = value_of(given);
     if (!value) return value.error();
+    if (points::is_byte(type.type))
+        return problem(422, std::string(label(type.type)) +
+                                " is half a register, and a write would change the other half; a "
+                                "point of this type is written by function 22");
     type.name = std::move(at);
     const auto* text = std::get_if<std::string>(&*value);
     if (text != nullptr && !has_length)

@@ -34,6 +34,14 @@ bool is_address_v6(const std::string& text) {
     return !error;
 }
 
+/// An address cannot be rebound: who is asked by one is who has it (a container is asked by that of
+/// its machine, which is none of its own).
+bool is_address(const std::string& host) {
+    boost::system::error_code error;
+    ip::make_address(host, error);
+    return !error;
+}
+
 /// Accepts the characters of names in practice; RFC 3986 allows more.
 bool is_name(std::string_view text) {
     return !text.empty() && std::ranges::all_of(text, [](unsigned char c) {
@@ -123,7 +131,8 @@ bool is_ours(std::string_view origin, const HttpRequest& request, const HostName
     if (scheme == std::string_view::npos) return false;
     const std::string_view authority = origin.substr(scheme + 3);
     const auto host = host_of_authority(authority);
-    if (!host || !names.knows(*host, local)) return false;
+    const bool is_asked = host == request.host && is_address(request.host);
+    if (!host || (!is_asked && !names.knows(*host, local))) return false;
     return names.is_configured(*host) || request.host.empty() ||
            port_of_authority(authority) == request.port;
 }
@@ -133,7 +142,8 @@ bool is_ours(std::string_view origin, const HttpRequest& request, const HostName
 std::optional<Problem> check_origin(const HttpRequest& request, const HostNames& names,
                                     const boost::asio::ip::address& local,
                                     const std::vector<std::string>& readers) {
-    if (!request.host.empty() && !names.knows(request.host, local)) {
+    const std::string& asked = request.host;
+    if (!asked.empty() && !is_address(asked) && !names.knows(asked, local)) {
         return problem(421, "this gateway is not called '" + request.host +
                                 "'; if it shall be, name it in http: hosts");
     }

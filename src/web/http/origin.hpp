@@ -41,10 +41,10 @@ class HostNames {
     std::set<boost::asio::ip::address> addresses_;
 };
 
-/// Checks a request for anything not public. 421 if it is for another host (`request.host`;
-/// HTTP/1.0 may have none). 403 if the browser reports a page of another site, unless the user
-/// follows a link to one of our pages; and for a foreign Origin, except with OPTIONS. Pages of the
-/// origins in `readers` (lower case) may read.
+/// Checks a request for anything not public. 421 if it is for another name (`request.host`;
+/// HTTP/1.0 may have none; an address is taken whichever it is). 403 if the browser reports a page
+/// of another site, unless the user follows a link to one of our pages; and for a foreign Origin,
+/// except with OPTIONS. Pages of the origins in `readers` (lower case) may read.
 std::optional<Problem> check_origin(const HttpRequest& request, const HostNames& names,
                                     const boost::asio::ip::address& local,
                                     const std::vector<std::string>& readers);

@@ -89,6 +89,32 @@ TEST_F(AsciiLine, LowerCaseIsTakenOnlyWhereConfiguredAndElseCountedAsThat) {
     }
 }
 
+/// pymodbus#2942, eModbus#407; '>' of an ABL eMH1
+TEST_F(AsciiLine, OtherDelimitersAreCountedAsThat) {
+    const std::string whole(kReplyText.begin(), kReplyText.end());
+    const std::string bare = whole.substr(0, whole.size() - 2);
+    const std::string damaged = bare.substr(0, bare.size() - 1) + (bare.back() == '0' ? "1" : "0");
+    const std::pair<std::string, unsigned> rows[] = {
+        {bare + "\n", 1},    {bare + "\r", 1},           {bare + "\r\r\n", 1},
+        {bare + " \r\n", 1}, {'>' + whole.substr(1), 1}, {damaged + "\r\n", 0},
+        {damaged + "\n", 0},
+    };
+    for (const auto& [text, counted] : rows) {
+        settings.stations[0].retries = 0;
+        BusScript script{settings};
+        const Ticket ticket = script.submit(17, kRead);
+        script.run_to_end_of_request();
+        script.run_for(2ms);
+        script.hear_paced(Bytes(text.begin(), text.end()));
+        script.run_for(2s);
+        EXPECT_TRUE(script.answered(ticket)) << text;
+        EXPECT_FALSE(script.answer(ticket).pdu) << text;
+        const Symptoms& symptoms = script.arbiter().station_counters().at(17).symptoms;
+        EXPECT_EQ(symptoms.damaged(), 1u) << text;
+        EXPECT_EQ(symptoms.delimited, counted) << text;
+    }
+}
+
 TEST_F(AsciiLine, AWrongLrcIsDamageAndTheReadGoesAgainAtOnce) {
     const Ticket ticket = ask();
     Bytes bad = kReplyText;

@@ -55,6 +55,27 @@ TEST_F(BusReportsTest, P6TellsOfEveryWriteBeforeItsAnswer) {
     bus.reset();
 }
 
+/// minimalmodbus#101
+TEST_F(BusReportsTest, TellsWhereAWriteHasChangedAPanelsAddress) {
+    const rt::LogTap log;
+    start_bus();
+    line->reply.clear();
+    for (const std::uint8_t value : Bytes{6, 5}) {
+        const Bytes write{0x06, 0x00, 0x0A, 0x00, value};
+        std::vector<Answer> answers;
+        const std::size_t before = line->written.size();
+        send(17, write, answers);
+        EXPECT_TRUE(run_until([&] { return line->written.size() > before; }));
+        clock.advance(2ms);
+        line->come(modbus::encode_adu(5, write));
+        line->poll_input();
+        EXPECT_TRUE(run_until([&] { return !answers.empty(); }));
+        EXPECT_EQ(end_of(answers.at(0)), "timeout, sent");
+    }
+    EXPECT_EQ(log.count("write answered by another address"), 1u) << "5 was written";
+    EXPECT_EQ(log.count("station 5 has answered with this very write"), 1u);
+}
+
 TEST_F(BusReportsTest, CountsAndLogsAWriteThatWasRefusedBeforeItWasARequest) {
     const rt::LogTap log;
     const WhoRef who = make_who({.face = Face::modbus_tcp, .name = "modbus_tcp 10.0.0.5:1"});

@@ -130,7 +130,7 @@ TEST(ConfigLoad, ReadsEveryKeyOfAListener) {
         "modbus_tcp:\n"
         "  - listen: '[::1]:1502'\n"
         "    lines: [a, b]\n"
-        "    units: {1: a/1, 2: b/oven, 3: a/200, 0: b/0}\n"
+        "    units: {1: a/1, 2: b/oven, 3: a/200, 0: b/0, 101-103: a/1-3}\n"
         "    broadcast: silent\n"
         "    diagnostics_unit: null\n"
         "    access: read_only\n"
@@ -147,6 +147,7 @@ TEST(ConfigLoad, ReadsEveryKeyOfAListener) {
         {1, {"a", 1}},
         {2, {"b", 1}},
         {3, {"a", 200}},  // unlisted, and the line passes those
+        {101, {"a", 1}},  {102, {"a", 2}}, {103, {"a", 3}},
     };
     EXPECT_EQ(first.units, units);
     EXPECT_EQ(first.broadcast, tcp_server::BroadcastMode::silent);

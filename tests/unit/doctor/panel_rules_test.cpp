@@ -38,6 +38,16 @@ TEST_F(Diagnose, ForAPanelThatWritesInLowerCaseTheSettingIsNamed) {
     EXPECT_EQ(alone(Mix().answered(4).damaged(6).with(&Symptoms::lower_case, 2)), "noise");
 }
 
+TEST_F(Diagnose, APanelWhoseAsciiBeginsOrEndsOtherwiseIsNoNoise) {
+    const Mix panel = Mix().damaged(6).with(&Symptoms::delimited, 6);
+    facts.serial.mode = SerialMode::ascii;
+    EXPECT_THAT(only("ascii-delimiters 7", {{7, panel}, {8, Mix().answered(20)}}).advice,
+                HasSubstr("08 00 03 0A 00"));
+    EXPECT_EQ(alone(panel), "ascii-delimiters 1");
+    facts.serial.mode = SerialMode::rtu;
+    EXPECT_THAT(alone(panel), Not(HasSubstr("ascii")));
+}
+
 TEST_F(Diagnose, AFewLateRepliesAmongManyAreNoTimeoutTooShort) {
     const Symptoms seldom = Mix().answered(28).lost(3).late(3, 300ms);
     EXPECT_EQ(alone(Mix().answered(97).lost(3).late(3, 300ms)), "");

@@ -153,7 +153,7 @@ TEST(Weaker, AccessAndBroadcastsOfAListener) {
     EXPECT_EQ(told(endpoint, ", broadcast: deny", ""),
               "modbus_tcp/127.0.0.1:1502: broadcast deny -> reply");
     EXPECT_EQ(told(endpoint, "", ", udp: true"), "modbus_tcp/127.0.0.1:1502: udp false -> true");
-    EXPECT_EQ(told(endpoint, ", diagnostics_unit: null", ""),
+    EXPECT_EQ(told(endpoint, "", ", diagnostics_unit: 255"),
               "modbus_tcp/127.0.0.1:1502: diagnostics_unit null -> 255");
 }
 

@@ -130,6 +130,43 @@ TEST(MbusdConf, TakesFilesOfWindows) {
     }
 }
 
+TEST(MbusdConf, TakesTheCommandLineOfAUnitOrAShell) {
+    for (const std::string start :
+         {"sudo /usr/bin/mbusd ", "[Service]\nExecStart=/usr/bin/mbusd ", "mbusd "}) {
+        const Imported imported = imported_of(
+            start + "-d -v2 -L - -p ttyUSB0 -s 9600 \\\n -m '8e1' -P 503 -W 300 -N0 -R 50 -b -t\n");
+        const Config config = load(imported);
+        EXPECT_EQ(config.lines[0].device.device, "/dev/ttyUSB0");
+        EXPECT_EQ(to_string(config.lines[0].device.serial), "9600 8E1");
+        EXPECT_EQ(config.lines[0].arbiter.unlisted.response_timeout, Duration(300ms));
+        EXPECT_EQ(config.lines[0].arbiter.unlisted.retries, 0);
+        EXPECT_EQ(config.lines[0].device.rs485.mode, Rs485::rts);
+        EXPECT_EQ(config.modbus_tcp[0].name(), "0.0.0.0:503");
+        EXPECT_EQ(config.modbus_tcp[0].broadcast, tcp_server::BroadcastMode::reply);
+        EXPECT_THAT(imported.yaml, HasSubstr("# pause = 50: between two requests"));
+    }
+    EXPECT_EQ(faults("ExecStart=/usr/bin/mbusd -d -c /etc/mbusd/mbusd-%i.conf -p /dev/%i -x\n"),
+              "mbusd.conf:1:32: the settings are in '/etc/mbusd/mbusd-%i.conf': import that file\n"
+              "mbusd.conf:1:68: mbusd has no option '-x'\n");
+    EXPECT_THAT(faults("mbusd -p /dev/tty%i\n"), HasSubstr("device must be the absolute path"));
+}
+
+TEST(MbusdConf, NamesTheProgramWhoseFileThisIs) {
+    const std::pair<const char*, const char*> rows[] = {
+        {"connection: &panel\n  accepter: tcp,4001\n",
+         "mbusd.conf:2:1: this is a file of ser2net, and import reads those of mbusd; "
+         "docs/start/from-ser2net says which key is which here\n"},
+        {"4001:raw:0:/dev/ttyUSB0:9600 8DATABITS NONE 1STOPBIT\n", "a file of ser2net"},
+        {"modbus:\n  - name: hub\n    type: serial\n    bytesize: 8\n",
+         "4:1: this is a file of Home Assistant, and import reads those of mbusd; "
+         "docs/start/from-other-programs"},
+        {"[[inputs.modbus]]\n  name = \"Device\"\n", "1:1: this is a file of Telegraf"},
+        {"modules:\n  - name: fake\n    metrics:\n      - metricType: gauge\n",
+         "4:1: this is a file of modbus_exporter"},
+    };
+    for (const auto& [text, fault] : rows) EXPECT_THAT(faults(text), HasSubstr(fault));
+}
+
 TEST(MbusdConf, ReportsAllFaultsWithTheirPlaces) {
     EXPECT_EQ(
         faults("device\nspeed = fast\n  mode = 7n1\nadress = 1\nport =\ntrx_control = gpio\n"),

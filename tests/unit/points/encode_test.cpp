@@ -176,6 +176,11 @@ TEST(Encode, AFractionTakesTheNearestFloatAndAWholeNumberIsMeantExactly) {
         {point, 16777216, "16777216"},
         {point, 16777217, "16777216", kNearest},
         {point, of("16777217.5"), "16777218", kNearest},
+        {point_of(Type::f16), 0.1, "0.099975586"},
+        {point_of(Type::f16), 2049,
+         "x cannot be exactly 2049 (f16); the nearest that it can be is 2048"},
+        {point_of(Type::f16), 2049, "2048", kNearest},
+        {point_of(Type::f16), 1e-6, "x ..."},
         {point, kOdd, "x cannot be exactly 9007199254740993..."},
         {point, -2e-45, "x ..."},    // half of it would be lost
         {point, 1e-45, "accepted"},  // as it is shown
@@ -196,6 +201,10 @@ TEST(Encode, WhatDoesNotFitTheTypeIsRefusedWithTheRangeInTheUnitOfTheValue) {
     expect_written({
         {point_of(u16), 65536, "x must be from 0 to 65535 (u16), not 65536"},
         {point_of(u16), -1, "x must be from 0 to 65535 (u16), not -1"},
+        {point_of(Type::u8h), 256, "x must be from 0 to 255 (u8h), not 256"},
+        {point_of(Type::i48), std::int64_t{1} << 47,
+         "x must be from -140737488355328 to 140737488355327 (i48), not 140737488355328"},
+        {point_of(Type::f16), 70000, "x must be from -65504 to 65504 (f16), not 70000"},
         {point_of(bcd16), 10000, "x must be from 0 to 9999 (bcd16), not 10000"},
         {point_of(f32), 1e39, "x must be from -3.4028235e+38 to 3.4028235e+38 (f32), not 1e+39"},
         {scaled(i16, 0.1), 4000, "x must be from -3276.8 to 3276.7 (i16, scale 0.1), not 4000"},

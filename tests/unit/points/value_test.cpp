@@ -33,6 +33,14 @@ const Vector kVectors[] = {
     {u16, dcba, {0x3412}, 0x1234},
     {i16, abcd, {0xFFFE}, -2},
     {i16, badc, {0xFEFF}, -2},
+    {u48, abcd, {0x0102, 0x0304, 0x0506}, std::int64_t{0x010203040506}},
+    {u48, cdab, {0x0506, 0x0304, 0x0102}, std::int64_t{0x010203040506}},
+    {i48, abcd, {0xFFFF, 0xFFFF, 0xFFFE}, -2},
+    {f16, abcd, {0x3C00}, 1.0},
+    {f16, badc, {0x003C}, 1.0},
+    {f16, abcd, {0xFBFF}, -65504.0},
+    {f16, abcd, {0x0001}, 5.9604645e-8},  // the smallest
+    {f16, abcd, {0x03FF}, 6.097555e-5},   // the largest below the normal ones
     {u32, abcd, {0x0102, 0x0304}, 0x01020304},
     {u32, cdab, {0x0304, 0x0102}, 0x01020304},
     {u32, badc, {0x0201, 0x0403}, 0x01020304},
@@ -78,6 +86,24 @@ void expect_decoded(const std::vector<Decoded>& rows) {
         EXPECT_EQ(decode(point, words), value) << label(point.type) << ' ' << words[0];
 }
 
+TEST(Value, AByteIsHalfOfItsRegister) {
+    expect_decoded({
+        {point_of(u8h), {0xFE07}, 254},
+        {point_of(u8l), {0xFE07}, 7},
+        {point_of(i8h), {0xFE07}, -2},
+        {point_of(i8l), {0x07FE}, -2},
+        {point_of(u8h, badc), {0xFE07}, 7},
+        {scaled(u8l, 0.1), {0xFF03}, 0.3},
+        {without(u8h, {-1}), {0xFF07}, {}},
+        {without(u8l, {0xFF}), {0x07FF}, {}},
+    });
+    EXPECT_EQ(encode(point_of(u8h), 7).value(), Words{0x0700});
+    EXPECT_EQ(encode(point_of(i8l), -2).value(), Words{0x00FE});
+    Point labelled = point_of(i8h);
+    labelled.labels = {{-1, "none"}};
+    EXPECT_EQ(label_of(labelled, Words{0xFF12}), "none");
+}
+
 TEST(Value, SentinelsBadDigitsAndNumbersThatAreNoneGiveNothing) {
     expect_decoded({
         // "No value" counts the bits of the type.
@@ -96,6 +122,8 @@ TEST(Value, SentinelsBadDigitsAndNumbersThatAreNoneGiveNothing) {
         {without(f32, {-9999}, 2), {0xC61C, 0x4000}, -20000.0},
         {point_of(bcd16), {0x12A4}, {}},
         {point_of(f32), {0x7FC0, 0}, {}},  // not a number
+        {point_of(f16), {0x7E00}, {}},
+        {point_of(f16), {0xFC00}, {}},     // infinite
         {point_of(f32), {0x7F80, 0}, {}},  // infinite
         {point_of(u32), {1}, {}},          // too short
     });
@@ -192,9 +220,9 @@ TEST(Value, EveryTypeAndOrderRoundTrips) {
     std::mt19937_64 random(7);
     for (const WordOrder order : kOrders) {
         for (const Type type : kTypes)
-            if (type != string && type != boolean)
+            if (type != string && type != boolean && !is_byte(type))
                 expect_round_trips(point_of(type, order), 2000, random);
-        for (const Type type : {u16, i16, u32, i32, bcd16, bcd32}) {
+        for (const Type type : {u16, i16, u32, i32, u48, i48, bcd16, bcd32}) {
             Point point = point_of(type, order);
             for (const double scale : {0.001, 0.1, 0.3, 1.0, 7.5, -0.25, -4.0}) {
                 point.scale = scale;
@@ -256,6 +284,8 @@ TEST(Interpretations, ShowOneBlockInEveryWay) {
     EXPECT_EQ(find(u32, cdab), std::vector<std::string>{"16812"});
     EXPECT_EQ(find(bcd16, abcd), (std::vector<std::string>{"", "0"}));
     EXPECT_EQ(find(u16, cdab), std::vector<std::string>{"none"});
+    EXPECT_EQ(find(u8h, abcd), (std::vector<std::string>{"65", "0"}));
+    EXPECT_EQ(find(u8h, badc), std::vector<std::string>{"none"});
     EXPECT_EQ(find(f64, abcd), std::vector<std::string>{"none"});
 }
 

@@ -120,6 +120,18 @@ TEST(WriteRequest, ABitOfAWordIsNeverReadChangedAndWritten) {
     });
 }
 
+TEST(WriteRequest, AByteLeavesTheOtherOneOfItsRegister) {
+    expect_requests({
+        {shipped("generic"), at(point_of(Type::u8h), 18), 7, "16 00 12 00 ff 07 00"},
+        {shipped("generic"), at(point_of(Type::i8l), 18), -2, "16 00 12 ff 00 00 fe"},
+        {shipped("generic"), at(point_of(Type::u8l, WordOrder::badc), 18), 7,
+         "16 00 12 00 ff 07 00"},
+        {shipped("panasonic-gt"), at(point_of(Type::u8h), 18), 7,
+         "panasonic-gt can write no single byte of D0: it has no function 22, and reading, "
+         "changing and writing the word would undo what changes in between"},
+    });
+}
+
 TEST(WriteRequest, TellsWhatThePointIsThen) {
     Point labelled = point_of(u16);
     labelled.labels = {{1, " running"}};

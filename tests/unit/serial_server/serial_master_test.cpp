@@ -31,7 +31,6 @@ Settings with_access(Settings settings) {
     settings.access.lines = {"floor1"};
     settings.access.units = {{kOurs, {"floor1", 3}}};
     settings.access.broadcast = tcp_server::BroadcastMode::silent;
-    settings.access.diagnostics_unit.reset();
     return settings;
 }
 

@@ -109,6 +109,7 @@ class DispatchTest : public TwoLines {
   protected:
     DispatchTest() {
         lines = {{"a", &bus_a, {1, 2}, false}, {"b", &bus_b, {3}, false}};
+        settings.diagnostics_unit = 255;
         bus_a.protect(2);
     }
     Decision decision_on(std::uint8_t unit, const Bytes& pdu) {
@@ -228,7 +229,8 @@ TEST_F(DispatchTest, OnlyAWriteIsBroadcastAndOnlyWhereAllMayBeWritten) {
     settings.lines = {"b"};
     expect_decided({
         {0, kWrite, "to everybody on b"},
-        {0, kRead, "refused 01"},
+        {0, kRead, "refused 0a"},  // nothing has this address
+        {0, kTooMuch, "refused 0a"},
         {0, "16 00 00 00 00 00 00"_hex, "refused 01"},
         {0, "17 00 00 00 01 00 00 00 01 02 00 01"_hex, "refused 01"},
         {0, kBroken, "refused 03"},

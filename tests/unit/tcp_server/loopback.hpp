@@ -181,6 +181,7 @@ class Loopback : public ::testing::Test {
     Loopback() {
         settings.port = 0;
         settings.lines = {"floor1"};
+        settings.diagnostics_unit = 255;
         lines = {{"floor1", &bus1, {1, 2}, true}, {"floor2", &bus2, {11, 12}, true}};
         bus1.protect(2);
     }

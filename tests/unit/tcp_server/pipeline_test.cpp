@@ -1,5 +1,6 @@
 #include "pipeline.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <boost/asio/io_context.hpp>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "held_bus.hpp"
+#include "panelgate/rt/log.hpp"
 #include "panelgate/tcp_server/dispatch.hpp"
 #include "shared.hpp"
 #include "support/hex.hpp"
@@ -140,6 +142,52 @@ TEST_F(SmallPipeline, P5WhatNeedsNoLineIsAnsweredAFewTimesAMillisecond) {
     EXPECT_EQ(told, 1);
     pipeline->pop();
     EXPECT_TRUE(pipeline->empty());
+}
+
+TEST_F(SmallPipeline, TellsOnceOfAClientThatHasNoUnitId) {
+    const rt::LogTap log;
+    shared->units = UnitMap(small(), {{"floor1", &bus, {1}, false}});
+    for (const std::uint8_t unit : Bytes{255, 0, 255, 7}) {
+        pipeline->take({1, unit, "03 0000 0001"_hex});
+        clock.advance(1ms);
+        ASSERT_NE(pipeline->front(), nullptr);
+        EXPECT_EQ(Bytes(pipeline->front()->end() - 2, pipeline->front()->end()), "83 0a"_hex);
+        pipeline->pop();
+    }
+    EXPECT_THAT(log.lines(),
+                testing::ElementsAre(testing::HasSubstr(
+                    "client=10.0.0.7:5000 hint=\"asks unit 255: is no unit id set?\"")));
+}
+
+/// What the listener's `exceptions` leaves of a panel's exception and of two of the gateway's own.
+class ExceptionsTest : public SmallPipeline {
+  protected:
+    /// Returns the exception codes that the client gets.
+    Bytes told_with(Exceptions exceptions) {
+        shared->settings.exceptions = exceptions;
+        Bytes codes;
+        for (const std::uint8_t unit : Bytes{1, 1, 77}) {
+            pipeline->take({++taken, unit, "03 0000 0001"_hex});
+            if (unit == 1)
+                bus.answer(0, taken % 2 == 1 ? Result<Bytes>("83 02"_hex) : Fault::timeout);
+            clock.advance(1ms);
+            const Bytes* reply = pipeline->front();
+            if (reply == nullptr) continue;
+            codes.push_back(reply->back());
+            pipeline->pop();
+        }
+        taken = 0;
+        return codes;
+    }
+};
+
+TEST_F(ExceptionsTest, OfThePanelsOnlyOrNone) {
+    shared->units = UnitMap(small(), {{"floor1", &bus, {1}, false}});
+    EXPECT_EQ(told_with(Exceptions::all), "02 0b 0a"_hex);
+    EXPECT_EQ(told_with(Exceptions::own), "02"_hex);
+    EXPECT_EQ(told_with(Exceptions::none), ""_hex);
+    EXPECT_TRUE(pipeline->empty()) << "silence frees the place";
+    EXPECT_EQ(shared->counters.unanswered, 5u);
 }
 
 /// Retransmissions: answers() lets the bus answer everything and counts the replies.

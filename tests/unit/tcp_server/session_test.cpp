@@ -166,7 +166,7 @@ TEST_F(SessionBroadcast, AnswersABroadcastAsSoonAsItHasLeft) {
 
 TEST_F(SessionBroadcast, RefusesAnythingButAWriteToUnitZeroAndEverythingWhereItIsDenied) {
     Client client = connect();
-    EXPECT_EQ(client.ask(0, read_pdu(0)), "83 01"_hex);
+    EXPECT_EQ(client.ask(0, read_pdu(0)), "83 0a"_hex);
     EXPECT_EQ(client.ask(0, "06 0000"_hex), "86 03"_hex);
     settings.broadcast = BroadcastMode::deny;
     start();
@@ -210,7 +210,7 @@ TEST_F(SessionBroadcast, KeepsSilentWhenItIsAskedTo) {
     bus1.answer(0, kWritten);
     EXPECT_EQ(client.receive(), read_reply(2));
     EXPECT_EQ(client.ask(0, "06 0000"_hex), "86 03"_hex) << "what is known before is told";
-    EXPECT_EQ(client.ask(0, read_pdu(0)), "83 01"_hex);
+    EXPECT_EQ(client.ask(0, read_pdu(0)), "83 0a"_hex);
     client.read(3);
     read(client, 4, 2);  // the silent one's place is free again
 }

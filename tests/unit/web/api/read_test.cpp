@@ -87,16 +87,17 @@ TEST_F(ApiRead, ReadsTextsOfALengthOrOneOfAllRegisters) {
 }
 
 TEST_F(ApiRead, SaysWhichWordsAQueryTakes) {
-    expect_gets("/api/v1/stations/press/",
-                {{"holding-registers/1?type=float", 400,
-                  "there is no type 'float'; there are bool, u16, i16, u32, i32, u64, i64, f32, "
-                  "f64, bcd16, bcd32, string"},
-                 {"coils/1?type=u16", 400, "the type of a bit is bool, not u16"},
-                 {"devices/UW0?order=LITTLE", 400,
-                  "there is no order 'LITTLE'; there are ABCD, BADC, CDAB, DCBA"},
-                 {"devices/UW0?raw=yes", 400, "raw is true or false, not 'yes'"},
-                 {"coils/0?order=ABCD", 400, "a bit has no order"},
-                 {"holding-registers/65535?type=u32", 400}});
+    expect_gets(
+        "/api/v1/stations/press/",
+        {{"holding-registers/1?type=float", 400,
+          "there is no type 'float'; there are bool, u8h, u8l, i8h, i8l, u16, i16, u32, i32, u48, "
+          "i48, u64, i64, f16, f32, f64, bcd16, bcd32, string"},
+         {"coils/1?type=u16", 400, "the type of a bit is bool, not u16"},
+         {"devices/UW0?order=LITTLE", 400,
+          "there is no order 'LITTLE'; there are ABCD, BADC, CDAB, DCBA"},
+         {"devices/UW0?raw=yes", 400, "raw is true or false, not 'yes'"},
+         {"coils/0?order=ABCD", 400, "a bit has no order"},
+         {"holding-registers/65535?type=u32", 400}});
     EXPECT_TRUE(bus.requests.empty());
 }
 

@@ -229,9 +229,26 @@ TEST_F(Origin, IsRefusedUnderAForeignName) {
         request.host = ours;
         EXPECT_EQ(refusal(), 0u) << ours;
     }
-    for (const char* foreign : {"evil.example", "10.0.0.1"}) {
-        request.host = foreign;
-        EXPECT_EQ(refusal(), 421u) << foreign;
+    request.host = "evil.example";
+    EXPECT_EQ(refusal(), 421u);
+}
+
+// A container is asked by the address of its machine, which it does not know.
+TEST_F(Origin, IsOursUnderTheAddressThatIsAsked) {
+    for (const char* address : {"10.0.0.1", "fd00::1"}) {
+        request.method = "PUT";
+        request.host = address;
+        request.port = "8080";
+        EXPECT_EQ(refusal(), 0u) << address;
+        const bool is_ipv6 = request.host.find(':') != std::string::npos;
+        const std::string own = is_ipv6 ? "[fd00::1]" : address;
+        request.headers["origin"] = "http://" + own + ":8080";
+        EXPECT_EQ(refusal(), 0u) << address;
+        for (const std::string other : {own + ":9999", std::string("10.0.0.2:8080")}) {
+            request.headers["origin"] = "http://" + other;
+            EXPECT_EQ(refusal(), 403u) << other;
+        }
+        request.headers.erase("origin");
     }
 }
 
