@@ -11,11 +11,13 @@ namespace {
 constexpr std::string_view kRebirth = "Node Control/Rebirth";
 constexpr std::uint64_t kDeaths = 256;  // bdSeq is 0..255 (Sparkplug 3.0, 5.4)
 
-/// By points::Type.
-constexpr std::array<DataType, std::size(points::kTypes)> kTypes{
-    DataType::boolean, DataType::uint16, DataType::int16,  DataType::uint32,
-    DataType::int32,   DataType::uint64, DataType::int64,  DataType::float32,
+/// By points::Type; a byte or 48 bits as the next larger one.
+constexpr std::array kTypes{
+    DataType::boolean, DataType::uint16, DataType::uint16, DataType::int16,   DataType::int16,
+    DataType::uint16,  DataType::int16,  DataType::uint32, DataType::int32,   DataType::uint64,
+    DataType::int64,   DataType::uint64, DataType::int64,  DataType::float32, DataType::float32,
     DataType::float64, DataType::uint16, DataType::uint32, DataType::string};
+static_assert(kTypes.size() == std::size(points::kTypes));
 
 DataType type_of(const Subject& subject) {
     if (subject.kind == Subject::Kind::line) return DataType::boolean;

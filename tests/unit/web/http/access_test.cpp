@@ -244,7 +244,7 @@ TEST_F(Origin, IsOursUnderTheAddressThatIsAsked) {
         const std::string own = is_ipv6 ? "[fd00::1]" : address;
         request.headers["origin"] = "http://" + own + ":8080";
         EXPECT_EQ(refusal(), 0u) << address;
-        for (const std::string other : {own + ":9999", std::string("10.0.0.2:8080")}) {
+        for (const std::string& other : {own + ":9999", std::string("10.0.0.2:8080")}) {
             request.headers["origin"] = "http://" + other;
             EXPECT_EQ(refusal(), 403u) << other;
         }
