@@ -166,6 +166,10 @@ class Reload(unittest.TestCase):
                              (200, "applied", True))
             self.assertEqual(running.program.get("/api/v1/stations/mixer")[0], 200)
             self.assertEqual(running.program.get("/api/v1/stations/io")[0], 404)
+            running.reload(plant(other(f"{MIXER}, {{id: 6, name: dryer, access: read_only}}")))
+            self.assertEqual(running.program.get("/api/v1/stations/dryer")[0], 200)
+            status, verdict = running.reload(path="/api/v1/reload?rollback=true")
+            self.assertEqual((status, verdict["changes"]), (200, ["lines/other/stations/dryer: removed"]))
 
     def test_the_way_back_weakens_nothing_that_nobody_has_named(self):
         hard = "{id: 5, name: mixer, profile: autonics-gp-2005, access: read_only}"
