@@ -157,7 +157,8 @@ def take_in(peer, newest=5):
 
 
 class Strict:
-    """A broker that knows no later version of MQTT and lets nobody read; a context manager."""
+    """A broker that knows no later version of MQTT, lets nobody read and, where the version has a
+    word for it, ends the connection; a context manager."""
 
     def __init__(self, newest=5):
         self._newest = newest
@@ -184,6 +185,8 @@ class Strict:
         assert said[0] == 0x82, said
         middle = b"\x00" if self._newest == 5 else b""
         peer.sendall(bytes([0x90, 3 + len(middle)]) + said[2:4] + middle + b"\x80")
+        if self._newest == 5 and peer.recv(65536):
+            peer.sendall(b"\xe0\x02\x8e\x00")  # DISCONNECT: session taken over
         while peer.recv(65536):
             pass
 
