@@ -94,7 +94,7 @@ struct Config {
     std::optional<audit::Settings> audit{};  ///< empty: nothing is recorded
     std::vector<alarms::Settings> alarms{};
     std::optional<alarms::WebhookSettings> webhook{};  ///< of alarms
-    store::Settings store{};  ///< events and history
+    store::Settings store{};                           ///< events and history
     /// Where each line's name stands, by that name.
     std::map<std::string, yaml::Mark> line_marks;
     /// Warnings of legal but questionable settings ("8N1 is outside the standard"), as

@@ -18,8 +18,8 @@ struct Imported {
 
 /// Converts an mbusd configuration, or a command that starts mbusd with options (of a shell, or of
 /// systemd's ExecStart=). Returns nothing if it adds anything to `problems`: lines other than
-/// NAME = VALUE, unknown names, values that mbusd would reject too, a file of another program, which
-/// is named. Missing settings get mbusd's defaults.
+/// NAME = VALUE, unknown names, values that mbusd would reject too, a file of another program,
+/// which is named. Missing settings get mbusd's defaults.
 std::optional<Imported> import_conf(std::string_view text, yaml::Problems& problems);
 
 }  // namespace panelgate::mbusd

@@ -143,11 +143,9 @@ TEST(ConfigLoad, ReadsEveryKeyOfAListener) {
     EXPECT_EQ(tuple(first.address, first.port), tuple("::1", 1502));
     EXPECT_THAT(first.lines, ElementsAre("a", "b"));
     const std::map<std::uint8_t, tcp_server::UnitTarget> units{
-        {0, {"b", 0}},  // everybody on line b
-        {1, {"a", 1}},
-        {2, {"b", 1}},
-        {3, {"a", 200}},  // unlisted, and the line passes those
-        {101, {"a", 1}},  {102, {"a", 2}}, {103, {"a", 3}},
+        {0, {"b", 0}},                                      // everybody on line b
+        {1, {"a", 1}},   {2, {"b", 1}},   {3, {"a", 200}},  // unlisted, and the line passes those
+        {101, {"a", 1}}, {102, {"a", 2}}, {103, {"a", 3}},
     };
     EXPECT_EQ(first.units, units);
     EXPECT_EQ(first.broadcast, tcp_server::BroadcastMode::silent);

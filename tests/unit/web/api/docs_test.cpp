@@ -81,9 +81,9 @@ TEST(Openapi, HasEveryRouteWithItsRoleItsQueriesAndHeadersAndNoOther) {
         EXPECT_EQ(found->second.role, label(route.needed)) << key.second;
         const std::set<std::string> queries(route.queries.begin(), route.queries.end());
         EXPECT_EQ(found->second.queries, queries) << key.first << ' ' << key.second;
-        const bool writes =
-            route.needed >= Role::operator_ && !route.pattern.starts_with("/api/v1/simulator/") &&
-            (!route.configures || route.pattern.ends_with("/rollback"));
+        const bool writes = route.needed >= Role::operator_ &&
+                            !route.pattern.starts_with("/api/v1/simulator/") &&
+                            (!route.configures || route.pattern.ends_with("/rollback"));
         EXPECT_EQ(found->second.headers.contains("Idempotency-Key"), writes) << key.second;
         open.erase(found);
     }
