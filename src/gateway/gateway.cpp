@@ -251,6 +251,9 @@ void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedTex
     retire_lines(lines);
     apply_lines(*config, lines);
     show(make_snapshot(std::move(config), std::move(lines)));
+    std::erase_if(minutes_, [&all = snapshot_->config->lines](const auto& one) {
+        return std::ranges::find(all, one.first, &config::Line::name) == all.end();
+    });
     if (kept_nothing && line_histories_) line_histories_->start();
     relays_->apply(routes_of(*snapshot_));
     servers_.apply(*snapshot_->config, snapshot_->plant, directory_in(snapshot_), shown,
@@ -379,7 +382,10 @@ void Gateway::start() {
     alarms_.apply(snapshot_->config->alarms, plant_in(snapshot_));
     journal_.add(
         {.kind = store::Kind::start, .text = std::string("panelgate ") + PANELGATE_VERSION});
-    for (const auto& line : snapshot_->lines) line->start();
+    for (const auto& line : snapshot_->lines) {
+        line->start();
+        line->record_minute();
+    }
     relays_->start();
     if (line_histories_) line_histories_->start();
     servers_.apply(*snapshot_->config, snapshot_->plant, directory(),

@@ -1,4 +1,5 @@
 // What the gateway tells of itself: findings, usage, metrics.
+#include <algorithm>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -15,12 +16,16 @@
 
 namespace panelgate::gateway {
 
-/// Takes what the lines have counted, for the last minute.
+/// Takes what one line has counted, and then the next: all lines at once would take long.
 void Gateway::look_for_findings() {
-    for (const auto& line : snapshot_->lines) line->record_minute();
-    looked_ = {};
+    const std::size_t count = snapshot_->lines.size();
+    next_line_ = count > 0 ? (next_line_ + 1) % count : 0;
+    if (next_line_ < count)
+        minutes_[snapshot_->config->lines[next_line_].name] =
+            snapshot_->lines[next_line_]->record_minute();
     findings();
-    looking_->arm(clock_.now() + bus::LastMinute::kStep, [this] { look_for_findings(); });
+    const auto share = static_cast<std::int64_t>(std::max<std::size_t>(count, 1));
+    looking_->arm(clock_.now() + bus::LastMinute::kStep / share, [this] { look_for_findings(); });
 }
 
 std::vector<web::LineUsage> Gateway::usage() const {
@@ -33,7 +38,9 @@ std::vector<web::LineUsage> Gateway::usage() const {
 Findings::State Gateway::state() const {
     const config::Config& config = *snapshot_->config;
     Findings::State state;
-    state.lines = usage();
+    for (const config::Line& line : config.lines)
+        if (const auto known = minutes_.find(line.name); known != minutes_.end())
+            state.lines.push_back({line.name, known->second});
     const auto broker = northbound_.counters();
     if (broker && !broker->connected && config.mqtt) state.broker_away = config.mqtt->broker();
     if (audit_.is_kept() && audit_.counters().failing) state.audit_fails = config.audit->file;
@@ -50,7 +57,7 @@ Findings::State Gateway::state() const {
     return state;
 }
 
-/// As they are now, but for a second.
+/// As they are now, but for a second; overloads as of the line's last look.
 const std::vector<web::Finding>& Gateway::findings() {
     constexpr Duration kRest = 1s;
     if (clock_.now() - looked_ >= kRest) {

@@ -158,6 +158,18 @@ void RunningLine::stop() {
     bus_->stop();
     if (simulated_) simulated_->stop();
     simulated_.reset();
+    minute_ = {};
+}
+
+bus::MinuteUse RunningLine::record_minute() {
+    const bus::LineReport report = bus_->report();
+    const std::vector<bus::ClientShare> clients = bus_->clients();
+    minute_.record(clock_.now(), report, clients);
+    return minute_.use(clock_.now(), report, clients);
+}
+
+bus::MinuteUse RunningLine::last_minute() const {
+    return minute_.use(clock_.now(), bus_->report(), bus_->clients());
 }
 
 void RunningLine::dispose() {

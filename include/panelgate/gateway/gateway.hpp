@@ -138,6 +138,8 @@ class Gateway {
     Findings findings_;
     std::unique_ptr<rt::Alarm> looking_ = clock_.make_alarm();  ///< for findings
     TimePoint looked_{};                                        ///< for them
+    std::size_t next_line_ = 0;                                 ///< whose counters are taken
+    std::map<std::string, bus::MinuteUse> minutes_;             ///< by line, as of its last look
     bool ready_ = false;
 };
 

@@ -75,11 +75,10 @@ class RunningLine {
     /// Applies a new configuration; `before` is the running one. Opens the line again after stop().
     void apply(const config::Line& before, const config::Line& now);
 
-    /// Call each bus::LastMinute::kStep.
-    void record_minute() { minute_.record(clock_.now(), bus_->report(), bus_->clients()); }
-    bus::MinuteUse last_minute() const {
-        return minute_.use(clock_.now(), bus_->report(), bus_->clients());
-    }
+    /// Call each bus::LastMinute::kStep. Returns what last_minute() would.
+    bus::MinuteUse record_minute();
+    /// What was used of it in the last minute; nothing before the first record.
+    bus::MinuteUse last_minute() const;
 
     bus::LineBus& bus() { return *bus_; }
     const bus::LineBus& bus() const { return *bus_; }
