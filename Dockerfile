@@ -26,6 +26,8 @@ RUN /tmp/deploy/install_packages.sh run && rm -rf /var/lib/apt/lists/* /var/cach
 COPY --from=build /image/ /
 # What the service writes; a new volume that is mounted there takes over the owner.
 RUN install -d -o 10001 -g 10001 /var/lib/panelgate /var/log/panelgate
+# Where events and history are kept, as systemd says it to the service.
+ENV STATE_DIRECTORY=/var/lib/panelgate
 # What is in here, for scanners: all packages of dpkg, and those that were compiled into the program
 RUN cd /usr/share/panelgate && { cat built-in.tsv; /tmp/deploy/sbom.sh rows; } | sort -u | \
     /tmp/deploy/sbom.sh cyclonedx >sbom.cdx.json && rm -r built-in.tsv /tmp/deploy
