@@ -1,7 +1,7 @@
 // Alarms: what holds now, and who knows.
 import {get, mayAcknowledge, offers, path, post} from './api.js';
 import {attribute, h, list, table, text} from './dom.js';
-import {dayTime, number, store, stored, t, word} from './language.js';
+import {clockTime, number, store, stored, t, word, zone} from './language.js';
 
 const PERIOD = 2000;  // ms
 
@@ -56,7 +56,7 @@ function row(first) {
     return {node: h('tr', {'data-alarm': first.name}, h('th', {scope: 'row', class: 'wide'}, first.text), h('td', null, state), since, value, h('td', null, word('severity', first.severity)), by, h('td', null, mayAcknowledge() ? button : null, failed)), update: (alarm) => {
         attribute(state, 'class', `badge ${TONES[alarm.state]}`);
         text(state, word('alarm', alarm.state));
-        text(since, alarm.since === null ? '–' : dayTime(Date.parse(alarm.since)));
+        text(since, alarm.since === null ? '–' : clockTime(Date.parse(alarm.since)));
         text(value, alarm.value === null ? '–' : number(alarm.value, 3));
         text(by, alarm.acknowledged_by ?? '');
         button.hidden = alarm.state !== 'active' && alarm.state !== 'cleared';
@@ -67,7 +67,7 @@ function row(first) {
 const ORDER = {active: 0, cleared: 1, acknowledged: 2, normal: 3};
 
 export function alarmsView() {
-    const shown = table(t('nav.alarms'), [[t('alarm')], [t('state')], [t('since')], [t('value'), 'number'], [t('severity')], [t('acknowledged.by')], ['']]);
+    const shown = table(t('nav.alarms'), [[t('alarm')], [t('state')], [`${t('since')} (${zone})`], [t('value'), 'number'], [t('severity')], [t('acknowledged.by')], ['']]);
     const none = h('p', {class: 'empty', hidden: true}, t('alarms.none'));
     const sound = h('input', {type: 'checkbox', checked: stored('sound') === 'on', onchange: () => store('sound', sound.checked ? 'on' : 'off')});
     const node = h('div', null, h('h1', null, t('nav.alarms')), shown.node, none, h('p', null, h('label', {class: 'tick'}, sound, ' ', t('alarms.sound'))));

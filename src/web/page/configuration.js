@@ -4,7 +4,7 @@ import {check, current, draft, isChanged, load, save} from './configuration_draf
 import {confirm, dialog, refusal} from './confirm.js';
 import {h, list, replace, table, text} from './dom.js';
 import {Editor} from './editor.js';
-import {number, t} from './language.js';
+import {clockTime, number, t} from './language.js';
 import {live} from './live.js';
 import {difference, excerpt} from './text_difference.js';
 
@@ -138,7 +138,7 @@ class View {
         const shown = table(t('text.versions'), [[''], [t('time')], [t('text.who')]]);
         list(shown.body, versions, (one) => one.version, (one) => ({node: h('tr', {'data-version': one.version},
             h('td', null, h('button', {type: 'button', onclick: () => this.#compare(one.version)}, t('text.compare'))),
-            h('td', null, new Date(one.time).toLocaleString()), h('td', {class: 'who', lang: 'en'}, one.who))}));
+            h('td', null, clockTime(Date.parse(one.time))), h('td', {class: 'who', lang: 'en'}, one.who))}));
         replace(this.versions, h('h2', null, t('text.versions')), shown.node);
     }
 

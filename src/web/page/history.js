@@ -2,7 +2,7 @@
 import {get, path} from './api.js';
 import {choice, h, text} from './dom.js';
 import {download} from './download.js';
-import {dayTime, number, t} from './language.js';
+import {clockTime, number, t} from './language.js';
 import {live} from './live.js';
 import {colour, library} from './plot.js';
 
@@ -57,7 +57,7 @@ export function historyView({argument, detail}) {
     const failed = h('p', {class: 'problem', hidden: true});
     const files = h('span');
 
-    const say = (at, values) => said.replaceChildren(at === null ? '' : `${dayTime(at)} `, ...[...chosen].map((name, i) => h('span', {class: `tone ${COLOURS[i]}`},
+    const say = (at, values) => said.replaceChildren(at === null ? '' : `${clockTime(at)} `, ...[...chosen].map((name, i) => h('span', {class: `tone ${COLOURS[i]}`},
         `${name} ${values[i] === null || values[i] === undefined ? '–' : number(values[i], 3)}`)));
     const draw = async (all, step) => {
         const Dygraph = await library();

@@ -2,7 +2,7 @@
 import {get, path} from './api.js';
 import {choice, h, list, table, text} from './dom.js';
 import {download} from './download.js';
-import {dayTime, t, word} from './language.js';
+import {clockTime, t, word, zone} from './language.js';
 import {live} from './live.js';
 
 const PERIOD = 3000;  // ms
@@ -14,12 +14,12 @@ const KINDS = {lines: 'line_up,line_down', stations: 'station_online,station_off
 function row(entry) {
     const place = [entry.station || entry.line, entry.point].filter((part) => part !== '').join('/');
     const tone = entry.severity === 'info' ? 'none' : entry.severity === 'low' || entry.severity === 'warning' ? 'warn' : 'bad';
-    return {node: h('tr', {'data-kind': entry.kind}, h('td', {class: 'figure'}, dayTime(Date.parse(entry.time))),
+    return {node: h('tr', {'data-kind': entry.kind}, h('td', {class: 'figure'}, clockTime(Date.parse(entry.time))),
         h('td', null, h('span', {class: `badge ${tone}`}, word('event', entry.kind))), h('td', {class: 'wide'}, place === '' ? null : h('strong', null, place, ' '), entry.text), h('td', null, entry.who))};
 }
 
 export function journalView({argument, detail}) {
-    const shown = table(t('nav.journal'), [[t('time')], [t('kind')], [t('what')], [t('who')]]);
+    const shown = table(t('nav.journal'), [[`${t('time')} (${zone})`], [t('kind')], [t('what')], [t('who')]]);
     const none = h('p', {class: 'empty', hidden: true}, t('journal.none'));
     const failed = h('p', {class: 'problem', hidden: true});
     let kind = KINDS[argument] ? argument : '';

@@ -92,15 +92,6 @@ export function clockTime(date) {
     return day === calendar.format() ? clock.format(date) : `${day} ${clock.format(date)}`;
 }
 
-const date = new Intl.DateTimeFormat(language, {day: '2-digit', month: '2-digit'});
-
-/** Wall time of ms since 1970, with its date where that is not today. */
-export function dayTime(ms) {
-    const at = new Date(ms);
-    const today = at.toDateString() === new Date().toDateString();
-    return today ? clock.format(at) : `${date.format(at)} ${clock.format(at)}`;
-}
-
 /** Wall time of seconds since 1970, with milliseconds. */
 export function time(seconds) {
     const ms = Math.floor((seconds * 1000) % 1000);
