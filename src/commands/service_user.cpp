@@ -46,8 +46,8 @@ std::vector<Used> used_by(const config::Config& config) {
         add(config.mqtt->password_file);
     }
     if (!config.profiles_dir.empty()) all.push_back({config.profiles_dir, R_OK | X_OK, "750"});
-    if (config.audit) {
-        const auto folder = std::filesystem::path(config.audit->file).parent_path();
+    for (const std::string& file : {config.audit ? config.audit->file : "", config.store.file}) {
+        const auto folder = std::filesystem::path(file).parent_path();
         std::error_code unknown;
         if (std::filesystem::is_directory(folder, unknown))
             all.push_back({folder.string(), R_OK | W_OK | X_OK, "770"});
