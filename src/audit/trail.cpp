@@ -1,9 +1,10 @@
 #include "panelgate/audit/trail.hpp"
 
 #include <algorithm>
-#include <csignal>
 #include <exception>
 #include <utility>
+
+#include "panelgate/base/thread.hpp"
 
 namespace panelgate::audit {
 
@@ -12,17 +13,6 @@ namespace {
 constexpr Duration kAgain = 1s;  // between two tries while the disk takes nothing, or two looks
 constexpr std::uint64_t kAnchorEvery = 10'000;  // records
 constexpr Duration kAnchorAfter = 10min;        // the same in time, if there was a record
-
-/// Signals are for the loop's thread.
-std::thread start_thread(std::function<void()> run) {
-    sigset_t all{};
-    sigset_t before{};
-    ::sigfillset(&all);
-    ::pthread_sigmask(SIG_SETMASK, &all, &before);
-    std::thread thread(std::move(run));
-    ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
-    return thread;
-}
 
 std::uint64_t lines_in(const std::string& text) {
     return static_cast<std::uint64_t>(std::ranges::count(text, '\n'));

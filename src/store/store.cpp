@@ -1,10 +1,10 @@
 #include "panelgate/store/store.hpp"
 
 #include <algorithm>
-#include <csignal>
 #include <exception>
 #include <utility>
 
+#include "panelgate/base/thread.hpp"
 #include "statement.hpp"
 
 namespace panelgate::store {
@@ -15,17 +15,6 @@ constexpr std::chrono::seconds kFlush{1};
 constexpr std::chrono::hours kPrune{1};
 constexpr std::chrono::hours kStep{24};  // of a clock that was set
 constexpr unsigned kAgain = 10;          // rounds between two tries to open the file
-
-/// Signals are for the loop's thread.
-std::thread start_thread(std::function<void()> run) {
-    sigset_t all{};
-    sigset_t before{};
-    ::sigfillset(&all);
-    ::pthread_sigmask(SIG_SETMASK, &all, &before);
-    std::thread thread(std::move(run));
-    ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
-    return thread;
-}
 
 }  // namespace
 

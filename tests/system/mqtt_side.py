@@ -156,12 +156,10 @@ def take_in(peer, newest=5):
     return True
 
 
-class Strict:
-    """A broker that knows no later version of MQTT, lets nobody read and, where the version has a
-    word for it, ends the connection; a context manager."""
+class Listening:
+    """What connects is served by `_serve`, until the end of the context."""
 
-    def __init__(self, newest=5):
-        self._newest = newest
+    def __init__(self):
         self._server = socket.create_server(("127.0.0.1", 0))
         self.port = self._server.getsockname()[1]
         threading.Thread(target=self._serve, daemon=True).start()
@@ -171,6 +169,15 @@ class Strict:
 
     def __exit__(self, *_):
         self._server.close()
+
+
+class Strict(Listening):
+    """A broker that knows no later version of MQTT, lets nobody read and, where the version has a
+    word for it, ends the connection; a context manager."""
+
+    def __init__(self, newest=5):
+        self._newest = newest
+        super().__init__()
 
     def _serve(self):
         with contextlib.suppress(OSError):
@@ -191,21 +198,13 @@ class Strict:
             pass
 
 
-class Rude:
+class Rude(Listening):
     """A broker that takes each connection and ends it with the first message; a context manager."""
 
     def __init__(self):
         self.came = []  # by the clock
         self._changed = threading.Condition()
-        self._server = socket.create_server(("127.0.0.1", 0))
-        self.port = self._server.getsockname()[1]
-        threading.Thread(target=self._serve, daemon=True).start()
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self._server.close()
+        super().__init__()
 
     def _serve(self):
         with contextlib.suppress(OSError):

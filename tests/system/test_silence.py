@@ -174,7 +174,7 @@ class Broadcast(unittest.TestCase):
 
     def test_a_read_is_refused_and_never_sent(self):
         with gateway_and_bus({1: echo_address}) as (program, bus), program.client() as client:
-            self.assertEqual(client.ask(0, read_registers(0)), fault(3, 1))
+            self.assertEqual(client.ask(0, read_registers(0)), fault(3, NO_PATH))
             self.assertEqual(bus.frames(0), [])
 
 

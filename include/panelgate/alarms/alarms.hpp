@@ -11,7 +11,7 @@
 
 namespace panelgate::alarms {
 
-/// Active or not, acknowledged or not (ISA-18.2, without latching and shelving).
+/// Active or not, acknowledged or not: the states of ISA 18.2 without latching and shelving.
 enum class State : std::uint8_t {
     normal,        ///< the condition has ended, and somebody knows
     active,        ///< the condition holds, and nobody has acknowledged
