@@ -163,8 +163,8 @@ class Mqtt(unittest.TestCase):
 
             def is_written():
                 listener.publish(f"{TOPIC}/press/level/set", b"21.5")
-                return listener.of(f"{TOPIC}/press/level/set/result")
-            self.assertTrue(until(is_written)[0]["ok"], "in the next second")
+                return any(one["ok"] for one in listener.of(f"{TOPIC}/press/level/set/result"))
+            until(is_written)  # in the next second
 
     def test_a_subscription_that_the_broker_refuses_is_told_and_why_it_ends_a_connection(self):
         for newest, version in ((5, "5"), (4, "3.1.1")):
