@@ -161,7 +161,8 @@ void add_status(Adder& adder) {
     add_format(command, typed);
     command->footer(
         "Exit codes: 0 all is well; 1 a line, a station, a relay or a listener is not, or there "
-        "are findings; 64 usage; 66 the token file cannot be read; 69 no gateway answers.");
+        "are findings or alarms; 64 usage; 66 the token file cannot be read; 69 no gateway "
+        "answers.");
     adder.on_call(command, [typed] { return status(typed->at, typed->format == "json"); });
     const auto shown = std::make_shared<Typed>();
     command = adder.add(

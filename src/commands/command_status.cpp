@@ -35,6 +35,7 @@ std::optional<Overview> look(const GatewayClient& gateway, ExitCode& code) {
         !ask_for(gateway, "/api/v1/stations", overview.stations, code) ||
         !ask_for(gateway, "/api/v1/relays", overview.relays, code) ||
         !ask_for(gateway, "/api/v1/findings", overview.findings, code) ||
+        !ask_for(gateway, "/api/v1/alarms", overview.alarms, code) ||
         !ask_for(gateway, "/api/v1/usage", overview.usage, code))
         return std::nullopt;
     for (const auto* line : objects_of(lines, "lines")) {

@@ -136,6 +136,12 @@ std::vector<std::string> troubles(const Overview& overview) {
                        (last ? ", its last answer is " + span_text(*last / 1000) + " old"
                              : ", it has never answered"));
     }
+    for (const json::object* alarm : objects_of(overview.alarms, "alarms")) {
+        const std::string state = shown(*alarm, "state");
+        if (state != "normal")
+            list.push_back("alarm " + shown(*alarm, "name") + " is " + state + ": " +
+                           shown(*alarm, "text"));
+    }
     for (const json::object* finding : objects_of(overview.findings, "findings"))
         list.push_back(shown(*finding, "text"));
     for (const json::object& line : overview.lines) {

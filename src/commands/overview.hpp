@@ -13,11 +13,12 @@ struct Overview {
     boost::json::object stations;            ///< GET /api/v1/stations
     boost::json::object relays;              ///< GET /api/v1/relays
     boost::json::object findings;            ///< GET /api/v1/findings
+    boost::json::object alarms;              ///< GET /api/v1/alarms
     boost::json::object usage;               ///< GET /api/v1/usage: of the last minute
     std::string not_ready;                   ///< what /readyz says, unless it is 200
 };
 
-/// What is not well, a sentence each: lines, stations, findings of lines and of the gateway,
+/// What is not well, a sentence each: lines, stations, findings of lines and of the gateway, alarms,
 /// relays, listeners.
 std::vector<std::string> troubles(const Overview& overview);
 /// Tables of lines and stations, findings with their advice, and what is not well.

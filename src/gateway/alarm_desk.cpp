@@ -135,7 +135,8 @@ std::optional<alarms::Change> AlarmDesk::look_at(std::size_t alarm) {
     if (station == nullptr) return std::nullopt;
     if (of.offline) {
         const auto health = station->bus->station_status(station->id).state;
-        return alarms_.on_condition(alarm, time(), health == Health::offline);
+        const bool is_gone = health == Health::offline || !station->bus->status().up;
+        return alarms_.on_condition(alarm, time(), is_gone);
     }
     if (!station->points) return std::nullopt;
     const auto& points = station->points->points();

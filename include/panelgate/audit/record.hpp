@@ -10,7 +10,7 @@
 namespace panelgate::audit {
 
 /// The kinds of records: stable identifiers.
-inline constexpr std::array<std::string_view, 12> kKinds{
+inline constexpr std::array<std::string_view, 13> kKinds{
     "start",      // the gateway has started
     "end",        // ... and ends in order
     "write",      // a write, whatever became of it
@@ -18,6 +18,7 @@ inline constexpr std::array<std::string_view, 12> kKinds{
     "repeats",    // how often one client repeated what is recorded above
     "login",      // a log-in that failed
     "reload",     // reload or rollback
+    "configuration",  // the text of the configuration was read, checked or written
     "discovery",  // a search for stations
     "simulator",  // a fault of a simulated panel was set
     "token",      // a token came, went, changed or expired

@@ -11,9 +11,11 @@ const PAGE = 100;     // entries
 const KINDS = {lines: 'line_up,line_down', stations: 'station_online,station_offline', findings: 'finding,finding_gone',
     writes: 'write,refused', access: 'refused,login_failed', alarms: 'alarm_raised,alarm_cleared,alarm_acknowledged', gateway: 'start,stop,reload,standby'};
 
+const TONES = {line_up: 'good', station_online: 'good', alarm_cleared: 'good', alarm_acknowledged: 'none', line_down: 'bad', station_offline: 'bad', alarm_raised: 'bad'};
+
 function row(entry) {
     const place = [entry.station || entry.line, entry.point].filter((part) => part !== '').join('/');
-    const tone = entry.severity === 'info' ? 'none' : entry.severity === 'low' || entry.severity === 'warning' ? 'warn' : 'bad';
+    const tone = TONES[entry.kind] ?? (entry.severity === 'info' ? 'none' : 'warn');
     return {node: h('tr', {'data-kind': entry.kind}, h('td', {class: 'figure'}, clockTime(Date.parse(entry.time))),
         h('td', null, h('span', {class: `badge ${tone}`}, word('event', entry.kind))), h('td', {class: 'wide'}, place === '' ? null : h('strong', null, place, ' '), entry.text), h('td', null, entry.who))};
 }
