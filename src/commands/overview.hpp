@@ -18,8 +18,8 @@ struct Overview {
     std::string not_ready;                   ///< what /readyz says, unless it is 200
 };
 
-/// What is not well, a sentence each: lines, stations, findings of lines and of the gateway, alarms,
-/// relays, listeners.
+/// What is not well, a sentence each: lines, stations, findings of lines and of the gateway,
+/// alarms, relays, listeners.
 std::vector<std::string> troubles(const Overview& overview);
 /// Tables of lines and stations, findings with their advice, and what is not well.
 std::string status_text(const Overview& overview, bool coloured);

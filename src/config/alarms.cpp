@@ -188,7 +188,8 @@ const Keys<Settings>& alarm_keys() {
                       "Cause of a finding of the line doctor, or any.")
                 .example("any")
                 .boolean("stale", &Settings::stale, "The point's value is too old or unreadable.")
-                .boolean("offline", &Settings::offline, "The station does not answer, or its line is down.")
+                .boolean("offline", &Settings::offline,
+                         "The station does not answer, or its line is down.")
                 .boolean("down", &Settings::down, "The line cannot be opened.");
         keys = number(std::move(keys), "above", &Settings::above, "Raised above this value.")
                    .example("80");

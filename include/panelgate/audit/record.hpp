@@ -11,19 +11,19 @@ namespace panelgate::audit {
 
 /// The kinds of records: stable identifiers.
 inline constexpr std::array<std::string_view, 13> kKinds{
-    "start",      // the gateway has started
-    "end",        // ... and ends in order
-    "write",      // a write, whatever became of it
-    "refusal",    // a request that was refused
-    "repeats",    // how often one client repeated what is recorded above
-    "login",      // a log-in that failed
-    "reload",     // reload or rollback
+    "start",          // the gateway has started
+    "end",            // ... and ends in order
+    "write",          // a write, whatever became of it
+    "refusal",        // a request that was refused
+    "repeats",        // how often one client repeated what is recorded above
+    "login",          // a log-in that failed
+    "reload",         // reload or rollback
     "configuration",  // the text of the configuration was read, checked or written
-    "discovery",  // a search for stations
-    "simulator",  // a fault of a simulated panel was set
-    "token",      // a token came, went, changed or expired
-    "file",       // a file begins
-    "lost",       // records were left out: the disk took nothing for too long
+    "discovery",      // a search for stations
+    "simulator",      // a fault of a simulated panel was set
+    "token",          // a token came, went, changed or expired
+    "file",           // a file begins
+    "lost",           // records were left out: the disk took nothing for too long
 };
 
 /// A record, or some of its members, in the order of the file; the chain adds number and hash.
