@@ -89,7 +89,7 @@ class Browser(unittest.TestCase):
         """What does not show all that it has, and gives no sign of it."""
         return self.script("""return [...document.querySelectorAll('main *, header *, dialog *')].filter((node) => {
             const style = getComputedStyle(node);
-            return node.clientWidth > 0 && node.scrollWidth > node.clientWidth + 1 && style.display !== 'inline' && !node.closest('.plot, .yaml')
+            return node.clientWidth > 0 && node.scrollWidth > node.clientWidth + 1 && style.display !== 'inline' && !node.closest('.plot, .yaml, .CodeMirror')
                 && style.textOverflow !== 'ellipsis' && !node.matches('select, input, .unseen, .stack');
         }).map((node) => `${node.tagName}.${node.className}: ${node.textContent.slice(0, 60)}`)""")
 
