@@ -278,11 +278,14 @@ def metric(program, name):
 
 
 class Truth:
-    """What the gateway itself has read of a point, by its events; a context manager."""
+    """What the gateway itself has read of a point, by its events, and how often the panel's state has
+    changed; a context manager."""
 
     def __init__(self, program, point):
-        self._events = Events(program, f"?types=point&point=press/{point}")
+        self._events = Events(program, "?types=point,station&station=press")
+        self._point = point
         self.states = []
+        self.flips = 0
         self._thread = threading.Thread(target=self._read, daemon=True)
 
     def __enter__(self):
@@ -302,9 +305,10 @@ class Truth:
     def _read(self):
         with contextlib.suppress(OSError, ValueError):
             for line in iter(self._events.response.readline, b""):
-                if line.startswith(b"data: ") and b'"quality"' in line:
-                    point = json.loads(line[6:])
-                    self.states.append((point["value"], point["quality"]))
+                said = json.loads(line[6:]) if line.startswith(b"data: ") else {}
+                if said.get("name") == self._point:
+                    self.states.append((said["value"], said["quality"]))
+                self.flips += "event" in said
 
 
 def changes(values):

@@ -226,6 +226,7 @@ class Mqtt(unittest.TestCase):
                 told = changes([(body["value"], body["quality"])
                                 for body in first_told(listener.of(ramp))])
                 read = changes(truth.states)
+                flips = truth.flips
             end = (last, "good")
             told, read = told[:told.index(end) + 1], read[:read.index(end) + 1]
             told = told[told.index(read[0]):]  # the events were listened to later
@@ -233,7 +234,9 @@ class Mqtt(unittest.TestCase):
             rest = iter(read)
             self.assertTrue(all(state in rest for state in told), (told, read))
             self.assertEqual(told[-30:], read[-30:])
-            self.assertEqual(len(read) - len(told), dropped)
+            # A panel that is late on a busy machine is suspect: its status waits in the store, too.
+            missing = len(read) - len(told)
+            self.assertTrue(missing <= dropped <= missing + flips, (missing, dropped, flips))
 
 
 @unittest.skipUnless(BROKER and paho, "needs Debian's mosquitto and python3-paho-mqtt "
