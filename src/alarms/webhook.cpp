@@ -21,7 +21,7 @@ json::object alert_of(const Settings& alarm, const Status& status) {
     if (!alarm.station.empty()) labels["station"] = alarm.station;
     if (!alarm.point.empty()) labels["point"] = alarm.point;
     if (!alarm.line.empty()) labels["line"] = alarm.line;
-    json::object annotations{{"summary", alarm.text.empty() ? alarm.name : alarm.text}};
+    json::object annotations{{"summary", alarm.shown()}};
     if (status.value) annotations["value"] = number_text(*status.value);
     return {{"labels", std::move(labels)},
             {"annotations", std::move(annotations)},
@@ -67,7 +67,7 @@ json::object describe(const Settings& alarm, const Status& status) {
     if (status.since != WallTime()) object["since"] = rfc3339(status.since);
     object["value"] = nullptr;
     if (status.value) object["value"] = *status.value;
-    object["text"] = alarm.text.empty() ? alarm.name : alarm.text;
+    object["text"] = alarm.shown();
     object["acknowledged_by"] = nullptr;
     if (!status.by.empty()) object["acknowledged_by"] = status.by;
     object["station"] = alarm.station;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "panelgate/base/text.hpp"
+#include "panelgate/web/http/json_text.hpp"
 #include "table.hpp"
 
 namespace panelgate::commands {
@@ -16,8 +17,7 @@ namespace panelgate::commands {
 namespace json = boost::json;
 
 std::string text_of(const json::object& object, std::string_view name) {
-    const json::value* found = object.if_contains(name);
-    return found != nullptr && found->is_string() ? std::string(found->get_string()) : "";
+    return web::member_text(object, name);
 }
 
 std::optional<double> number_of(const json::object& object, std::string_view name) {

@@ -8,6 +8,7 @@
 #include <thread>
 #include <variant>
 
+#include "answers.hpp"
 #include "commands.hpp"
 #include "gateway_client.hpp"
 #include "http_door.hpp"
@@ -28,11 +29,6 @@ constexpr Duration kHealthTimeout = 2s;
 constexpr Duration kPauses[] = {100ms, 500ms, 2s};
 constexpr std::size_t kMostOfVerdict = 8 * 1024 * 1024;  // bytes of the verdict
 
-std::string text_in(const json::object& object, std::string_view name) {
-    const json::value* found = object.if_contains(name);
-    return found != nullptr && found->is_string() ? std::string(found->as_string()) : "";
-}
-
 /// Prints each text of a list on its own line.
 void print_list(std::ostream& out, const json::object& verdict, std::string_view name,
                 std::string_view before) {
@@ -48,16 +44,16 @@ void print_faults(const json::object& verdict) {
     for (const json::value& one : list->as_array()) {
         const json::object* fault = one.if_object();
         if (fault == nullptr) continue;
-        std::cerr << text_in(*fault, "file");
+        std::cerr << text_of(*fault, "file");
         if (fault->contains("line"))
             std::cerr << ':' << fault->at("line") << ':' << fault->at("column");
-        std::cerr << ": " << text_in(*fault, "detail") << '\n';
+        std::cerr << ": " << text_of(*fault, "detail") << '\n';
     }
 }
 
 /// Prints the verdict of a gateway that understood the request.
 ExitCode print_verdict(const json::object& verdict) {
-    const std::string outcome = text_in(verdict, "outcome");
+    const std::string outcome = text_of(verdict, "outcome");
     if (outcome == "applied" || outcome == "unchanged") {
         std::ostringstream done;
         done << outcome << '\n';
@@ -69,7 +65,7 @@ ExitCode print_verdict(const json::object& verdict) {
         return kFine;
     }
     print_faults(verdict);
-    std::cerr << "panelgate: not reloaded: " << text_in(verdict, "detail") << '\n';
+    std::cerr << "panelgate: not reloaded: " << text_of(verdict, "detail") << '\n';
     if (outcome == "refused") {
         print_list(std::cerr, verdict, "weaker", "  ");
         std::cerr << "  (where that is meant: panelgate reload --rollback --weaker)\n";
@@ -152,7 +148,7 @@ ExitCode reload(const ReloadOptions& options) {
     if (!wrong && body.is_object() && body.as_object().contains("outcome"))
         return print_verdict(body.as_object());
     std::string why = reply.text.empty() ? reply.failure() : reply.status();
-    if (!wrong && body.is_object()) why += ": " + text_in(body.as_object(), "detail");
+    if (!wrong && body.is_object()) why += ": " + text_of(body.as_object(), "detail");
     std::cerr << "panelgate: not reloaded: " << door.url() << ": " << why << '\n';
     if (reply.text.empty() && options.http.empty())
         std::cerr << "  (if it runs with another `http: listen` than " << options.file

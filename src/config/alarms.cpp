@@ -33,18 +33,6 @@ bool read_point(Reader& in, Settings& alarm) {
     return true;
 }
 
-/// A number that an alarm may lack.
-Keys<Settings> number(Keys<Settings>&& keys, std::string_view key,
-                      std::optional<double> Settings::* member, std::string_view text) {
-    return std::move(keys).value(
-        shape_of(key, Kind::number, text),
-        [=](Reader& in, Settings& into) {
-            into.*member = read_exact(in, key);
-            return (into.*member).has_value();
-        },
-        [=](const Settings& of) { return as_written(of.*member); });
-}
-
 template <class List, class Name>
 std::vector<std::string_view> names_in(const List& list, Name name) {
     std::vector<std::string_view> names;
@@ -52,27 +40,15 @@ std::vector<std::string_view> names_in(const List& list, Name name) {
     return names;
 }
 
-const Station* find_station(const Config& config, std::string_view name) {
-    for (const Line& line : config.lines)
-        for (const Station& station : line.stations)
-            if (station.name == name) return &station;
-    return nullptr;
-}
-
 void check_station(Reader& in, const Settings& alarm) {
-    const Loading& loading = in.loading;
-    const std::string_view key = alarm.point.empty() ? "station" : "point";
-    const Station* const station = find_station(loading.config, alarm.station);
-    if (station == nullptr) {
-        const std::vector<std::string_view> names(loading.station_names.begin(),
-                                                  loading.station_names.end());
-        if (!loading.names_missing) in.problem(key, yaml::no_such("station", alarm.station, names));
-    } else if (!alarm.point.empty() &&
-               std::ranges::find(station->points, alarm.point, &points::Point::name) ==
-                   station->points.end()) {
+    const bool is_of_point = !alarm.point.empty();
+    const std::string_view key = is_of_point ? "point" : "station";
+    const Station* const station = find_station(in, key, alarm.station);
+    if (station == nullptr || !is_of_point) return;
+    const auto& points = station->points;
+    if (std::ranges::find(points, alarm.point, &points::Point::name) == points.end())
         in.problem(key, yaml::no_such("point of " + alarm.station, alarm.point,
-                                      names_in(station->points, &points::Point::name)));
-    }
+                                      names_in(points, &points::Point::name)));
 }
 
 void check_place(Reader& in, const Settings& alarm) {
@@ -161,52 +137,47 @@ const Keys<alarms::WebhookSettings>& webhook_keys() {
 const Keys<Settings>& alarm_keys() {
     static constexpr Words<std::string_view, 4> kSeverities{
         {{"low", "low"}, {"medium", "medium"}, {"high", "high"}, {"urgent", "urgent"}}};
-    static const auto kKeys = [] {
-        auto keys =
-            Keys<Settings>()
-                .text("name", &Settings::name, name_form(), "Name of the alarm; unique.")
-                .required()
-                .example("oven-hot")
-                .value(text_shape("point", {"^[^/]+/."}, "STATION/POINT that is watched."),
-                       read_point,
-                       [](const Settings& of) {
-                           return of.point.empty() ? "" : of.station + '/' + of.point;
-                       })
-                .example("oven/temperature")
-                .value(
-                    text_shape("station", {}, "Station that may be offline."),
-                    [](Reader& in, Settings& into) {
-                        const auto name = in.text("station");
-                        if (name) into.station = *name;
-                        return name.has_value();
-                    },
-                    [](const Settings& of) { return of.point.empty() ? of.station : ""; })
-                .example("press")
-                .text("line", &Settings::line, {}, "Line that may be down.")
-                .example("floor1")
-                .text("finding", &Settings::finding, {"^[a-z][a-z0-9-]*$"},
-                      "Cause of a finding of the line doctor, or any.")
-                .example("any")
-                .boolean("stale", &Settings::stale, "The point's value is too old or unreadable.")
-                .boolean("offline", &Settings::offline,
-                         "The station does not answer, or its line is down.")
-                .boolean("down", &Settings::down, "The line cannot be opened.");
-        keys = number(std::move(keys), "above", &Settings::above, "Raised above this value.")
-                   .example("80");
-        keys = number(std::move(keys), "below", &Settings::below, "Raised below this value.")
-                   .example("10");
-        keys = number(std::move(keys), "equals", &Settings::equals, "Raised at this value.")
-                   .example("3");
-        keys = number(std::move(keys), "back", &Settings::back,
-                      "Value at which it ends; without it the limit itself.")
-                   .example("78");
-        return std::move(keys)
+    static const auto kKeys =
+        Keys<Settings>()
+            .text("name", &Settings::name, name_form(), "Name of the alarm; unique.")
+            .required()
+            .example("oven-hot")
+            .value(text_shape("point", {"^[^/]+/."}, "STATION/POINT that is watched."), read_point,
+                   [](const Settings& of) {
+                       return of.point.empty() ? "" : of.station + '/' + of.point;
+                   })
+            .example("oven/temperature")
+            .value(
+                text_shape("station", {}, "Station that may be offline."),
+                [](Reader& in, Settings& into) {
+                    const auto name = in.text("station");
+                    if (name) into.station = *name;
+                    return name.has_value();
+                },
+                [](const Settings& of) { return of.point.empty() ? of.station : ""; })
+            .example("press")
+            .text("line", &Settings::line, {}, "Line that may be down.")
+            .example("floor1")
+            .text("finding", &Settings::finding, {"^[a-z][a-z0-9-]*$"},
+                  "Cause of a finding of the line doctor, or any.")
+            .example("any")
+            .boolean("stale", &Settings::stale, "The point's value is too old or unreadable.")
+            .boolean("offline", &Settings::offline,
+                     "The station does not answer, or its line is down.")
+            .boolean("down", &Settings::down, "The line cannot be opened.")
+            .number("above", &Settings::above, "Raised above this value.")
+            .example("80")
+            .number("below", &Settings::below, "Raised below this value.")
+            .example("10")
+            .number("equals", &Settings::equals, "Raised at this value.")
+            .example("3")
+            .number("back", &Settings::back, "Value at which it ends; without it the limit itself.")
+            .example("78")
             .duration("for", &Settings::delay, 0ms, kLongest,
                       "How long the condition must hold before it is raised.")
             .word("severity", &Settings::severity, kSeverities, "How bad it is.")
             .text("text", &Settings::text, {}, "What operators read; without it the name.")
             .example("The oven is too hot");
-    }();
     return kKeys;
 }
 

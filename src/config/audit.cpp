@@ -25,12 +25,6 @@ bool read_rotate(Reader& in, audit::Settings& settings) {
     return size.has_value();
 }
 
-std::string file_fault(std::string_view typed) {
-    if (typed.starts_with('/') && !typed.ends_with('/')) return "";
-    return "file must be the whole path of a file, such as /var/log/panelgate/audit.jsonl, not " +
-           yaml::quote(typed);
-}
-
 }  // namespace
 
 const Keys<audit::Settings>& audit_keys() {
@@ -40,7 +34,7 @@ const Keys<audit::Settings>& audit_keys() {
         {{"continue", OnFailure::keep_on}, {"refuse_writes", OnFailure::refuse_writes}}};
     static const auto kKeys =
         Keys<Settings>()
-            .text("file", &Settings::file, {"^/.*[^/]$", false, 0, file_fault},
+            .text("file", &Settings::file, whole_path("/var/log/panelgate/audit.jsonl"),
                   "File that is written; full ones beside it have a number behind the name.")
             .weaker(By::any)
             .required()

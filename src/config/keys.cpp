@@ -120,6 +120,14 @@ std::optional<std::uint64_t> parse_size(std::string_view text) {
 
 }  // namespace
 
+Form whole_path(const std::string& example) {
+    return {"^/.*[^/]$", false, 0, [example](std::string_view typed) -> std::string {
+                if (typed.starts_with('/') && !typed.ends_with('/')) return "";
+                return "file must be the whole path of a file, such as " + example + ", not " +
+                       yaml::quote(typed);
+            }};
+}
+
 KeyShape size_shape(std::string_view key, std::string_view text) {
     return text_shape(key, {"^[1-9][0-9]*(KiB|MiB|GiB)$"}, text);
 }

@@ -85,6 +85,8 @@ std::optional<Decimal> read_number(Reader& in, std::string_view key);
 /// Reads a number; more digits than a double holds are a problem.
 std::optional<double> read_exact(Reader& in, std::string_view key);
 
+/// The whole path of a file that is written; `example` is told where it is none.
+Form whole_path(const std::string& example);
 /// A size such as 50MiB.
 KeyShape size_shape(std::string_view key, std::string_view text);
 /// Reads such a size, in bytes.
@@ -160,8 +162,9 @@ class Keys : public Table {
         return std::move(*this).value(
             shape_of(key, KeyShape::Kind::number, text),
             [=](Reader& in, S& into) {
-                if constexpr (std::same_as<std::remove_cvref_t<std::invoke_result_t<Field, S&>>,
-                                           double>)
+                using Member = std::remove_cvref_t<std::invoke_result_t<Field, S&>>;
+                if constexpr (std::same_as<Member, double> ||
+                              std::same_as<Member, std::optional<double>>)
                     return store(read_exact(in, key), field, into);
                 else
                     return store(read_number(in, key), field, into);

@@ -137,13 +137,6 @@ struct Route {
     Memory to;
 };
 
-const Station* find_station(const Config& config, std::string_view name) {
-    for (const Line& line : config.lines)
-        for (const Station& station : line.stations)
-            if (station.name == name) return &station;
-    return nullptr;
-}
-
 /// STATION/NOTATION
 bool read_end(Reader& in, std::string_view key, points::RelayEnd& end) {
     const auto text = in.text(key);
@@ -161,14 +154,8 @@ bool read_end(Reader& in, std::string_view key, points::RelayEnd& end) {
 
 /// What an end names.
 std::optional<End> find_end(Reader& in, std::string_view key, const points::RelayEnd& named) {
-    const Loading& loading = in.loading;
-    End end{named, find_station(loading.config, named.station)};
-    if (end.station == nullptr) {
-        const std::vector<std::string_view> names(loading.station_names.begin(),
-                                                  loading.station_names.end());
-        if (!loading.names_missing) in.problem(key, yaml::no_such("station", named.station, names));
-        return std::nullopt;
-    }
+    End end{named, find_station(in, key, named.station)};
+    if (end.station == nullptr) return std::nullopt;
     if (end.station->listens) {
         in.problem(key, "station '" + named.station +
                             "' is on a line that is only listened to (mode: listen): a relay can "
@@ -283,6 +270,17 @@ void load_relay(Reader& root, const Node& node, Config& config, std::vector<Rout
 }
 
 }  // namespace
+
+const Station* find_station(Reader& in, std::string_view key, const std::string& name) {
+    const Loading& loading = in.loading;
+    for (const Line& line : loading.config.lines)
+        for (const Station& station : line.stations)
+            if (station.name == name) return &station;
+    const std::vector<std::string_view> names(loading.station_names.begin(),
+                                              loading.station_names.end());
+    if (!loading.names_missing) in.problem(key, yaml::no_such("station", name, names));
+    return nullptr;
+}
 
 const Keys<Relay>& relay_keys() {
     const auto text = [](const points::RelayEnd& end) {

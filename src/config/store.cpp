@@ -9,19 +9,13 @@ namespace {
 constexpr std::uint64_t kSmallest = 8 * 1024 * 1024;
 constexpr std::uint64_t kLargest = std::uint64_t{64} * 1024 * 1024 * 1024;
 
-std::string store_fault(std::string_view typed) {
-    if (typed.starts_with('/') && !typed.ends_with('/')) return "";
-    return "file must be the whole path of a file, such as /var/lib/panelgate/state.db, not " +
-           yaml::quote(typed);
-}
-
 }  // namespace
 
 const Keys<store::Settings>& store_keys() {
     using store::Settings;
     static const auto kKeys =
         Keys<Settings>()
-            .text("file", &Settings::file, {"^/.*[^/]$", false, 0, store_fault},
+            .text("file", &Settings::file, whole_path("/var/lib/panelgate/state.db"),
                   "SQLite file of events and history; without it state.db in $STATE_DIRECTORY, or "
                   "nothing but memory.")
             .example("/var/lib/panelgate/state.db")

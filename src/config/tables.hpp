@@ -120,6 +120,8 @@ bool read_serial(Reader& owner, const std::function<void(Reader&)>& read);
 void check_rs485(Reader& in, const line::Rs485& rs485);
 /// Refuses /dev/ttyUSB0:9600 and the like; other paths may contain colons.
 void check_path(Reader& in, const std::string& path);
+/// Finds a station by its name; null, and a problem at `key`, if there is none.
+const Station* find_station(Reader& in, std::string_view key, const std::string& name);
 /// Finds an item by its notation; nothing, and a problem at `key`, if the panel has none.
 std::optional<profile::Item> find_item(Reader& in, std::string_view key, const std::string& text,
                                        const profile::PanelProfile& profile);

@@ -23,10 +23,6 @@ store::Kind kind_of(alarms::Change::Kind kind) {
     return store::Kind::alarm_acknowledged;
 }
 
-std::string shown_text(const alarms::Settings& alarm) {
-    return alarm.text.empty() ? alarm.name : alarm.text;
-}
-
 /// What the store keeps of an alarm; "" of a normal one.
 std::string kept_text(const alarms::Status& status) {
     if (status.state == alarms::State::normal) return {};
@@ -58,12 +54,6 @@ std::optional<alarms::Status> parse_kept(const std::string& text) {
 }
 
 std::string point_of(const alarms::Settings& alarm) { return alarm.station + '/' + alarm.point; }
-
-std::optional<double> value_of(const Station& station, const points::Point& point, TimePoint now) {
-    const points::PointReading reading = station.points->read(point, now);
-    if (!reading.value || reading.quality != points::Quality::good) return std::nullopt;
-    return points::number_of(*reading.value);
-}
 
 }  // namespace
 
@@ -104,45 +94,47 @@ void AlarmDesk::restore(const std::vector<std::pair<std::string, std::string>>& 
     look();
 }
 
+/// The lines and findings as they are now: asked once for all alarms.
+AlarmDesk::Sights AlarmDesk::look_around() const {
+    Sights sights;
+    for (const web::Finding& finding : findings_()) sights.findings.insert(finding.cause);
+    for (const Line& line : plant_->lines()) {
+        const bus::LineStatus status = line.bus->status();
+        if (!status.up) sights.down.insert(line.configured->name);
+        for (const bus::LineFinding& finding : status.findings)
+            sights.findings.insert(finding.cause);
+    }
+    return sights;
+}
+
 /// Looks at every alarm's condition, and at delays that have passed.
 void AlarmDesk::look() {
-    for (std::size_t i = 0; i < alarms_.size(); ++i) on_change(look_at(i));
-    for (const alarms::Change& change : alarms_.on_time(time())) on_change(change);
+    if (alarms_.size() > 0) {
+        const Sights sights = look_around();
+        for (std::size_t i = 0; i < alarms_.size(); ++i) on_change(look_at(i, sights));
+        for (const alarms::Change& change : alarms_.on_time(time())) on_change(change);
+    }
     alarm_->arm(clock_.now() + kAlarmLook, [this] { look(); });
 }
 
-bool AlarmDesk::is_finding(std::string_view cause) const {
-    const auto is_meant = [&](const auto& finding) {
-        return cause == "any" || finding.cause == cause;
-    };
-    if (std::ranges::any_of(findings_(), is_meant)) return true;
-    return std::ranges::any_of(plant_->lines(), [&](const Line& line) {
-        const auto findings = line.bus->status().findings;
-        return std::ranges::any_of(findings, is_meant);
-    });
-}
-
-std::optional<alarms::Change> AlarmDesk::look_at(std::size_t alarm) {
+std::optional<alarms::Change> AlarmDesk::look_at(std::size_t alarm, const Sights& sights) {
     const alarms::Settings& of = alarms_.settings(alarm);
-    if (!of.finding.empty()) return alarms_.on_condition(alarm, time(), is_finding(of.finding));
-    if (of.down) {
-        const auto line = std::ranges::find(plant_->lines(), of.line,
-                                            [](const Line& one) { return one.configured->name; });
-        const bool down = line != plant_->lines().end() && !line->bus->status().up;
-        return alarms_.on_condition(alarm, time(), down);
-    }
+    if (!of.finding.empty())
+        return alarms_.on_condition(
+            alarm, time(),
+            of.finding == "any" ? !sights.findings.empty() : sights.findings.contains(of.finding));
+    if (of.down) return alarms_.on_condition(alarm, time(), sights.down.contains(of.line));
     const Station* const station = plant_->find(of.station);
     if (station == nullptr) return std::nullopt;
     if (of.offline) {
         const auto health = station->bus->station_status(station->id).state;
-        const bool is_gone = health == Health::offline || !station->bus->status().up;
+        const bool is_gone = health == Health::offline || sights.down.contains(station->line);
         return alarms_.on_condition(alarm, time(), is_gone);
     }
-    if (!station->points) return std::nullopt;
-    const auto& points = station->points->points();
-    const auto point = std::ranges::find(points, of.point, &points::Point::name);
-    if (point == points.end()) return std::nullopt;
-    return alarms_.on_value(alarm, time(), value_of(*station, *point, clock_.now()));
+    const points::Point* const point = station->points ? station->points->find(of.point) : nullptr;
+    if (point == nullptr) return std::nullopt;
+    return alarms_.on_value(alarm, time(),
+                            station->points->read(*point, clock_.now()).good_number());
 }
 
 void AlarmDesk::on_points(const Station& station, const std::vector<std::size_t>& wants) {
@@ -150,10 +142,10 @@ void AlarmDesk::on_points(const Station& station, const std::vector<std::size_t>
     for (const std::size_t want : wants) {
         const points::Point* const point = station.points->point_of(want);
         if (point == nullptr) continue;
+        const auto value = station.points->read(*point, clock_.now()).good_number();
         const auto [first, last] = by_point_.equal_range(station.name + '/' + point->name);
         for (auto at = first; at != last; ++at)
-            on_change(
-                alarms_.on_value(at->second, time(), value_of(station, *point, clock_.now())));
+            on_change(alarms_.on_value(at->second, time(), value));
     }
 }
 
@@ -165,9 +157,8 @@ void AlarmDesk::on_change(const std::optional<alarms::Change>& change) {
     entry.severity = alarm.severity;
     entry.station = alarm.station;
     entry.point = alarm.point;
-    entry.line = alarm.line;
-    if (const Station* const station = plant_->find(alarm.station)) entry.line = station->line;
-    entry.text = shown_text(alarm);
+    entry.line = line_of(alarm);
+    entry.text = alarm.shown();
     if (change->kind == alarms::Change::Kind::acknowledged) entry.who = change->now.by;
     json::object data;
     data["alarm"] = alarm.name;
@@ -178,12 +169,16 @@ void AlarmDesk::on_change(const std::optional<alarms::Change>& change) {
     tell_(*change);
 }
 
+std::string AlarmDesk::line_of(const alarms::Settings& alarm) const {
+    const Station* const station = plant_->find(alarm.station);
+    return station != nullptr ? station->line : alarm.line;
+}
+
 std::vector<web::AlarmView> AlarmDesk::list() const {
     std::vector<web::AlarmView> list;
     for (std::size_t i = 0; i < alarms_.size(); ++i) {
         const alarms::Settings& of = alarms_.settings(i);
-        const Station* const station = plant_->find(of.station);
-        list.push_back({of, alarms_.status(i), station != nullptr ? station->line : of.line});
+        list.push_back({of, alarms_.status(i), line_of(of)});
     }
     return list;
 }

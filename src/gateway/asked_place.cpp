@@ -11,6 +11,7 @@
 #include "panelgate/base/text.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/profile/notation.hpp"
+#include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::gateway {
 
@@ -62,17 +63,11 @@ const json::object* first_item(const json::object& body) {
     return list != nullptr && !list->empty() ? list->front().if_object() : nullptr;
 }
 
-std::string_view text_in(const json::object& object, std::string_view key) {
-    const json::value* value = object.if_contains(key);
-    const auto* text = value != nullptr ? value->if_string() : nullptr;
-    return text != nullptr ? std::string_view(*text) : std::string_view();
-}
-
 /// Of several items the first: `{"point": "press/speed"}` or `{"station": "press", ...}`; of raw
 /// `{"station": 7}`.
 void look_in_body(const Plant& plant, const json::object& body, AskedPlace& place) {
     if (const json::object* item = first_item(body)) return look_in_body(plant, *item, place);
-    const std::string_view point = text_in(body, "point");
+    const std::string point = web::member_text(body, "point");
     const auto slash = point.find('/');
     if (slash != point.npos) {
         place.station = plant.find(point.substr(0, slash));
@@ -86,7 +81,7 @@ void look_in_body(const Plant& plant, const json::object& body, AskedPlace& plac
     const auto* id = station->if_int64();
     if (id != nullptr && *id > 0 && *id < 256)
         place.station = plant.find(place.line, static_cast<std::uint8_t>(*id));
-    if (place.station != nullptr) place.at = text_in(body, "device");
+    if (place.station != nullptr) place.at = web::member_text(body, "device");
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "panelgate/gateway/northbound.hpp"
 #include "panelgate/gateway/snapshot.hpp"
 #include "panelgate/profile/notation.hpp"
+#include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::gateway {
 
@@ -25,9 +26,7 @@ std::string text_in(std::string_view body, std::string_view key) {
     boost::system::error_code wrong;
     const boost::json::value value = boost::json::parse(body, wrong);
     const auto* object = wrong ? nullptr : value.if_object();
-    const auto* found = object != nullptr ? object->if_contains(key) : nullptr;
-    const auto* text = found != nullptr ? found->if_string() : nullptr;
-    return text != nullptr ? std::string(*text) : std::string();
+    return object != nullptr ? web::member_text(*object, key) : std::string();
 }
 
 /// Adds the first texts of a list.

@@ -156,15 +156,13 @@ void Gateway::on_points(const std::string& line, std::uint8_t id,
 void Gateway::on_alarm(const alarms::Change& change) {
     hook_.on_change(change);
     const alarms::Settings& alarm = *change.alarm;
-    const Station* const station = snapshot_->plant.find(alarm.station);
-    const std::string line = station != nullptr ? station->line : alarm.line;
     rt::log(change.kind == alarms::Change::Kind::raised ? rt::LogLevel::warn : rt::LogLevel::info,
             "alarm",
             {{"alarm", alarm.name},
              {"state", std::string(alarms::label(change.now.state))},
              {"severity", alarm.severity}});
     if (events_.is_wanted())
-        events_.publish({"alarm", line, alarm.station, alarm.point},
+        events_.publish({"alarm", alarms_.line_of(alarm), alarm.station, alarm.point},
                         web::json_text(alarms::describe(alarm, change.now)));
 }
 
@@ -292,8 +290,8 @@ void Gateway::watch_expiry() {
     expiry_->arm(clock_.now() + pause, [this] { watch_expiry(); });
 }
 
-/// Brings the counters of the connection to the broker here, so that it is known whether it is
-/// there.
+/// Brings the broker connection's counters to the plant's loop, so that findings tell a broker that
+/// is away.
 void Gateway::ask_broker() {
     boost::asio::post(loops_.faces, [collect = northbound_.collector(), plant = loops_.plant] {
         if (auto keep = collect()) boost::asio::post(plant, std::move(keep));

@@ -12,6 +12,7 @@
 #include "panelgate/gateway/snapshot.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::gateway {
 
@@ -25,15 +26,9 @@ constexpr std::uint64_t kInMemory = 8 * 1024 * 1024;  // bytes of a store withou
 constexpr std::string_view kFinding = "finding: ";
 constexpr std::string_view kFindingGone = "finding gone: ";
 
-std::string member_text(const audit::Members& record, std::string_view key) {
-    const json::value* const value = record.if_contains(key);
-    const auto* const text = value != nullptr ? value->if_string() : nullptr;
-    return text != nullptr ? std::string(*text) : std::string();
-}
-
 /// Which records of the audit are entries, and as what.
 std::optional<store::Kind> kind_of(const audit::Members& record) {
-    const std::string kind = member_text(record, "kind");
+    const std::string kind = web::member_text(record, "kind");
     if (kind == "write") return store::Kind::write;
     if (kind == "refusal") return store::Kind::refused;
     if (kind == "login") return store::Kind::login_failed;
@@ -55,12 +50,12 @@ std::vector<std::uint16_t> items_in(const audit::Members& record, std::string_vi
 /// The point that a write has written as a whole; null if there is none.
 const points::Point* point_of(const Snapshot* snapshot, const audit::Members& record) {
     const Station* const station =
-        snapshot != nullptr ? snapshot->plant.find(member_text(record, "station")) : nullptr;
+        snapshot != nullptr ? snapshot->plant.find(web::member_text(record, "station")) : nullptr;
     const json::value* const address = record.if_contains("address");
     const json::value* const count = record.if_contains("count");
     if (station == nullptr || !station->points || address == nullptr || count == nullptr)
         return nullptr;
-    const std::string table = member_text(record, "table");
+    const std::string table = web::member_text(record, "table");
     for (const points::Point& point : station->points->points())
         if (modbus::label(point.table) == table && *address == point.address &&
             *count == point.count())
@@ -81,19 +76,20 @@ std::string value_text(const points::Point* point, const std::vector<std::uint16
 
 /// "temperature = 21.5, was 20 (confirmed)".
 std::string write_text(const audit::Members& record, const points::Point* point) {
-    std::string text = point != nullptr ? point->name : member_text(record, "at");
+    std::string text = point != nullptr ? point->name : web::member_text(record, "at");
     if (const std::string now = value_text(point, items_in(record, "values")); !now.empty())
         text += " = " + now;
     if (const std::string before = value_text(point, items_in(record, "before")); !before.empty())
         text += ", was " + before;
-    const std::string why = member_text(record, "why");
-    return text + " (" + member_text(record, "outcome") + (why.empty() ? "" : ": " + why) + ')';
+    const std::string why = web::member_text(record, "why");
+    return text + " (" + web::member_text(record, "outcome") + (why.empty() ? "" : ": " + why) +
+           ')';
 }
 
 std::string other_text(const audit::Members& record) {
     std::string text;
     for (const std::string_view key : {"method", "path", "at", "outcome", "cause", "rule", "why"}) {
-        const std::string part = member_text(record, key);
+        const std::string part = web::member_text(record, key);
         if (!part.empty()) text += (text.empty() ? "" : " ") + part;
     }
     return text;
@@ -217,16 +213,16 @@ void Journal::on_station(const std::string& line, const arbiter::StationEvent& e
 void Journal::on_record(const audit::Members& record) {
     const auto kind = kind_of(record);
     // A relay writes all day; its state is a finding's affair.
-    if (!kind || member_text(record, "face") == "gateway") return;
+    if (!kind || web::member_text(record, "face") == "gateway") return;
     const bool is_write = *kind == store::Kind::write;
     const points::Point* const point = is_write ? point_of(snapshot_.get(), record) : nullptr;
     store::Entry entry;
     entry.kind = *kind;
     entry.severity = is_refusal(*kind) ? "warning" : "info";
-    entry.line = member_text(record, "line");
-    entry.station = member_text(record, "station");
+    entry.line = web::member_text(record, "line");
+    entry.station = web::member_text(record, "station");
     if (point != nullptr) entry.point = point->name;
-    entry.who = member_text(record, *kind == store::Kind::reload ? "cause" : "client");
+    entry.who = web::member_text(record, *kind == store::Kind::reload ? "cause" : "client");
     entry.text = is_write ? write_text(record, point) : other_text(record);
     entry.data = json::serialize(record);
     add(std::move(entry));
@@ -239,9 +235,7 @@ void Journal::on_points(const Station& station, const std::vector<std::size_t>& 
     for (const std::size_t want : wants) {
         const points::Point* const point = station.points->point_of(want);
         if (point == nullptr) continue;
-        const points::PointReading reading = station.points->read(*point, clock_.now());
-        if (!reading.value || reading.quality != points::Quality::good) continue;
-        const auto value = points::number_of(*reading.value);
+        const auto value = station.points->read(*point, clock_.now()).good_number();
         if (!value) continue;
         const std::string name = station.name + '/' + point->name;
         Running& running = blocks_[name];

@@ -81,8 +81,7 @@ web::StationEntry entry_of(const Station& station) {
 points::PointSample sample_of(const SeenPoint& seen) {
     const auto& [station, point, reading] = seen;
     points::PointSample sample{station->line, station->name, point->name, point->unit, {}, {}};
-    if (reading.value && reading.quality == points::Quality::good)
-        sample.value = points::number_of(*reading.value);
+    sample.value = reading.good_number();
     if (reading.age) sample.age = to_seconds(*reading.age);
     return sample;
 }

@@ -232,7 +232,8 @@ std::vector<HistorySample> Database::history(const HistoryQuery& query) const {
     const std::int64_t id = is_known ? point.integer(0) : 0;
     point.reset();
     const std::int64_t first = std::max(Block::number_of(query.from), oldest_block());
-    for (std::int64_t number = first; is_known && Block::begin_of(number) < query.to; ++number) {
+    const WallTime end = std::min(query.to, Block::begin_of(newest_block() + 1));
+    for (std::int64_t number = first; is_known && Block::begin_of(number) < end; ++number) {
         const auto block = block_of(id, number);
         for (std::size_t i = 0; block && i < Block::kSlots; ++i) {
             const WallTime time =
@@ -265,6 +266,8 @@ std::vector<std::pair<std::string, std::string>> Database::kept(std::string_view
 std::int64_t Database::page_size() const { return number("PRAGMA page_size"); }
 
 std::int64_t Database::oldest_block() const { return number("SELECT min(block) FROM sample"); }
+
+std::int64_t Database::newest_block() const { return number("SELECT max(block) FROM sample"); }
 
 std::uint64_t Database::bytes() const {
     return static_cast<std::uint64_t>(number("PRAGMA page_count") * page_size());

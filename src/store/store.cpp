@@ -154,6 +154,7 @@ void Store::look_after() {
 /// Counts, and tells when the disk begins to refuse or to take writes.
 void Store::settle(const std::string& why, std::size_t written, std::size_t lost) {
     bool turned = false;
+    const std::uint64_t bytes = written > 0 ? database_->bytes() : 0;  // before others wait
     {
         const std::scoped_lock lock(mutex_);
         turned = counters_.failing != !why.empty();
@@ -161,7 +162,7 @@ void Store::settle(const std::string& why, std::size_t written, std::size_t lost
         counters_.written += written;
         counters_.lost += lost;
         if (turned && !why.empty()) ++counters_.failures;
-        if (written > 0) counters_.bytes = database_->bytes();
+        if (written > 0) counters_.bytes = bytes;
         why_ = why;
     }
     if (turned) tell_(!why.empty(), why);

@@ -64,8 +64,8 @@ class Alarms {
     std::vector<Change> on_time(Time time);
     /// When on_time() should be called; nullopt: no delay runs.
     std::optional<TimePoint> next() const;
-    /// Somebody has seen the alarm. Returns nothing if there is none of this name, or if there is
-    /// nothing to acknowledge.
+    /// An operator has seen the alarm. Returns nothing for an unknown name, and for an alarm that
+    /// is normal or acknowledged.
     std::optional<Change> acknowledge(Time time, std::string_view name, std::string by);
 
     std::size_t size() const { return alarms_.size(); }

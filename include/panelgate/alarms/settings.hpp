@@ -30,6 +30,8 @@ struct Settings {
     std::string severity = "high";
     std::string text{};  ///< for operators; "": the name
 
+    /// What operators read.
+    const std::string& shown() const { return text.empty() ? name : text; }
     friend bool operator==(const Settings&, const Settings&) = default;
 };
 

@@ -5,8 +5,8 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "panelgate/alarms/alarms.hpp"
@@ -41,12 +41,21 @@ class AlarmDesk : public web::AlarmSource {
     std::vector<web::AlarmView> list() const override;
     Acknowledged acknowledge(const std::string& name, const std::string& who) override;
 
+    /// The line of the alarm's station, or its own; "": the alarm has none.
+    std::string line_of(const alarms::Settings& alarm) const;
+
   private:
+    /// What alarms look at besides values.
+    struct Sights {
+        std::set<std::string> down{};      ///< lines
+        std::set<std::string> findings{};  ///< causes
+    };
+
     alarms::Alarms::Time time() const;
     void restore(const std::vector<std::pair<std::string, std::string>>& kept);
     void look();
-    bool is_finding(std::string_view cause) const;
-    std::optional<alarms::Change> look_at(std::size_t alarm);
+    Sights look_around() const;
+    std::optional<alarms::Change> look_at(std::size_t alarm, const Sights& sights);
     void on_change(const std::optional<alarms::Change>& change);
 
     rt::Clock& clock_;

@@ -58,6 +58,12 @@ struct PointReading {
     std::optional<std::string> label;  ///< the label of its raw value
     Quality quality = Quality::bad;
     std::optional<Duration> age;  ///< nullopt if never read
+
+    /// Its value as a number if it is good; nullopt for a text.
+    std::optional<double> good_number() const {
+        if (!value || quality != Quality::good) return std::nullopt;
+        return number_of(*value);
+    }
 };
 
 /// Returns what to poll for a station: its points in order, then its poll blocks.

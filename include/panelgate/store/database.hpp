@@ -26,7 +26,7 @@ class Database {
     Database(const Database&) = delete;
     Database& operator=(const Database&) = delete;
 
-    /// Runs `work` in one transaction; nothing of it stays if it throws.
+    /// Runs `work` in one transaction. If `work` throws, the transaction leaves nothing behind.
     void in_transaction(const std::function<void()>& work);
 
     void add(const Entry& entry);
@@ -59,6 +59,7 @@ class Database {
     std::optional<Block> block_of(std::int64_t point, std::int64_t number) const;
     std::int64_t page_size() const;
     std::int64_t oldest_block() const;
+    std::int64_t newest_block() const;
     bool is_nearly_full() const;
     void drop_before(WallTime time);
 

@@ -1,3 +1,4 @@
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,6 +26,12 @@ std::vector<AlarmView> seen_alarms(const HttpRequest& request, const Api* api) {
     return seen;
 }
 
+std::optional<AlarmView> find_seen(const HttpRequest& request, const Api* api) {
+    for (AlarmView& alarm : seen_alarms(request, api))
+        if (alarm.settings.name == request.arguments[0]) return std::move(alarm);
+    return std::nullopt;
+}
+
 }  // namespace
 
 Handling get_alarms(HttpRequest request, const Api* api) {
@@ -38,18 +45,13 @@ Handling get_alarms(HttpRequest request, const Api* api) {
 
 Handling post_acknowledge(HttpRequest request, const Api* api) {
     const std::string name = request.arguments[0];
-    bool may_see = false;
-    for (const AlarmView& alarm : seen_alarms(request, api))
-        may_see = may_see || alarm.settings.name == name;
-    if (!may_see) refuse(404, "there is no alarm '" + excerpt(name) + '\'');
+    if (!find_seen(request, api)) refuse(404, "there is no alarm '" + excerpt(name) + '\'');
     const auto done = api->providers.alarms->acknowledge(name, request.caller->name());
-    if (done == AlarmSource::Acknowledged::nothing)
+    if (done != AlarmSource::Acknowledged::done)
         refuse(409, "alarm '" + name + "' is normal, or somebody has acknowledged it already");
     log_client(*request.caller, "alarm acknowledged", {{"alarm", name}});
-    for (const AlarmView& alarm : seen_alarms(request, api))
-        if (alarm.settings.name == name)
-            co_return json_response(200, alarms::describe(alarm.settings, alarm.status));
-    refuse(404, "there is no alarm '" + excerpt(name) + '\'');
+    const AlarmView now = find_seen(request, api).value();
+    co_return json_response(200, alarms::describe(now.settings, now.status));
 }
 
 }  // namespace panelgate::web

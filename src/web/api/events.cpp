@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <iterator>
-#include <sstream>
 
 #include "panelgate/web/http/event_hub.hpp"
 #include "routes.hpp"
@@ -30,18 +29,8 @@ std::string known_types() {
     return text;
 }
 
-/// The comma-separated parts of a query; none if it is not given.
-std::vector<std::string> list_of(const HttpRequest& request, const std::string& query) {
-    std::vector<std::string> parts;
-    const auto given = request.query.find(query);
-    if (given == request.query.end()) return parts;
-    std::istringstream in(given->second);
-    for (std::string part; std::getline(in, part, ',');) parts.push_back(part);
-    return parts;
-}
-
 void add_types(EventFilter& filter, const HttpRequest& request) {
-    for (const std::string& type : list_of(request, "types")) {
+    for (const std::string& type : query_list(request, "types")) {
         if (std::ranges::find(kKinds, type, &Kind::type) == std::end(kKinds))
             refuse(400, "there is no event '" + type + "'; types are " + known_types());
         filter.types.insert(type);
@@ -56,13 +45,13 @@ std::string name_in_events(const Directory& directory, const StationEntry& stati
 }
 
 void add_places(EventFilter& filter, const HttpRequest& request, const Directory& directory) {
-    for (const std::string& name : list_of(request, "line"))
+    for (const std::string& name : query_list(request, "line"))
         filter.lines.insert(find_line(directory, name).value()->name);
-    for (const std::string& name : list_of(request, "station")) {
+    for (const std::string& name : query_list(request, "station")) {
         const StationEntry station = find_station(directory, name).value();
         filter.stations.emplace(station.line, name_in_events(directory, station));
     }
-    for (const std::string& name : list_of(request, "point")) {
+    for (const std::string& name : query_list(request, "point")) {
         const Target found = find_point(directory, name).value();
         filter.points.emplace(found.station.name, found.point->name);
     }

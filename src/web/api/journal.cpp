@@ -83,17 +83,12 @@ store::JournalQuery query_of(const HttpRequest& request, const Api* api) {
     query.limit = query_number(request, "limit", 1, kMost, 100).value();
     query.after =
         query_number(request, "after", 0, std::numeric_limits<unsigned>::max(), 0).value();
-    std::string_view kinds = request.query.contains("kind")
-                                 ? std::string_view(request.query.find("kind")->second)
-                                 : std::string_view();
-    while (!kinds.empty()) {
-        const std::size_t end = std::min(kinds.find(','), kinds.size());
-        const auto kind = store::kind_of(kinds.substr(0, end));
+    for (const std::string& name : query_list(request, "kind")) {
+        const auto kind = store::kind_of(name);
         if (!kind)
-            refuse(400, "there is no kind '" + excerpt(std::string(kinds.substr(0, end))) +
-                            "'; kinds are " + store::known_kinds());
+            refuse(400,
+                   "there is no kind '" + excerpt(name) + "'; kinds are " + store::known_kinds());
         query.kinds.push_back(*kind);
-        kinds.remove_prefix(std::min(end + 1, kinds.size()));
     }
     query.may_see = [directory = api->lent,
                      who = request.caller->who()](const store::Entry& entry) {

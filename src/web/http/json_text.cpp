@@ -256,6 +256,11 @@ std::optional<std::string_view> exact_digits(const json::value& value) {
     return std::string_view(*words).substr(1);
 }
 
+std::string member_text(const json::object& object, std::string_view name) {
+    const json::value* const found = object.if_contains(name);
+    return found != nullptr && found->is_string() ? std::string(found->get_string()) : "";
+}
+
 std::string excerpt(std::string text) {
     constexpr std::size_t kMost = 80;
     if (text.size() <= kMost) return text;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <sstream>
 
 #include "panelgate/base/text.hpp"
 #include "panelgate/web/http/json_text.hpp"
@@ -99,6 +100,15 @@ std::optional<Problem> check_queries(const HttpRequest& request,
             return problem(400, "the query '" + name + "' is given twice");
     }
     return std::nullopt;
+}
+
+std::vector<std::string> query_list(const HttpRequest& request, const std::string& name) {
+    std::vector<std::string> parts;
+    const auto given = request.query.find(name);
+    if (given == request.query.end()) return parts;
+    std::istringstream in(given->second);
+    for (std::string part; std::getline(in, part, ',');) parts.push_back(part);
+    return parts;
 }
 
 Parsed<unsigned> query_number(const HttpRequest& request, const std::string& name, unsigned low,

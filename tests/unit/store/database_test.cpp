@@ -9,6 +9,7 @@
 #include <string>
 
 #include "panelgate/store/store.hpp"
+#include "support/temp_dir.hpp"
 
 namespace panelgate::store {
 namespace {
@@ -17,12 +18,7 @@ constexpr WallTime kNoon{std::chrono::seconds(1'795'953'600)};
 
 class StoreTest : public testing::Test {
   protected:
-    StoreTest() {
-        std::string name = testing::TempDir() + "panelgate-store-XXXXXX";
-        folder = ::mkdtemp(name.data());
-        settings.file = folder / "state.db";
-    }
-    ~StoreTest() override { std::filesystem::remove_all(folder); }
+    StoreTest() { settings.file = folder / "state.db"; }
 
     static Entry entry(int minute, Kind kind = Kind::write, std::string station = "press") {
         Entry entry;
@@ -33,7 +29,8 @@ class StoreTest : public testing::Test {
         return entry;
     }
 
-    std::filesystem::path folder;
+    const test::TempDir temporary;
+    const std::filesystem::path folder = temporary.path();
     Settings settings;
 };
 
@@ -93,6 +90,17 @@ TEST_F(StoreTest, AStepOfHistoryJoinsItsSlotsAndBlocksOfTwoRuns) {
     EXPECT_EQ(samples[1].time, kNoon + std::chrono::seconds(60));
     EXPECT_EQ(samples[1].values, (Summary{10, 30, 20, 6}));
     EXPECT_TRUE(database.history({"press/other", kNoon, kNoon + std::chrono::hours(1)}).empty());
+}
+
+TEST_F(StoreTest, HistoryOfAFarFutureEndsWithTheNewestBlock) {
+    Database database(settings);
+    Block block;
+    block.add(kNoon, 10);
+    database.add("press/temperature", Block::number_of(kNoon), block);
+    const auto samples = database.history(
+        {"press/temperature", kNoon, kNoon + std::chrono::days(200'000), std::chrono::days(1)});
+    ASSERT_EQ(samples.size(), 1U);
+    EXPECT_EQ(samples[0].values.mean, 10);
 }
 
 TEST_F(StoreTest, WhatIsOldGoesAndTheFileStaysWithinItsSize) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <boost/json/object.hpp>
 #include <boost/json/value.hpp>
 #include <optional>
 #include <string>
@@ -22,6 +23,8 @@ Parsed<boost::json::value> parse_json(std::string_view text);
 boost::json::value exact_number(std::string_view digits);
 /// Returns the digits of an exact_number(); nullopt for any other value.
 std::optional<std::string_view> exact_digits(const boost::json::value& value);
+/// Returns the text of a member; "" without such a member, or if it is no text.
+std::string member_text(const boost::json::object& object, std::string_view name);
 /// Returns a text (UTF-8) for a message, truncated if long.
 std::string excerpt(std::string text);
 

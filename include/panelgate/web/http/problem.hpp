@@ -61,7 +61,8 @@ HttpResponse to_response(const Problem& problem);
 /// Returns 400 for an unknown or repeated query.
 std::optional<Problem> check_queries(const HttpRequest& request,
                                      std::span<const std::string_view> known);
-
+/// Returns the comma-separated parts of a query; none if absent.
+std::vector<std::string> query_list(const HttpRequest& request, const std::string& name);
 /// Returns a query value as an integer in [low, high]; `fallback` if absent.
 Parsed<unsigned> query_number(const HttpRequest& request, const std::string& name, unsigned low,
                               unsigned high, unsigned fallback);
