@@ -135,6 +135,26 @@ class History(unittest.TestCase):
             self.assertEqual(seen, sorted(seen, reverse=True))
             self.assertEqual(program.get("/api/v1/journal?kind=nothing")[0], 400)
 
+    def test_a_write_to_all_stations_is_told_to_who_may_read_them_all(self):
+        token = self.folder / "admin"
+        token.write_text("token-of-an-admin-0123456789")
+        token.chmod(0o600)
+        text = self.file.read_text().replace("anonymous: admin", "anonymous: viewer, tokens: "
+                                             f"[{{name: boss, role: admin, file: {token}}}]")
+        text = text.replace("http:", "      - {id: 5, name: mixer, profile: autonics-gp-2005}\nhttp:", 1)
+        self.file.write_text(text + "access: {rules: [{name: no-mixer, roles: [viewer], stations: [mixer], "
+                                    "deny: [read]}]}\n")
+        with self.run_gateway() as program:
+            place = {"data": json.dumps({"table": "holding-registers", "address": 120, "values": [1]}).encode(),
+                     "headers": {"Authorization": f"Bearer {token.read_text()}"}}
+            urllib.request.urlopen(urllib.request.Request(
+                program.url("/api/v1/lines/floor1/broadcast"), method="POST", **place), timeout=harness.PATIENCE).close()
+            request = urllib.request.Request(program.url("/api/v1/journal?kind=write"), headers=place["headers"])
+            with urllib.request.urlopen(request, timeout=harness.PATIENCE) as answer:
+                self.assertEqual(len(json.loads(answer.read())["entries"]), 1)
+            self.assertEqual(self.entries(program, "?kind=write"), [])
+            self.assertTrue(self.entries(program, "?kind=line_up"))
+
     def test_a_kill_leaves_a_file_that_opens(self):
         with self.run_gateway() as program:
             self.set_point(program, 1)

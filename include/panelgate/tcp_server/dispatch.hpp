@@ -32,8 +32,9 @@ class Caller {
     const std::string& name() const { return name_; }
     const WhoRef& who() const { return who_; }
     std::uint64_t host() const { return who_->host; }
-    /// What its certificate says. `role` is the one in it, "" none, which is the least; nothing
-    /// where its listener does not go by that. Call it before the first request.
+    /// Takes over the client's certificate, before the first request. `role`: the role that the
+    /// certificate carries, "" without a role; nothing on a listener that takes no roles from
+    /// certificates.
     void certify(std::string subject, std::optional<std::string> role,
                  std::span<const OwnRole> own_roles = {});
     /// By its certificate: only operators and above write, and own roles with that right.

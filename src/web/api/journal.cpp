@@ -68,10 +68,13 @@ asio::awaitable<std::optional<Result>> read_store(
     refuse(503, "the store cannot be read: the log says why", "store");
 }
 
+/// As an event of the same place: what names no station may be about any of the line.
 bool may_see(const Sight& sight, const store::Entry& entry) {
-    if (!entry.line.empty()) return sight.named(entry.line, entry.station, entry.point);
-    const bool is_open = entry.kind == store::Kind::start || entry.kind == store::Kind::stop;
-    return is_open || sight.everything();
+    using store::Kind;
+    if (entry.kind == Kind::start || entry.kind == Kind::stop) return true;
+    const bool is_of_line = entry.kind == Kind::line_up || entry.kind == Kind::line_down ||
+                            entry.kind == Kind::finding || entry.kind == Kind::finding_gone;
+    return sight.event({is_of_line ? "line" : "", entry.line, entry.station, entry.point});
 }
 
 store::JournalQuery query_of(const HttpRequest& request, const Api* api) {

@@ -41,7 +41,7 @@ function theme(chosen) {
     store('theme', chosen);
 }
 
-/** What there is whoever one is: names, and what is chosen, behind who one is. */
+/** The tools of the head, with and without a role: `who` comes first, then language, theme and help. */
 function tools(...who) {
     attribute(document.getElementById('nav'), 'aria-label', t('nav'));
     attribute(document.getElementById('menu'), 'aria-label', t('menu'));
