@@ -37,7 +37,10 @@ mosquitto* new_session(const std::string& client_id, void* owner) {
     return session;
 }
 
-constexpr int kReads = 64;         // per wake-up
+constexpr int kReads = 64;  // per wake-up
+/// A write met the broker's reset before libmosquitto read the alert ahead of the reset.
+constexpr const char* kClosed =
+    "TLS: the broker ends it: the connection was closed (it may not know `tls: certificate`)";
 constexpr int kFirstFault = 0x80;  // of MQTT's reason codes
 constexpr const char* kNothing = "panelgate/barrier";
 
@@ -123,7 +126,9 @@ std::string Connection::reason(int code) const {
     if (code == MOSQ_ERR_SUCCESS || !client_) return why(code);
     if (!client_->refusal().empty())
         return "TLS: " + client_->refusal() + " (`tls: ca` names who may sign it)";
-    return tls_error_.empty() ? why(code) : "TLS: the broker ends it: " + tls_error_;
+    if (!tls_error_.empty()) return "TLS: the broker ends it: " + tls_error_;
+    const bool is_reset = errno == EPROTO || errno == EPIPE || errno == ECONNRESET;
+    return code == MOSQ_ERR_ERRNO && is_reset ? kClosed : why(code);
 }
 
 std::string Connection::set_up(const Message& will) {
