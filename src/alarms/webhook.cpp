@@ -37,9 +37,10 @@ std::string_view word(Change::Kind kind) {
 
 std::optional<Url> parse_url(std::string_view text) {
     Url url;
-    constexpr std::string_view kScheme = "http://";
-    if (!text.starts_with(kScheme)) return std::nullopt;
-    text.remove_prefix(kScheme.size());
+    url.secure = text.starts_with("https://");
+    if (!url.secure && !text.starts_with("http://")) return std::nullopt;
+    if (url.secure) url.port = 443;
+    text.remove_prefix(text.find("//") + 2);
     const std::size_t end = std::min(text.find('/'), text.size());
     std::string_view place = text.substr(0, end);
     url.path = end == text.size() ? "/" : std::string(text.substr(end));

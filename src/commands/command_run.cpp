@@ -235,8 +235,7 @@ ExitCode serve(config::Config config, const Service& service,
     rt::ServiceManager manager(clock);
     SignalLoop loop(io);
     gateway::Reloader reloader(io.get_executor(), clock, service.file);
-    gateway::MemoryKeeper keeper;
-    gateway::ConfigurationText text(io.get_executor(), reloader, keeper, service.text);
+    gateway::ConfigurationText text(io.get_executor(), reloader, service.text);
     const rt::Loop faces(kFacesNice);
     gateway::Gateway gateway({faces.get_executor(), io.get_executor()}, shared, service.simulate,
                              &reloader, &text);
@@ -246,6 +245,7 @@ ExitCode serve(config::Config config, const Service& service,
         rt::log(rt::LogLevel::error, "cannot start", {{"reason", error.what()}});
         return kUnavailable;
     }
+    text.keep_in(gateway.journal());
     reloader.serve(gateway);
     reloader.on_step([&](bool begins) { begins ? manager.reloading() : manager.ready(); });
     started(gateway);

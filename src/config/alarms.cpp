@@ -96,6 +96,20 @@ void check_condition(Reader& in, const Settings& alarm) {
         in.problem("back", "back is where the alarm ends: below `above`, or above `below`");
 }
 
+/// TOPIC/alarm/NAME is the alarm's topic, and that of the point NAME of a station `alarm`.
+void check_topic(Reader& in, const Settings& alarm) {
+    const Config& config = in.loading.config;
+    if (!config.mqtt || config.mqtt->format != mqtt::Format::json) return;
+    for (const Line& line : config.lines)
+        for (const Station& station : line.stations)
+            if (station.name == "alarm" &&
+                std::ranges::find(station.points, alarm.name, &points::Point::name) !=
+                    station.points.end())
+                in.problem("name", "the MQTT topic alarm/" + alarm.name +
+                                       " is already that of the point alarm/" + alarm.name +
+                                       "; name the alarm otherwise");
+}
+
 }  // namespace
 
 std::optional<Settings> load_alarm(Reader& root, const Node& node) {
@@ -105,6 +119,7 @@ std::optional<Settings> load_alarm(Reader& root, const Node& node) {
     check_unique(in, "alarm", alarm.name);
     check_condition(in, alarm);
     check_place(in, alarm);
+    check_topic(in, alarm);
     in.finish();
     return alarm;
 }
@@ -116,22 +131,34 @@ const Keys<alarms::WebhookSettings>& webhook_keys() {
         {{"alertmanager", Format::alertmanager}, {"json", Format::json}}};
     const auto fault = [](std::string_view typed) {
         return alarms::parse_url(typed) ? std::string()
-                                        : "url must be http://HOST:PORT/PATH such as "
+                                        : "url must be http://HOST:PORT/PATH or https://, such as "
                                           "http://alertmanager:9093/api/v2/alerts, not " +
                                               yaml::quote(typed);
     };
     static const auto kKeys =
         Keys<WebhookSettings>()
-            .text("url", &WebhookSettings::url, {"^http://.", false, 0, fault},
-                  "Where changes of alarms are posted to; plain HTTP.")
+            .text("url", &WebhookSettings::url, {"^https?://.", false, 0, fault},
+                  "Where changes of alarms are posted to, by http:// or https://.")
             .required()
             .example("http://127.0.0.1:9093/api/v2/alerts")
+            .path("ca", &WebhookSettings::ca,
+                  "File of the CA that has signed the server's certificate; with https://.")
+            .example("/etc/panelgate/ca.crt")
             .word("format", &WebhookSettings::format, kFormats,
                   "alertmanager: what is active, again and again, and each end. json: each change "
                   "once.")
             .duration("every", &WebhookSettings::every, 1s, 1h,
                       "With alertmanager: how often what is active is told again.");
     return kKeys;
+}
+
+void check_webhook(Reader& in, alarms::WebhookSettings& hook) {
+    const auto url = alarms::parse_url(hook.url);
+    if (!url) return;
+    if (url->secure && hook.ca.empty())
+        in.problem("url", "https needs ca: the file of the CA that has signed the certificate of " +
+                              url->host);
+    if (!url->secure && !hook.ca.empty()) in.problem("ca", "ca is for https://");
 }
 
 const Keys<Settings>& alarm_keys() {

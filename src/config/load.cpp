@@ -161,13 +161,16 @@ const Keys<rt::RealtimeSettings>& realtime_keys() {
 /// A section that a file may leave out: its map is read into the member that then exists.
 template <class T, class U>
 auto optional_section(std::string_view key, std::string_view example,
-                      std::optional<T> Config::* member, const Keys<T, U>& (*table)()) {
+                      std::optional<T> Config::* member, const Keys<T, U>& (*table)(),
+                      void (*check)(Reader&, T&) = nullptr) {
     return [=](Reader& root, Config& config) {
         const Node* node = root.map(key, example);
         if (node == nullptr) return false;
         Reader in(root.loading, *node, std::string(key));
         in.elsewhere(root.loading.top_keys);
-        table().read(in, (config.*member).emplace());
+        T& read = (config.*member).emplace();
+        table().read(in, read);
+        if (check != nullptr) check(in, read);
         in.finish();
         return true;
     };
@@ -273,7 +276,7 @@ const Keys<Config>& root_keys() {
                 shape_of("alarm_webhook", Kind::map, "Where changes of alarms are posted to."),
                 []() -> const Table& { return webhook_keys(); },
                 optional_section("alarm_webhook", "{url: http://127.0.0.1:9093/api/v2/alerts}",
-                                 &Config::webhook, webhook_keys),
+                                 &Config::webhook, webhook_keys, check_webhook),
                 shown_section("alarm_webhook", &Config::webhook, webhook_keys))
             .map("store", &Config::store, store_keys, "{days: 30}",
                  "Events and history of days, in one file.");

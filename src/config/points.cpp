@@ -161,7 +161,14 @@ const Keys<Point>& point_keys() {
                    [](const Point& point) { return as_written(point.no_value); })
             .example("[-32768]")
             .only_with("type", numbers, kNumbers, true)
-            .duration("every", &Point::every, 1ms, points::kSlowest, "Interval between two reads.");
+            .duration("every", &Point::every, 1ms, points::kSlowest, "Interval between two reads.")
+            .map(
+                "report", &Point::report, report_keys, "{deadband: 0.5, at_least: 60s}",
+                "When MQTT, Sparkplug and events tell a value; without it each change, events each "
+                "read.",
+                check_report)
+            .boolean("overview", &Point::overview,
+                     "Its value stands on its station's tile; without one the first point's.");
     return kKeys;
 }
 
@@ -367,6 +374,9 @@ void check_type(Reader& in, Point& point, const Given& given) {
          {"word_order", "scale", "offset", "min", "max", "labels", "no_value"})
         if (!in.has("type") && is_bit && in.has(key))
             in.problem(key, std::string(key) + " is not for a bit, whose type is bool");
+    if (point.report.deadband && !is_number(point.type))
+        in.problem("report", "deadband is for numbers, and " + point.name + " is of type " +
+                                 std::string(label(point.type)));
     if (point.type != Type::string) point.length = 0;
 }
 

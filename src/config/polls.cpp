@@ -77,4 +77,29 @@ void check_read_count(Reader& in, std::string_view key, const profile::PanelProf
                         " in one read, not " + std::to_string(count));
 }
 
+const Keys<points::ReportRule>& report_keys() {
+    using points::ReportRule;
+    static const auto kKeys =
+        Keys<ReportRule>()
+            .number("deadband", &ReportRule::deadband, "Smallest change of a number that is told.")
+            .example("0.5")
+            .duration("at_most", &ReportRule::at_most, 1ms, 24h,
+                      "Shortest time between two changes that are told.")
+            .example("1s")
+            .duration("at_least", &ReportRule::at_least, 100ms, 24h,
+                      "An unchanged value is told again that often.")
+            .example("60s");
+    return kKeys;
+}
+
+void check_report(Reader& in, points::Point& point) {
+    const points::ReportRule& rule = point.report;
+    if (rule.deadband && *rule.deadband <= 0)
+        in.problem("deadband", "deadband must be above 0, in the unit of the value");
+    if (rule.at_most && rule.at_least && *rule.at_least < *rule.at_most)
+        in.problem("at_least", "at_least " + yaml::format_duration(*rule.at_least) +
+                                   " is below at_most, " + yaml::format_duration(*rule.at_most) +
+                                   "; make it longer, or at_most shorter");
+}
+
 }  // namespace panelgate::config

@@ -70,6 +70,9 @@ const Keys<audit::Settings>& audit_keys();
 const Keys<store::Settings>& store_keys();
 const Keys<alarms::Settings>& alarm_keys();
 const Keys<alarms::WebhookSettings>& webhook_keys();
+const Keys<points::ReportRule>& report_keys();
+void check_report(Reader& in, points::Point& point);
+void check_webhook(Reader& in, alarms::WebhookSettings& hook);
 const Keys<access::Settings>& access_keys();
 
 // What reads an entry of a list.

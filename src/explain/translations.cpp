@@ -172,7 +172,22 @@ mqtt::Subjects subjects_of(const config::Config& config) {
         for (const points::Point* point : by_name(station->points))
             if (sight.point(*station, *point)) subjects.add_point(*point);
     }
+    if (config.mqtt->format != mqtt::Format::json) return subjects;
+    for (const alarms::Settings* alarm : by_name(config.alarms))
+        if (sight.alarm(config, *alarm)) subjects.add_alarm(alarm->name);
     return subjects;
+}
+
+bool BrokerSight::alarm(const config::Config& config, const alarms::Settings& one) const {
+    for (const config::Line& on : config.lines) {
+        if (on.name == one.line) return line(on);
+        for (const config::Station& with : on.stations) {
+            if (with.name != one.station) continue;
+            const auto found = std::ranges::find(with.points, one.point, &points::Point::name);
+            return found == with.points.end() ? station(with) : point(with, *found);
+        }
+    }
+    return sees_all(config);
 }
 
 bool is_same_session(const config::Config& before, const config::Config& now) {

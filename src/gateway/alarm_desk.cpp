@@ -57,11 +57,13 @@ std::string point_of(const alarms::Settings& alarm) { return alarm.station + '/'
 
 }  // namespace
 
-AlarmDesk::AlarmDesk(rt::Clock& clock, Journal& journal, Findings findings, Listener tell)
+AlarmDesk::AlarmDesk(rt::Clock& clock, Journal& journal, Findings findings, Listener tell,
+                     Announcement announce)
     : clock_(clock),
       journal_(journal),
       findings_(std::move(findings)),
       tell_(std::move(tell)),
+      announce_(std::move(announce)),
       alarm_(clock.make_alarm()) {}
 
 alarms::Alarms::Time AlarmDesk::time() const { return {clock_.now(), rt::wall_now()}; }
@@ -73,6 +75,7 @@ void AlarmDesk::apply(const std::vector<alarms::Settings>& settings,
     by_point_.clear();
     for (std::size_t i = 0; i < alarms_.size(); ++i)
         if (!alarms_.settings(i).point.empty()) by_point_.emplace(point_of(alarms_.settings(i)), i);
+    if (ready_) announce_all();
     if (asked_) return;
     asked_ = true;
     using Kept = std::vector<std::pair<std::string, std::string>>;
@@ -91,7 +94,13 @@ void AlarmDesk::restore(const std::vector<std::pair<std::string, std::string>>& 
         if (auto status = parse_kept(text))
             alarms_.restore(std::string_view(key).substr(kAlarmKey.size()), std::move(*status));
     ready_ = true;
+    announce_all();
     look();
+}
+
+void AlarmDesk::announce_all() const {
+    for (std::size_t i = 0; i < alarms_.size(); ++i)
+        announce_(alarms_.settings(i), alarms_.status(i));
 }
 
 /// The lines and findings as they are now: asked once for all alarms.
@@ -167,6 +176,7 @@ void AlarmDesk::on_change(const std::optional<alarms::Change>& change) {
     journal_.add(std::move(entry));
     journal_.keep(std::string(kAlarmKey) + alarm.name, kept_text(change->now));
     tell_(*change);
+    announce_(alarm, change->now);
 }
 
 std::string AlarmDesk::line_of(const alarms::Settings& alarm) const {

@@ -1,5 +1,8 @@
 #include "panelgate/gateway/alarm_hook.hpp"
 
+#include <fstream>
+#include <iterator>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -18,14 +21,21 @@ bool has_status(const web::HttpReply& reply) {
     return reply.text.find("\r\n") != std::string::npos;
 }
 
+/// Whom an https server must be known by: the CA's file, read for each post.
+std::optional<tls::Trust> trust_of(const alarms::Url& url, const std::string& ca) {
+    if (!url.secure) return std::nullopt;
+    std::ifstream in(ca);
+    return tls::Trust{{}, {std::istreambuf_iterator<char>(in), {}}};
+}
+
 /// Posts JSON. Returns why the server has not taken the request; "" if it has.
-std::string post(const alarms::Url& url, const std::string& body) {
+std::string post(const alarms::Url& url, const std::string& ca, const std::string& body) {
     const std::string request =
         "POST " + url.path + " HTTP/1.1\r\nHost: " + endpoint_text(url.host, url.port) +
         "\r\nContent-Type: application/json\r\nContent-Length: " + std::to_string(body.size()) +
         "\r\nConnection: close\r\n\r\n" + body;
-    const web::HttpReply reply =
-        web::ask({url.host, url.port, {}}, request, kHookPatience, kHookReply, has_status);
+    const web::HttpReply reply = web::ask({url.host, url.port, trust_of(url, ca)}, request,
+                                          kHookPatience, kHookReply, has_status);
     if (!has_status(reply)) return reply.failure();
     return reply.is_http() && reply.status().starts_with('2') ? "" : reply.status();
 }
@@ -66,7 +76,8 @@ void AlarmHook::send(std::string body) {
     under_way_ = true;
     const auto why = std::make_shared<std::string>();
     const alarms::Url url = alarms::parse_url(hook_->settings().url).value();
-    worker_->run([url, body = std::move(body), why] { *why = post(url, body); },
+    worker_->run([url, ca = hook_->settings().ca, body = std::move(body),
+                  why] { *why = post(url, ca, body); },
                  [this, why, life = std::weak_ptr(alive_)] {
                      if (!life.expired()) settle(*why);
                  });

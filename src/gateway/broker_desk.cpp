@@ -14,7 +14,8 @@ namespace panelgate::gateway {
 
 namespace {
 
-constexpr Duration kRebirth = 1s;       ///< minimum interval: hosts may ask as often as they like
+constexpr Duration kRebirth = 1s;  ///< minimum interval: hosts may ask as often as they like
+constexpr Duration kKeep = 1s;
 constexpr Duration kLook = 5ms;         ///< how often the end of the farewell is looked for
 constexpr std::size_t kRefusals = 256;  ///< on their way to the session, for the audit
 
@@ -32,16 +33,33 @@ BrokerDesk::BrokerDesk(web::Loops loops, const mqtt::Settings& settings, mqtt::S
       settings_(settings),
       publisher_(settings, std::move(subjects)),
       alarm_(clock_.make_alarm()),
+      keeping_(clock_.make_alarm()),
       client_(loops_.faces, clock_, settings, publisher_,
               [this](const mqtt::Command& command) { on_command(command); }) {}
 
 void BrokerDesk::start(std::weak_ptr<BrokerSession> session) {
     session_ = std::move(session);
     client_.start();
+    keep_waiting();
+}
+
+void BrokerDesk::restore(const mqtt::Outbox::Texts& kept) {
+    outbox_.emplace().restore(publisher_, kept);
+}
+
+/// Has the session keep what waits for the broker, once a second.
+void BrokerDesk::keep_waiting() {
+    if (!outbox_) return;
+    mqtt::Outbox::Texts texts = outbox_->next(publisher_);
+    if (!texts.empty())
+        tell([texts = std::move(texts)](BrokerSession& session) { session.keep(texts); });
+    keeping_->arm(clock_.now() + kKeep, [this] { keep_waiting(); });
 }
 
 void BrokerDesk::stop(const std::shared_ptr<std::atomic<bool>>& closed) {
     alarm_->cancel();
+    keep_waiting();
+    keeping_->cancel();
     closing_ = client_.stop();
     wait_for(closed);
 }
@@ -55,14 +73,16 @@ void BrokerDesk::wait_for(const std::shared_ptr<std::atomic<bool>>& closed) {
     alarm_->arm(clock_.now() + kLook, [this, closed] { wait_for(closed); });
 }
 
-void BrokerDesk::take_over(const BrokerDesk& before) {
+void BrokerDesk::take_over(BrokerDesk& before) {
     publisher_.take_over(before.publisher_);
+    outbox_ = std::exchange(before.outbox_, std::nullopt);
+    if (outbox_) outbox_->renumbered();
     counters_ = before.counters();
     if (settings_.broker() == before.settings_.broker()) under_way_ = before.under_way_;
 }
 
-void BrokerDesk::offer(std::size_t subject, mqtt::State state) {
-    if (publisher_.offer(subject, std::move(state))) client_.wake();
+void BrokerDesk::offer(std::size_t subject, mqtt::State state, bool again) {
+    if (publisher_.offer(subject, std::move(state), again)) client_.wake();
 }
 
 void BrokerDesk::repeat(std::size_t subject) { publisher_.repeat(subject); }

@@ -14,6 +14,7 @@
 #include "panelgate/explain/load.hpp"
 #include "panelgate/explain/rights_text.hpp"
 #include "panelgate/explain/schema_json.hpp"
+#include "panelgate/gateway/journal.hpp"
 #include "panelgate/gateway/prepare.hpp"
 #include "panelgate/gateway/reloader.hpp"
 #include "panelgate/gateway/text_file.hpp"
@@ -182,13 +183,26 @@ void ConfigurationText::Job::put_back() {
 }
 
 ConfigurationText::ConfigurationText(boost::asio::any_io_executor executor, Reloader& reloader,
-                                     TextKeeper& keeper, std::string text)
-    : reloader_(reloader), versions_(keeper), executor_(std::move(executor)) {
+                                     std::string text)
+    : reloader_(reloader), executor_(std::move(executor)) {
     versions_.add(text, "start", rt::wall_now());
     if (!reloader_.no_file().empty()) built_in_ = std::move(text);
     reloader_.on_ran([this](const std::string& ran, const std::string& cause) {
         versions_.add(ran, cause, rt::wall_now());
     });
+}
+
+void ConfigurationText::keep_in(Journal& journal) {
+    const auto kept = std::make_shared<TextVersions::Records>();
+    journal.ask(
+        [kept](const store::Database* from) {
+            if (from != nullptr) *kept = from->kept(TextVersions::kPrefix);
+        },
+        [this, kept, &journal] {
+            versions_.restore(*kept, [&journal](const std::string& key, const std::string& record) {
+                journal.keep(key, record);
+            });
+        });
 }
 
 std::string ConfigurationText::read_only() const { return reloader_.read_only(); }

@@ -89,7 +89,7 @@ Gateway::Gateway(web::Loops loops, std::shared_ptr<const config::Config> config,
       text_(text),
       events_(std::make_shared<web::EventHub>(new_epoch()), loops_.faces),
       servers_(loops_, clock_, audit_.stray_writes()),
-      northbound_(loops_, clock_, audit_.topic_refusals()) {
+      northbound_(loops_, clock_, journal_, audit_.topic_refusals()) {
     Lines lines = lines_of(*config);
     for (std::size_t i = 0; i < lines.size(); ++i)
         known_.lines.emplace(std::pair(config->lines[i].name, lines[i]->listens()), lines[i]);

@@ -6,9 +6,11 @@
 #include <utility>
 #include <variant>
 
+#include "panelgate/alarms/webhook.hpp"
 #include "panelgate/base/words.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/tls/judge.hpp"
+#include "panelgate/web/http/json_text.hpp"
 #include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::gateway {
@@ -41,11 +43,12 @@ struct BrokerSession::Order {
     web::PointOrder order;
 };
 
-BrokerSession::BrokerSession(web::Loops loops, rt::Clock& clock,
+BrokerSession::BrokerSession(web::Loops loops, rt::Clock& clock, Journal& journal,
                              const std::shared_ptr<const Snapshot>& snapshot, TopicRefusals refused,
                              std::shared_ptr<std::weak_ptr<BrokerDesk>> serving)
     : loops_(std::move(loops)),
       clock_(clock),
+      journal_(journal),
       settings_(completed(*snapshot->config->mqtt)),
       subjects_(explain::subjects_of(*snapshot->config)),
       alarm_(clock.make_alarm()),
@@ -117,6 +120,14 @@ void BrokerSession::take_over(BrokerSession& before) {
     writes_->session = this;
 }
 
+void BrokerSession::restore(const mqtt::Outbox::Texts& kept) {
+    at_desk([kept](BrokerDesk& desk) { desk.restore(kept); });
+}
+
+void BrokerSession::keep(const mqtt::Outbox::Texts& texts) {
+    for (const auto& [key, text] : texts) journal_.keep(key, text);
+}
+
 void BrokerSession::start() {
     for (std::size_t i = 0; i < places_.size(); ++i)
         if (auto state = seen(i))
@@ -145,16 +156,16 @@ void BrokerSession::stop() {
     snapshot_.reset();  // the lines of an earlier configuration end
 }
 
-mqtt::State BrokerSession::state_of(const Station& station, const points::Point& point) const {
-    const TimePoint now = clock_.now();
-    const points::PointReading reading = station.points->read(point, now);
+mqtt::State BrokerSession::state_of(const points::PointReading& reading) const {
     mqtt::State state;
     state.value = reading.value;
     state.text = reading.label.value_or("");
     state.quality = reading.quality;
     state.time = rt::wall_now();
-    if (reading.value && reading.age)
+    if (reading.value && reading.age) {
+        const TimePoint now = clock_.now();
         state.time = wall_time_of(now - *reading.age, now, state.time);
+    }
     return state;
 }
 
@@ -162,7 +173,8 @@ mqtt::State BrokerSession::state_of(const Station& station, const points::Point&
 std::optional<mqtt::State> BrokerSession::seen(std::size_t subject) const {
     const Place& place = places_[subject];
     if (place.station == nullptr) return std::nullopt;
-    if (place.point != nullptr) return state_of(*place.station, *place.point);
+    if (place.point != nullptr)
+        return state_of(place.station->points->read(*place.point, clock_.now()));
     const Health health = place.station->bus->station_status(place.station->id).state;
     mqtt::State state;
     state.value = health != Health::offline && health != Health::unknown;
@@ -172,9 +184,22 @@ std::optional<mqtt::State> BrokerSession::seen(std::size_t subject) const {
 }
 
 void BrokerSession::look(std::size_t subject) {
-    auto state = desk_->has_room() ? seen(subject) : std::nullopt;
+    if (!desk_->has_room()) return;
+    Place& place = places_[subject];
+    if (place.point != nullptr && !place.point->report.empty()) return look_by_rule(subject, place);
+    auto state = seen(subject);
     if (!state) return;
     at_desk([subject, state = std::move(*state)](BrokerDesk& desk) { desk.offer(subject, state); });
+}
+
+void BrokerSession::look_by_rule(std::size_t subject, Place& place) {
+    const TimePoint now = clock_.now();
+    const points::PointReading reading = place.station->points->read(*place.point, now);
+    const points::Report report = place.told.take(place.point->report, reading, now);
+    if (report == points::Report::none) return;
+    at_desk([subject, state = state_of(reading), report](BrokerDesk& desk) {
+        desk.offer(subject, state, report == points::Report::again);
+    });
 }
 
 /// The stations of a line, or one of them.
@@ -201,6 +226,14 @@ void BrokerSession::sweep() {
 void BrokerSession::keep(mqtt::Counters counters) {
     counters.certificate_expiry = counters_.certificate_expiry;
     counters_ = std::move(counters);
+}
+
+void BrokerSession::on_alarm(const std::string& name, mqtt::State state) {
+    const auto subject = subjects_.find_alarm(name);
+    if (!subject || !desk_->has_room()) return;
+    at_desk([subject = *subject, state = std::move(state)](BrokerDesk& desk) {
+        desk.offer(subject, state);
+    });
 }
 
 void BrokerSession::on_bus_event(const std::string& line, const bus::BusEvent& event) {
@@ -272,15 +305,17 @@ void BrokerSession::finish(const Order& order, const bus::Answer& answer) {
                 BrokerDesk& desk) { desk.answer(topic, id, text, ok); });
 }
 
-Northbound::Northbound(web::Loops loops, rt::Clock& clock, TopicRefusals refused)
-    : loops_(std::move(loops)), clock_(clock), refused_(std::move(refused)) {}
+Northbound::Northbound(web::Loops loops, rt::Clock& clock, Journal& journal, TopicRefusals refused)
+    : loops_(std::move(loops)), clock_(clock), journal_(journal), refused_(std::move(refused)) {}
 
 void Northbound::show(const std::shared_ptr<const Snapshot>& snapshot) {
     if (session_ && session_->fits(*snapshot)) return session_->show(snapshot);
     std::shared_ptr<BrokerSession> next;
     if (snapshot->config->mqtt)
-        next = std::make_shared<BrokerSession>(loops_, clock_, snapshot, refused_, serving_);
+        next =
+            std::make_shared<BrokerSession>(loops_, clock_, journal_, snapshot, refused_, serving_);
     if (session_ && next) next->take_over(*session_);
+    if (!session_ && next && running_ && !journal_.file().empty()) next->restore({});
     leave();
     session_ = std::move(next);
     if (session_ && running_) session_->start();
@@ -301,12 +336,23 @@ void Northbound::renew(const tls::Material& files) {
 }
 
 void Northbound::start() {
-    running_ = true;
-    if (session_) session_->start();
+    const auto kept = std::make_shared<mqtt::Outbox::Texts>();
+    journal_.ask(
+        [kept](const store::Database* from) {
+            if (from != nullptr) *kept = from->kept(mqtt::Outbox::kPrefix);
+        },
+        [this, kept, life = std::weak_ptr(alive_)] {
+            if (life.expired() || stopped_) return;
+            running_ = true;
+            if (!session_) return;
+            if (!journal_.file().empty()) session_->restore(*kept);
+            session_->start();
+        });
 }
 
 void Northbound::stop() {
     running_ = false;
+    stopped_ = true;
     leave();
 }
 
@@ -314,6 +360,15 @@ void Northbound::leave() {
     if (!session_) return;
     session_->stop();
     leaving_ = session_;
+}
+
+void Northbound::on_alarm(const alarms::Settings& alarm, const alarms::Status& status) {
+    if (!session_) return;
+    mqtt::State state;
+    state.text = alarms::label(status.state);
+    state.time = status.since;
+    state.body = web::json_text(alarms::describe(alarm, status));
+    session_->on_alarm(alarm.name, std::move(state));
 }
 
 void Northbound::on_bus_event(const std::string& line, const bus::BusEvent& event) {

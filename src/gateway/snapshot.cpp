@@ -168,14 +168,19 @@ void remember(Station& station, const std::vector<std::size_t>& wants, TimePoint
     }
 }
 
-void publish_points(web::EventOutlet& events, const Station& station,
+void publish_points(web::EventOutlet& events, Station& station,
                     const std::vector<std::size_t>& wants, TimePoint now) {
     if (!station.points) return;
+    station.told.resize(station.points->points().size());
     for (const std::size_t want : wants) {
         const points::Point* point = station.points->point_of(want);
         if (point == nullptr || !events.is_wanted()) continue;  // a poll block
+        const points::PointReading reading = station.points->read(*point, now);
+        if (!point->report.empty() &&
+            station.told[want].take(point->report, reading, now) == points::Report::none)
+            continue;
         events.publish({"point", station.line, station.name, point->name},
-                       web::point_event(station, *point, station.points->read(*point, now)));
+                       web::point_event(station, *point, reading));
     }
 }
 

@@ -13,6 +13,7 @@ namespace {
 constexpr std::string_view kSet = "/set";
 
 std::string payload_of(const Subject& subject, const State& state) {
+    if (subject.kind == Subject::Kind::alarm) return state.body;
     json::object object;
     if (subject.kind == Subject::Kind::point) {
         object["value"] = nullptr;
@@ -95,6 +96,8 @@ std::string JsonTopics::name_of(std::size_t subject) const {
             return top + "line/" + one.name + "/state";
         case Subject::Kind::station:
             return top + "station/" + one.name + "/state";
+        case Subject::Kind::alarm:
+            return top + "alarm/" + one.name;
         case Subject::Kind::point:
             break;
     }

@@ -64,9 +64,9 @@ void Publisher::know(std::size_t subject, State state) {
     if (!states_[subject]) states_[subject] = std::move(state);
 }
 
-bool Publisher::offer(std::size_t subject, State state) {
+bool Publisher::offer(std::size_t subject, State state, bool again) {
     std::optional<State>& known = states_[subject];
-    if (known && known->same_as(state)) return false;
+    if (!again && known && known->same_as(state)) return false;
     known = state;
     change(subject, std::move(state));
     return true;

@@ -30,6 +30,13 @@ void Subjects::add_point(const points::Point& point) {
     all_.push_back(std::move(made));
 }
 
+void Subjects::add_alarm(std::string name) {
+    Subject made;
+    made.kind = Subject::Kind::alarm;
+    made.name = std::move(name);
+    all_.push_back(std::move(made));
+}
+
 std::size_t Subjects::end_of(std::size_t station) const {
     std::size_t end = station + 1;
     while (end < all_.size() && all_[end].kind == Subject::Kind::point) ++end;
@@ -55,6 +62,10 @@ std::optional<std::size_t> Subjects::find_line(std::string_view name) const {
 
 std::optional<std::size_t> Subjects::find_station(std::string_view name) const {
     return find(Subject::Kind::station, name);
+}
+
+std::optional<std::size_t> Subjects::find_alarm(std::string_view name) const {
+    return find(Subject::Kind::alarm, name);
 }
 
 std::optional<std::size_t> Subjects::find_point(std::size_t station, std::string_view name) const {

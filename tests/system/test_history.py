@@ -7,14 +7,17 @@ import json
 import pathlib
 import queue
 import sqlite3
+import ssl
 import tempfile
 import threading
 import unittest
 import urllib.request
 
 import harness
+from test_points import until
 
 PRESS = "/api/v1/stations/press/"
+VERSIONS = "/api/v1/configuration/versions"
 ALARM = "/api/v1/alarms/press-hot/acknowledge"
 
 CONFIG = """lines:
@@ -195,11 +198,45 @@ class History(unittest.TestCase):
                 self.assertEqual(hook.wait_for(lambda one: "endsAt" in one)["annotations"]["summary"],
                                  "The press is too hot")
 
+    def test_a_webhook_by_https_knows_the_server_by_the_ca(self):
+        for names, well in ((("localhost", "127.0.0.1"), True), (("other.plant",), False)):
+            with self.subTest(names=names), tempfile.TemporaryDirectory() as folder:
+                for words in (["new-ca"], ["new-server", *names]):
+                    self.assertEqual(harness.run("cert", *words, "--dir", folder).returncode, 0)
+                secure = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+                secure.load_cert_chain(f"{folder}/{names[0]}.crt", f"{folder}/{names[0]}.key")
+                with Alertmanager([], secure) as hook:
+                    self.file.write_text(CONFIG.format(folder=folder) +
+                                         f"alarm_webhook: {{url: {hook.url}, ca: {folder}/ca.crt, every: 1s}}\n")
+                    with self.run_gateway() as program:
+                        self.set_point(program, 20)
+                        self.set_point(program, 50)
+                        if well:
+                            hook.wait_for(lambda one: one["labels"]["alertname"] == "press-hot")
+                        else:
+                            program.log.wait_for("warn webhook fails .*127.0.0.1")
+
+    def test_texts_of_the_configuration_that_ran_outlive_a_restart(self):
+        with self.run_gateway() as program:
+            until(lambda: len(program.get(VERSIONS)[1]["versions"]) == 1)
+            self.set_point(program, 1)
+            until(lambda: self.entries(program, "?kind=write"))  # the store has answered
+            self.file.write_text(self.file.read_text().replace("too hot", "much too hot"))
+            self.assertEqual(program.rest("POST", "/api/v1/reload")[0], 200)
+            until(lambda: len(program.get(VERSIONS)[1]["versions"]) == 2)
+        with self.run_gateway() as program:
+            until(lambda: len(program.get(VERSIONS)[1]["versions"]) == 2)
+            newest = program.get(VERSIONS)[1]["versions"][0]
+            self.assertEqual(newest["version"], 2)
+            self.assertNotEqual(newest["who"], "start")
+            self.assertEqual(program.rest("POST", "/api/v1/configuration/rollback", {"version": 1})[0], 200)
+            self.assertNotIn("much", self.file.read_text())
+
 
 class Alertmanager:
-    """Takes alerts as Alertmanager does; `answers`: the first statuses, then 200."""
+    """Takes alerts as Alertmanager does; `answers`: the first statuses, then 200. `secure`: TLS."""
 
-    def __init__(self, answers):
+    def __init__(self, answers, secure=None):
         self.alerts = queue.Queue()
         alerts = self.alerts
 
@@ -217,7 +254,9 @@ class Alertmanager:
                 pass
 
         self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        self.url = f"http://127.0.0.1:{self.server.server_address[1]}/api/v2/alerts"
+        if secure:
+            self.server.socket = secure.wrap_socket(self.server.socket, server_side=True)
+        self.url = f"http{'s' if secure else ''}://127.0.0.1:{self.server.server_address[1]}/api/v2/alerts"
         threading.Thread(target=self.server.serve_forever, daemon=True).start()
 
     def __enter__(self):

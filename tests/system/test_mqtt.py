@@ -1,9 +1,11 @@
 """Values at a real broker, and writes by way of it: mosquitto, listened to by paho."""
+import contextlib
 import json
 import pathlib
 import re
 import shutil
 import signal
+import sqlite3
 import subprocess
 import tempfile
 import unittest
@@ -13,6 +15,15 @@ import harness
 from mqtt_side import (BROKER, Broker, Chatty, COUNTER, Listener, LOCKED, PRESS, Rude, TOPIC, Truth, changes,
                        first_told, flood, metric, paho, plant, Strict)
 from test_points import until
+
+
+def kept(folder):
+    """How many changes the store keeps for the broker."""
+    try:
+        with contextlib.closing(sqlite3.connect(f"file:{folder}/state.db?mode=ro", uri=True)) as store:
+            return store.execute("SELECT count(*) FROM kept WHERE key LIKE 'mqtt/%'").fetchone()[0]
+    except sqlite3.OperationalError:  # the file is being made
+        return 0
 
 
 def refused_writes(program):
@@ -242,6 +253,41 @@ class Mqtt(unittest.TestCase):
 @unittest.skipUnless(BROKER and paho, "needs Debian's mosquitto and python3-paho-mqtt "
                                       "(deploy/install_packages.sh test)")
 class Configuration(unittest.TestCase):
+    def test_an_alarm_is_a_retained_message_and_outlives_a_restart(self):
+        with Broker() as broker, tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            file.write_text(plant(broker, PRESS) + f"store: {{file: {folder}/state.db}}\n"
+                            "alarms: [{name: gone, station: press, offline: true, severity: low}]\n")
+            topic = f"{TOPIC}/alarm/gone"
+            with harness.Program("run", "-c", str(file)) as program, Listener(broker) as listener:
+                self.assertIsNone(listener.wait_for(topic, lambda body: body["state"] == "normal")["since"])
+                program.rest("PUT", "/api/v1/simulator/press", {"dead": 1})
+                told = listener.wait_for(topic, lambda body: body["state"] == "active")
+                self.assertEqual((told["severity"], told["text"], told["acknowledged_by"]), ("low", "gone", None))
+                self.assertEqual(program.rest("POST", "/api/v1/alarms/gone/acknowledge")[0], 200)
+                listener.wait_for(topic, lambda body: body["state"] == "acknowledged")
+            with Listener(broker) as late:
+                self.assertEqual(late.wait_for(topic)["state"], "acknowledged")
+                with harness.Program("run", "-c", str(file)):
+                    late.wait_for(topic, lambda body: body["state"] == "normal")
+                    self.assertEqual({body["state"] for body in late.of(topic)}, {"acknowledged", "normal"})
+
+    def test_what_waits_for_the_broker_outlives_the_program_and_is_sent_once(self):
+        with Broker() as broker, tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            file.write_text(plant(broker, COUNTER) + f"store: {{file: {folder}/state.db}}\n")
+            broker.stop()
+            with harness.Program("run", "-c", str(file)) as program:
+                until(lambda: kept(folder) > 30)
+                waited = kept(folder)
+                program.ends_with = -signal.SIGKILL
+                program.stop(signal.SIGKILL)
+            broker.start()
+            with Listener(broker) as listener, harness.Program("run", "-c", str(file)) as program:
+                listener.wait_for(f"{TOPIC}/press/ramp", after=waited)
+                until(lambda: kept(folder) == 0)
+                self.assertEqual(metric(program, "dropped_total"), 0)
+
     def test_a_reload_keeps_the_connection_or_what_waits(self):
         with Broker() as broker, Listener(broker) as listener, tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "panelgate.yaml"

@@ -68,6 +68,7 @@ class Editing(Browser):
         self.assertEqual(marked, row)
         self.assertIn("did you mean 'profile'", self.text("#problems"))
         self.assertRegex(self.text("#counted"), "Faults: [1-9]")
+        self.assertFalse(self.find("#save").is_enabled())
         self.assertEqual(self.file.read_text(), self.content)
 
     def test_keys_are_offered_by_the_schema(self):
@@ -131,6 +132,9 @@ class Editing(Browser):
         self.wait(lambda: self.all("dialog .difference"))
         self.assertIn("hall 1", self.text("dialog .come"))
         self.find("#roll-back").click()
+        self.wait(lambda: self.all("dialog #confirm"))
+        self.assertIn("The file becomes Version", self.text("dialog"))
+        self.find("#confirm").click()
         self.wait(lambda: self.file.read_text() == self.content and self.value() == self.content)
 
     def test_what_will_be_interrupted_is_asked_for(self):

@@ -4,7 +4,8 @@ import harness
 from browser import NARROW, WIDE, Browser
 
 PRESS = """{id: 31, name: press, profile: autonics-gplp-s,
-      points: [{name: setpoint, at: UW120, unit: celsius, writable: true, every: 100ms}]}"""
+      points: [{name: setpoint, at: UW120, unit: celsius, writable: true, every: 100ms, overview: true},
+               {name: speed, at: UW130, unit: rpm, every: 100ms}, {name: mode, at: UW131, every: 100ms, overview: true}]}"""
 ALARMS = """[{name: press-hot, point: press/setpoint, above: 40, back: 30, severity: urgent, text: The press is too hot},
   {name: press-lost, station: press, offline: true}]"""
 SETPOINT = "/api/v1/stations/press/points/setpoint"
@@ -57,13 +58,43 @@ class Day(Browser):
         self.wait(lambda: "setpoint = 21" in self.text("tbody"))
         self.assertNotIn("panelgate ", self.text("tbody"))
 
+    def test_history_opens_with_the_span_that_has_values(self):
+        self.wait(lambda: len(self.program.get(SETPOINT + "/history?step=10s")[1]["samples"]) > 1)
+        self.open("history/press/setpoint")
+        self.wait(lambda: self.script("return document.querySelector('.bar select').value") == "1")
+
+    def test_a_tile_has_the_values_that_were_chosen_and_trouble_comes_first(self):
+        self.set_point(20)
+        self.program.rest("POST", "/api/v1/alarms/press-hot/acknowledge", {})
+        self.open("")
+        self.wait(lambda: "setpoint 20" in self.text(".tile-values"))
+        self.assertIn("mode", self.text(".tile-values"))
+        self.assertNotIn("speed", self.text(".tile-values"))
+        self.wait(lambda: "all is well" in self.text(".counts"))
+        self.program.rest("PUT", "/api/v1/simulator/press", {"dead": 1})
+        self.wait(lambda: "(stale)" in self.text(".tile-values") or "(bad)" in self.text(".tile-values"))
+        self.assertNotIn("all is well", self.text(".counts"))
+        self.program.rest("PUT", "/api/v1/simulator/press", {})
+        self.wait(lambda: "all is well" in self.text(".counts"))
+
+    def test_a_view_that_is_not_there_is_told(self):
+        self.open("hystory")
+        self.wait(lambda: "There is no such view" in self.text("#no-view"))
+        self.open("history")
+        self.wait(lambda: not self.all("#no-view"))
+
     def test_history_has_a_plot_of_the_points_that_are_chosen(self):
         self.set_point(22)
         self.wait(lambda: len(self.program.get(SETPOINT + "/history?step=10s")[1]["samples"]) > 1)
         self.open("history/press/setpoint")
         self.script("const s = document.querySelector('.bar select'); s.value = '1'; s.dispatchEvent(new Event('change'))")
         self.wait(lambda: self.script("return Number(document.querySelector('.plot.tall').dataset.rows ?? 0)") >= 2)
-        self.assertIn("press/setpoint", self.text(".plot-values"))
+        self.assertRegex(self.text(".plot-values"), "press/setpoint 22 °C")
+        self.assertEqual(self.text(".dygraph-ylabel"), "°C")
+        self.assertFalse(self.all(".dygraph-y2label"))
+        self.find('.picks label:nth-of-type(2) input').click()
+        self.wait(lambda: self.all(".dygraph-y2label"))
+        self.assertIn("rpm", self.text(".dygraph-y2label"))
         self.looks("history")
 
 

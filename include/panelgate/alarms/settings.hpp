@@ -42,6 +42,7 @@ struct WebhookSettings {
         json           ///< each change once
     };
     std::string url{};  ///< parse_url() takes it
+    std::string ca{};   ///< file of the CA that has signed the server's certificate, for https
     Format format = Format::alertmanager;
     Duration every = 60s;  ///< between two reports of what stays active
 
@@ -50,11 +51,12 @@ struct WebhookSettings {
 
 /// The parts of "http://alerts.plant:9093/api/v2/alerts".
 struct Url {
-    std::string host{};  ///< without brackets
-    std::uint16_t port = 80;
-    std::string path{};  ///< with its query; begins with '/'
+    bool secure = false;      ///< https
+    std::string host{};       ///< without brackets
+    std::uint16_t port = 80;  ///< 443 of https, where the text names none
+    std::string path{};       ///< with its query; begins with '/'
 };
-/// Nothing if the text is no URL of plain HTTP, or names a user.
+/// Nothing if the text is no URL of HTTP, or names a user.
 std::optional<Url> parse_url(std::string_view text);
 
 }  // namespace panelgate::alarms

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "panelgate/access/line_rules.hpp"
+#include "panelgate/alarms/settings.hpp"
 #include "panelgate/base/who.hpp"
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/config/config.hpp"
@@ -62,8 +63,15 @@ class BrokerSight {
             ->judge(who_, one.id, access::Act::read, modbus::read_function(point.table), items)
             .allowed;
     }
+    /// `one`: of this configuration. An alarm of no place is seen by who sees every line.
+    bool alarm(const config::Config& config, const alarms::Settings& one) const;
 
   private:
+    bool sees_all(const config::Config& config) const {
+        return std::ranges::all_of(config.lines,
+                                   [this](const config::Line& one) { return line(one); });
+    }
+
     WhoRef who_;
     std::map<const config::Station*, const access::LineRules*> rules_;
 };

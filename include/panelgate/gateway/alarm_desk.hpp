@@ -23,11 +23,15 @@ namespace panelgate::gateway {
 class AlarmDesk : public web::AlarmSource {
   public:
     using Listener = std::function<void(const alarms::Change&)>;
+    /// An alarm as it is now, for whoever keeps a copy.
+    using Announcement = std::function<void(const alarms::Settings&, const alarms::Status&)>;
     /// The findings of the gateway itself, as they are now.
     using Findings = std::function<const std::vector<web::Finding>&()>;
 
-    /// Clock and journal outlive the desk. `tell` gets each change.
-    AlarmDesk(rt::Clock& clock, Journal& journal, Findings findings, Listener tell);
+    /// Clock and journal outlive the desk. `tell` gets each change; `announce` each change, too,
+    /// and all alarms once their states are known, and after each apply().
+    AlarmDesk(rt::Clock& clock, Journal& journal, Findings findings, Listener tell,
+              Announcement announce);
     AlarmDesk(const AlarmDesk&) = delete;
     AlarmDesk& operator=(const AlarmDesk&) = delete;
 
@@ -53,6 +57,7 @@ class AlarmDesk : public web::AlarmSource {
 
     alarms::Alarms::Time time() const;
     void restore(const std::vector<std::pair<std::string, std::string>>& kept);
+    void announce_all() const;
     void look();
     Sights look_around() const;
     std::optional<alarms::Change> look_at(std::size_t alarm, const Sights& sights);
@@ -62,6 +67,7 @@ class AlarmDesk : public web::AlarmSource {
     Journal& journal_;
     Findings findings_;
     Listener tell_;
+    Announcement announce_;
     std::unique_ptr<rt::Alarm> alarm_;
     std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
     alarms::Alarms alarms_;

@@ -10,6 +10,7 @@
 #include "panelgate/base/time.hpp"
 #include "panelgate/mqtt/client.hpp"
 #include "panelgate/mqtt/counters.hpp"
+#include "panelgate/mqtt/outbox.hpp"
 #include "panelgate/mqtt/publisher.hpp"
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/rt/asio_clock.hpp"
@@ -45,12 +46,16 @@ class BrokerDesk {
     void stop(const std::shared_ptr<std::atomic<bool>>& closed);
     void renew(const tls::Material& files) { client_.renew(files); }
     /// As BrokerSession::take_over().
-    void take_over(const BrokerDesk& before);
+    void take_over(BrokerDesk& before);
+    /// Before start(): changes that waited when the program ended; from now on those that wait are
+    /// kept by the session.
+    void restore(const mqtt::Outbox::Texts& kept);
 
     void know(std::size_t subject, mqtt::State state) {
         publisher_.know(subject, std::move(state));
     }
-    void offer(std::size_t subject, mqtt::State state);
+    /// `again`: also an unchanged state is published.
+    void offer(std::size_t subject, mqtt::State state, bool again = false);
     /// Publishes the current state again, for clients that ignore answers.
     void repeat(std::size_t subject);
     /// Answers a write that a panel has got, or may have got. `body`: of answer_text().
@@ -69,6 +74,7 @@ class BrokerDesk {
     void refuse_here(const std::string& topic, const std::string& id, const web::Problem& why,
                      std::optional<std::size_t> point);
     void tell(std::function<void(BrokerSession&)> work);
+    void keep_waiting();
     void wait_for(const std::shared_ptr<std::atomic<bool>>& closed);
 
     web::Loops loops_;
@@ -77,6 +83,8 @@ class BrokerDesk {
     mqtt::Publisher publisher_;
     std::weak_ptr<BrokerSession> session_;  ///< locked by the plant's loop alone
     std::unique_ptr<rt::Alarm> alarm_;      ///< of a pending rebirth, then of the farewell
+    std::unique_ptr<rt::Alarm> keeping_;    ///< of the outbox
+    std::optional<mqtt::Outbox> outbox_;    ///< none: nothing is kept over a restart
     TimePoint next_rebirth_{};              ///< earliest time of the next rebirth
     bool rebirth_waits_ = false;
     std::size_t under_way_ = 0;  ///< writes at the session

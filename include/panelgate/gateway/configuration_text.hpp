@@ -14,17 +14,20 @@
 
 namespace panelgate::gateway {
 
+class Journal;
 class Reloader;
 
 /// The text of the file that a reloader reads. One thread.
 class ConfigurationText final : public web::TextSource {
   public:
-    /// `text`: what runs at the start, read from the reloader's file. The reloader and the keeper
-    /// outlive it.
-    ConfigurationText(boost::asio::any_io_executor executor, Reloader& reloader, TextKeeper& keeper,
-                      std::string text);
+    /// `text`: what runs at the start, read from the reloader's file. The reloader outlives it.
+    ConfigurationText(boost::asio::any_io_executor executor, Reloader& reloader, std::string text);
     ConfigurationText(const ConfigurationText&) = delete;
     ConfigurationText& operator=(const ConfigurationText&) = delete;
+
+    /// Keeps versions in the journal's store from now on, behind those of a former program. No text
+    /// runs after the journal's end.
+    void keep_in(Journal& journal);
 
     std::string read_only() const override;
     std::function<File()> reader() const override;

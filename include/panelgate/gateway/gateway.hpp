@@ -70,6 +70,7 @@ class Gateway {
     Duration longest_answer() const;
     /// The status text for the service manager.
     std::string status() const;
+    Journal& journal() { return journal_; }
     /// Closes everything.
     void stop();
 
@@ -110,7 +111,10 @@ class Gateway {
     AlarmHook hook_{loops_.plant, clock_};
     AlarmDesk alarms_{clock_, journal_,
                       [this]() -> const std::vector<web::Finding>& { return findings(); },
-                      [this](const alarms::Change& change) { on_alarm(change); }};
+                      [this](const alarms::Change& change) { on_alarm(change); },
+                      [this](const alarms::Settings& alarm, const alarms::Status& status) {
+                          northbound_.on_alarm(alarm, status);
+                      }};
     explain::Doors doors_;  ///< lines ask it until they are destroyed
     bool simulate_;
     Reloader* reloads_;

@@ -10,12 +10,15 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/alarms/alarms.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/gateway/broker_desk.hpp"
+#include "panelgate/gateway/journal.hpp"
 #include "panelgate/gateway/snapshot.hpp"
 #include "panelgate/mqtt/counters.hpp"
 #include "panelgate/mqtt/settings.hpp"
+#include "panelgate/points/report.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/web/api/render.hpp"
 #include "panelgate/web/http/crossing.hpp"
@@ -37,7 +40,8 @@ using TopicRefusals = std::function<void(const TopicRefusal&)>;
 class BrokerSession : public std::enable_shared_from_this<BrokerSession> {
   public:
     /// `snapshot` must have `mqtt:`. `serving`: of the faces' loop, gets the desk at its start.
-    BrokerSession(web::Loops loops, rt::Clock& clock,
+    /// The journal outlives it.
+    BrokerSession(web::Loops loops, rt::Clock& clock, Journal& journal,
                   const std::shared_ptr<const Snapshot>& snapshot, TopicRefusals refused,
                   std::shared_ptr<std::weak_ptr<BrokerDesk>> serving);
     ~BrokerSession();
@@ -52,12 +56,16 @@ class BrokerSession : public std::enable_shared_from_this<BrokerSession> {
     /// same broker the new session answers outstanding writes of the former session, too.
     void take_over(BrokerSession& before);
 
+    /// Before start(): what a former program has kept of changes for the broker.
+    void restore(const mqtt::Outbox::Texts& kept);
     void start();
     /// Ends the session. No effect if it has ended.
     void stop();
     /// True once the broker has got the last message, or is not waited for any more.
     bool has_left() const { return closed_ && *closed_; }
 
+    /// Publishes the state of an alarm of this name, if the broker may see the alarm.
+    void on_alarm(const std::string& name, mqtt::State state);
     /// Publishes what has happened on a line.
     void on_bus_event(const std::string& line, const bus::BusEvent& event);
     /// Publishes the points among these wants of a station's polls.
@@ -69,6 +77,8 @@ class BrokerSession : public std::enable_shared_from_this<BrokerSession> {
     /// The desk has refused a write; `point`: a subject's number, if it named one.
     void refused(const std::string& topic, const web::Problem& why,
                  std::optional<std::size_t> point);
+    /// Keeps and forgets these texts in the store.
+    void keep(const mqtt::Outbox::Texts& texts);
     /// The desk's counters.
     void keep(mqtt::Counters counters);
 
@@ -78,8 +88,9 @@ class BrokerSession : public std::enable_shared_from_this<BrokerSession> {
   private:
     /// The source of a subject's state.
     struct Place {
-        const Station* station = nullptr;  ///< null: a line
+        const Station* station = nullptr;  ///< null: a line or an alarm
         const points::Point* point = nullptr;
+        points::Told told{};  ///< of a point with a report rule
     };
     struct Order;
     /// The running writes. Passed from session to session, for answers that come later.
@@ -97,15 +108,17 @@ class BrokerSession : public std::enable_shared_from_this<BrokerSession> {
     void at_desk(std::function<void(BrokerDesk&)> work) const;
     std::optional<mqtt::State> seen(std::size_t subject) const;
     void look(std::size_t subject);
+    void look_by_rule(std::size_t subject, Place& place);
     void look_at_stations(const std::string& line, std::optional<std::uint8_t> id);
     void sweep();
-    mqtt::State state_of(const Station& station, const points::Point& point) const;
+    mqtt::State state_of(const points::PointReading& reading) const;
     void answer_refused(const std::string& topic, const std::string& id,
                         const web::Problem& why) const;
     void finish(const Order& order, const bus::Answer& answer);
 
     web::Loops loops_;
     rt::Clock& clock_;
+    Journal& journal_;
     std::shared_ptr<const Snapshot> snapshot_;  ///< what the places refer to
     mqtt::Settings settings_;
     mqtt::Subjects subjects_;
@@ -125,12 +138,14 @@ class BrokerSession : public std::enable_shared_from_this<BrokerSession> {
 /// The plant's MQTT service, across all reloads. The clock outlives it. Of the plant's loop.
 class Northbound {
   public:
-    /// `refused` is told of writes that are refused before they come to a line.
-    Northbound(web::Loops loops, rt::Clock& clock, TopicRefusals refused = {});
+    /// `refused` is told of writes that are refused before they come to a line. The journal
+    /// outlives it, and keeps changes that wait for the broker when the program ends.
+    Northbound(web::Loops loops, rt::Clock& clock, Journal& journal, TopicRefusals refused = {});
 
     /// Serves this snapshot from now on; without `mqtt:` nothing. If broker, points and stations
     /// are the same, the connection stays; else it is made anew, and queued messages are kept.
     void show(const std::shared_ptr<const Snapshot>& snapshot);
+    /// Connects to the broker as soon as the journal has told what waits from before.
     void start();
     /// Sends the last message. No effect if it was sent already.
     void stop();
@@ -140,6 +155,8 @@ class Northbound {
     /// Files for the next connection to the broker; none is closed.
     void renew(const tls::Material& files);
 
+    /// Reports an alarm, as web::AlarmSource knows it.
+    void on_alarm(const alarms::Settings& alarm, const alarms::Status& status);
     /// Reports an event of a line of the snapshot.
     void on_bus_event(const std::string& line, const bus::BusEvent& event);
     void on_points(const Station& station, const std::vector<std::size_t>& wants);
@@ -155,12 +172,15 @@ class Northbound {
 
     web::Loops loops_;
     rt::Clock& clock_;
+    Journal& journal_;
     TopicRefusals refused_;
     std::shared_ptr<BrokerSession> session_;  ///< null without a broker
     std::shared_ptr<std::weak_ptr<BrokerDesk>> serving_ =
         std::make_shared<std::weak_ptr<BrokerDesk>>();  ///< of the faces' loop
     std::shared_ptr<BrokerSession> leaving_;  ///< the previous or the last session, as it ends
-    bool running_ = false;
+    bool running_ = false;                    ///< the journal has answered
+    bool stopped_ = false;
+    std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
 };
 
 }  // namespace panelgate::gateway

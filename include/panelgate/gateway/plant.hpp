@@ -11,6 +11,7 @@
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/explain/unit_map.hpp"
+#include "panelgate/points/report.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
 #include "panelgate/tcp_server/unit_map.hpp"
@@ -38,6 +39,7 @@ struct Station : bus::StationRef {
     std::shared_ptr<sim::SimulatedBus> simulated;
     std::optional<points::StationPoints> points;    ///< the values of its polls, if it has points
     std::optional<points::StationHistory> history;  ///< their history, if REST is served
+    std::vector<points::Told> told;                 ///< by point: what events have told
     /// The unit id of the station at the first listener that serves the station.
     std::optional<int> unit;
 };

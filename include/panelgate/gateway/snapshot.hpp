@@ -73,7 +73,7 @@ std::vector<points::RelaySample> relay_samples(const std::vector<points::RelaySt
 void publish(web::EventOutlet& events, const Plant& plant, const std::string& line,
              const bus::BusEvent& event);
 /// The same for the points among these wants of the station's polls.
-void publish_points(web::EventOutlet& events, const Station& station,
+void publish_points(web::EventOutlet& events, Station& station,
                     const std::vector<std::size_t>& wants, TimePoint now);
 
 /// Records the points among these wants in the station's history, if it has one.

@@ -2,9 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
+#include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -13,34 +14,21 @@
 
 namespace panelgate::gateway {
 
-/// Keeps texts by their keys. One thread.
-class TextKeeper {
-  public:
-    virtual ~TextKeeper() = default;
-    /// Replaces the text of the same key.
-    virtual void keep(const std::string& key, std::string text) = 0;
-    virtual std::map<std::string, std::string> kept(const std::string& prefix) const = 0;
-};
-
-/// Until the program ends.
-class MemoryKeeper final : public TextKeeper {
-  public:
-    void keep(const std::string& key, std::string text) override { kept_[key] = std::move(text); }
-    std::map<std::string, std::string> kept(const std::string& prefix) const override;
-
-  private:
-    std::map<std::string, std::string> kept_;
-};
-
-/// The last texts of the configuration that ran. One thread.
+/// The last texts of the configuration that ran, in memory, and as records for a store. One thread.
 class TextVersions {
   public:
     static constexpr std::size_t kMost = 10;
+    static constexpr std::string_view kPrefix = "configuration/";  ///< of the records' keys
 
-    /// Goes on where the keeper's end; the keeper outlives it.
-    explicit TextVersions(TextKeeper& keeper);
+    using Records = std::vector<std::pair<std::string, std::string>>;  ///< key, record
+    /// Keeps a record under its key, in place of the record that was there.
+    using Keep = std::function<void(const std::string& key, const std::string& record)>;
+
     /// No effect for the text that ran before.
     void add(const std::string& text, const std::string& who, WallTime now);
+    /// The records of a former program come before the texts added so far; from now on `keep` gets
+    /// each new one. Records that cannot be read are left out.
+    void restore(const Records& kept, Keep keep);
     /// The newest first.
     std::vector<web::TextVersion> list() const;
     std::optional<std::string> text(std::uint64_t version) const;
@@ -50,10 +38,10 @@ class TextVersions {
         web::TextVersion version;
         std::string text;
     };
-    std::vector<Kept> kept() const;
+    static std::optional<Kept> parse(const std::string& record);
 
-    TextKeeper& keeper_;
-    web::TextVersion last_;
+    std::vector<Kept> kept_;  ///< the newest last
+    Keep keep_;               ///< null until restore()
 };
 
 }  // namespace panelgate::gateway

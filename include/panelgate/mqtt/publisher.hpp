@@ -83,8 +83,10 @@ class Publisher {
     /// Sets a subject's state before there is a connection, if it has none: births publish it, and
     /// it takes no room in the store.
     void know(std::size_t subject, State state);
-    /// Updates a subject's state. True if it changed and will be published.
-    bool offer(std::size_t subject, State state);
+    /// Puts a change from before a restart behind those in the store.
+    void restore(std::size_t subject, State state) { change(subject, std::move(state)); }
+    /// Updates a subject's state. True if the state will be published: if it changed, or `again`.
+    bool offer(std::size_t subject, State state, bool again = false);
     /// Publishes its current state again.
     void repeat(std::size_t subject);
     /// Queues a write result after pending changes until the broker has it; beyond
@@ -125,6 +127,7 @@ class Publisher {
     std::string topic_of(std::size_t point) const { return format_->topic_of(point); }
 
     const Kept<Change>& store() const { return store_; }
+    bool is_connected() const { return connected_; }
 
   private:
     std::optional<Message> next_before(WallTime now);

@@ -26,7 +26,7 @@ struct Message {
 
 /// Something whose state is published.
 struct Subject {
-    enum class Kind : std::uint8_t { line, station, point };
+    enum class Kind : std::uint8_t { line, station, point, alarm };
     Kind kind = Kind::point;
     std::string name;
     std::size_t station = 0;  ///< of a point: its station's subject number
@@ -37,14 +37,15 @@ struct Subject {
     friend bool operator==(const Subject&, const Subject&) = default;
 };
 
-/// The published subjects in a fixed order: lines; then each station followed by its points. A
-/// subject's number is its index, and never changes.
+/// The published subjects in a fixed order: lines; then each station followed by its points; then
+/// alarms, of JsonTopics alone. A subject's number is its index, and never changes.
 class Subjects {
   public:
     void add_line(std::string name);
     /// Adds a station; the points added next belong to it.
     void add_station(std::string name);
     void add_point(const points::Point& point);
+    void add_alarm(std::string name);
 
     std::size_t size() const { return all_.size(); }
     const Subject& operator[](std::size_t subject) const { return all_[subject]; }
@@ -58,6 +59,7 @@ class Subjects {
     friend bool operator==(const Subjects&, const Subjects&) = default;
     std::optional<std::size_t> find_line(std::string_view name) const;
     std::optional<std::size_t> find_station(std::string_view name) const;
+    std::optional<std::size_t> find_alarm(std::string_view name) const;
     std::optional<std::size_t> find_point(std::size_t station, std::string_view name) const;
     std::optional<std::size_t> find_point(std::string_view station, std::string_view name) const;
 
@@ -73,9 +75,10 @@ struct State {
     std::optional<points::Value> value;
     std::string text;  ///< of a point: its label; otherwise the name of its state
     points::Quality quality = points::Quality::good;
-    WallTime time;  ///< since when; of a point's value: when it was read
+    WallTime time;       ///< since when; of a point's value: when it was read
+    std::string body{};  ///< of an alarm: its payload, as of the moment of the state
 
-    /// Compares all but the times.
+    /// Compares value, text and quality.
     bool same_as(const State& other) const {
         return value == other.value && text == other.text && quality == other.quality;
     }

@@ -72,6 +72,16 @@ inline constexpr WordOrder kOrders[] = {WordOrder::abcd, WordOrder::badc, WordOr
 std::string_view label(WordOrder order);
 
 /// A named value of a panel, as configured.
+/// When a reading of a point is told to subscribers (MQTT, Sparkplug, server-sent events).
+struct ReportRule {
+    std::optional<double> deadband{};    ///< smallest change of a number that is told
+    std::optional<Duration> at_most{};   ///< shortest time between two changes that are told
+    std::optional<Duration> at_least{};  ///< an unchanged value is told again that often
+
+    bool empty() const { return !deadband && !at_most && !at_least; }
+    friend bool operator==(const ReportRule&, const ReportRule&) = default;
+};
+
 struct Point {
     std::string name;
     std::string at;  ///< the configured notation
@@ -90,6 +100,8 @@ struct Point {
     std::map<std::int64_t, std::string> labels;  ///< names of raw values
     std::vector<std::int64_t> no_value;          ///< raw values that mean "no value"
     Duration every = 1s;
+    ReportRule report{};
+    bool overview = false;  ///< shown on its station's tile
 
     /// Returns the number of items in the table: bits or registers.
     unsigned count() const;

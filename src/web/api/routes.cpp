@@ -93,7 +93,7 @@ constexpr Row kRows[] = {
     {"DELETE", "/api/v1/lines/{}/discover", delete_discovery, kEngineer, kShowsAll, kOnce},
     {"POST", "/api/v1/read", post_read, kSee, kShowsNone, kAsks},
     {"POST", "/api/v1/write", post_write, kChange, kShowsNone, kWrites},
-    {"GET", "/api/v1/stations", get_stations, kSee, kShowsNone, kTagged},
+    {"GET", "/api/v1/stations", get_stations, kSee, kShowsNone, kTagged, "overview"},
     {"GET", "/api/v1/stations/{}", get_station, kSee, kShowsStation, kTagged},
     {"GET", "/api/v1/simulator/{}", get_simulated, kSee, kShowsStation},
     {"PUT", "/api/v1/simulator/{}", put_simulated, kEngineer, kShowsStation},

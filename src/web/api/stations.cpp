@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "answer.hpp"
@@ -75,16 +76,45 @@ json::array describe_polls(const points::StationPoints* points, TimePoint now) {
     return polls;
 }
 
+constexpr std::size_t kShown = 3;  // points of a tile
+
+/// The points that the station's tile shows: those with `overview`, else the first.
+json::array overview_of(const StationEntry& station, const Sight& sight, TimePoint now) {
+    json::array shown;
+    if (station.points == nullptr) return shown;
+    const std::vector<points::Point>& all = station.points->points();
+    const bool chosen = std::ranges::any_of(all, &points::Point::overview);
+    for (const points::Point& point : all) {
+        if (shown.size() == (chosen ? kShown : 1)) break;
+        if ((chosen && !point.overview) || !sight.point(station, point)) continue;
+        shown.push_back(point_json(point, station.points->read(point, now)));
+    }
+    return shown;
+}
+
+/// A station with a copy of what is known of the station.
+struct SeenStation {
+    const StationEntry* station;
+    bus::StationStatus status;
+    std::optional<json::array> overview{};
+};
+
 }  // namespace
 
 Handling get_stations(HttpRequest request, const Api* api) {
     const Sight sight(*api->directory, request.caller->who());
-    std::vector<std::pair<const StationEntry*, bus::StationStatus>> seen;
-    for (const StationEntry& station : api->directory->stations)
-        if (sight.station(station)) seen.emplace_back(&station, status_of(station));
+    const bool with_points = query_flag(request, "overview").value();
+    std::vector<SeenStation> seen;
+    for (const StationEntry& station : api->directory->stations) {
+        if (!sight.station(station)) continue;
+        seen.push_back({&station, status_of(station)});
+        if (with_points) seen.back().overview = overview_of(station, sight, api->providers.now());
+    }
     Table table{.directory = api->lent, .name = "stations", .count = seen.size()};
     table.entry = [seen = std::move(seen)](std::size_t i) {
-        return describe(*seen[i].first, seen[i].second);
+        json::object object = describe(*seen[i].station, seen[i].status);
+        if (seen[i].overview) object["overview"] = *seen[i].overview;
+        return object;
     };
     co_return table_answer(request, std::move(table));
 }

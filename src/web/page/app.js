@@ -97,7 +97,7 @@ function show() {
     shown?.stop?.();
     shown = VIEWS[view]({argument, detail});
     for (const open of document.querySelectorAll('dialog')) open.close();
-    replace(main, shown.node);
+    replace(main, name === view ? null : h('p', {class: 'finding', id: 'no-view'}, t('view.unknown')), shown.node);
     shown.update?.();
     for (const link of document.querySelectorAll('#nav a')) attribute(link, 'aria-current', link.dataset.view === view ? 'page' : null);
     entitle();

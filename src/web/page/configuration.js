@@ -30,9 +30,13 @@ function changeRow({path: where, kind, before, after, needs}) {
     return h('li', null, h('code', null, where), `: ${said}`, needs ? h('small', {class: 'muted', lang: 'en'}, ` (${needs})`) : null);
 }
 
+/** What applying a text would interrupt. */
+const cutsView = (cuts) => cuts.length === 0 ? null : [h('p', null, t('text.interrupts')), h('ul', {class: 'plain'}, cuts.map((cut) => h('li', null, h('code', null, cut.path), ': ', h('span', {lang: 'en'}, cut.what))))];
+
 class View {
     constructor() {
         this.turn = 0;
+        this.faults = 0;
         this.said = h('div', {role: 'status'});
         this.save = h('button', {type: 'button', class: 'primary', id: 'save', disabled: true, onclick: () => this.#save()}, t('text.save'));
         this.drop = h('button', {type: 'button', id: 'drop', disabled: true, onclick: () => this.#drop()}, t('text.drop'));
@@ -69,7 +73,8 @@ class View {
 
     #typed(now) {
         draft.text = now;
-        for (const button of [this.save, this.drop]) button.disabled = !isChanged();
+        this.drop.disabled = !isChanged();
+        this.save.disabled = !isChanged() || this.faults > 0;
     }
 
     /** Asks what is wrong with a text, shows that beside it, and returns it for the marks. */
@@ -78,8 +83,9 @@ class View {
         const found = await check(now);
         if (turn !== this.turn) return [];
         this.found = found;
-        const faults = found.problems.filter((one) => one.severity === 'error').length;
-        text(this.counted, faults ? t('text.faults', {count: faults}) : t('text.valid'));
+        this.faults = found.problems.filter((one) => one.severity === 'error').length;
+        text(this.counted, this.faults ? t('text.faults', {count: this.faults}) : t('text.valid'));
+        this.#typed(now);
         replace(this.problems, found.problems.map((one) => problemRow(one, ({line, column}) => this.editor.goTo(line, column))));
         replace(this.changes, found.valid && found.changes.length === 0 ? h('li', {class: 'muted'}, t('text.same')) : found.changes.map(changeRow),
             found.interruptions.map((cut) => h('li', {class: 'warning'}, h('code', null, cut.path), ': ', h('span', {lang: 'en'}, cut.what))));
@@ -90,8 +96,7 @@ class View {
 
     async #save() {
         const cuts = this.found?.interruptions ?? [];
-        const said = [h('p', null, t('text.interrupts')), h('ul', {class: 'plain'}, cuts.map((cut) => h('li', null, h('code', null, cut.path), ': ', h('span', {lang: 'en'}, cut.what))))];
-        if (cuts.length > 0 && !await confirm(t('text.save'), said, t('text.save'))) return;
+        if (cuts.length > 0 && !await confirm(t('text.save'), cutsView(cuts), t('text.save'))) return;
         await this.#done(save);
     }
 
@@ -147,6 +152,9 @@ class View {
         const before = await getText(path('configuration', 'versions', version));
         const back = async () => {
             node.close();
+            const {interruptions} = await check(before.text);
+            const name = `${t('text.version')} ${version}`;
+            if (!await confirm(t('text.back'), [h('p', null, t('text.back.ask', {name})), cutsView(interruptions)], t('text.back'))) return;
             await this.#done(async () => {
                 const answer = await post(path('configuration', 'rollback'), {version});
                 await load(true);

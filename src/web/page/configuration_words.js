@@ -25,6 +25,7 @@ export const words = {
 "text.who": ["By", "Durch", "변경자", "変更者"],
 "text.compare": ["Compare", "Vergleichen", "비교", "比較"],
 "text.back": ["Go back to this", "Dorthin zurück", "이 버전으로 되돌리기", "この版に戻す"],
+"text.back.ask": ["The file becomes {name}, and the gateway runs it.", "Die Datei wird {name}, und das Gateway läuft damit.", "파일이 {name}(으)로 바뀌고 게이트웨이가 이를 실행합니다.", "ファイルは{name}になり、ゲートウェイがそれを実行します。"],
 "text.add.station": ["Add this station", "Diese Station aufnehmen", "이 국 추가", "この局を追加"],
 "text.add.point": ["Make this a point", "Daraus einen Messwert machen", "포인트로 만들기", "ポイントにする"],
 "change.added": ["added", "neu", "추가됨", "追加"],

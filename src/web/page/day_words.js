@@ -3,6 +3,8 @@ export const words = {
 "nav.alarms": ["Alarms", "Alarme", "알람", "アラーム"],
 "nav.journal": ["Events", "Ereignisse", "이벤트", "イベント"],
 "nav.history": ["History", "Verlauf", "이력", "履歴"],
+"counts.well": ["all is well", "alles in Ordnung", "모두 정상", "すべて正常"],
+"view.unknown": ["There is no such view, or you may not see it: this is the overview.", "Diese Ansicht gibt es nicht, oder Sie dürfen sie nicht sehen: Dies ist die Übersicht.", "해당 보기가 없거나 볼 권한이 없습니다. 개요를 표시합니다.", "その表示がないか、閲覧できません。概要を表示しています。"],
 "what": ["What", "Was", "내용", "内容"],
 "who": ["Who", "Wer", "누가", "誰が"],
 "since": ["Since", "Seit", "부터", "開始"],

@@ -2,7 +2,7 @@
 import {get, path} from './api.js';
 import {choice, h, text} from './dom.js';
 import {download} from './download.js';
-import {clockTime, number, t} from './language.js';
+import {clockTime, number, t, word} from './language.js';
 import {live} from './live.js';
 import {colour, library} from './plot.js';
 
@@ -45,10 +45,12 @@ function marks(canvas, area, graph, entries) {
 
 export function historyView({argument, detail}) {
     let span = 24 * HOUR;
+    let isChosen = false;  // the span, by whoever looks
     let graph = null;
     let ended = false;
     let entries = [];
     const names = [];
+    const units = new Map();  // of each name
     const chosen = new Set(argument && detail ? [`${argument}/${detail}`] : []);
     const box = h('div', {class: 'plot tall', role: 'img', 'aria-label': t('nav.history')});
     const said = h('p', {class: 'muted plot-values'});
@@ -58,7 +60,28 @@ export function historyView({argument, detail}) {
     const files = h('span');
 
     const say = (at, values) => said.replaceChildren(at === null ? '' : `${clockTime(at)} `, ...[...chosen].map((name, i) => h('span', {class: `tone ${COLOURS[i]}`},
-        `${name} ${values[i] === null || values[i] === undefined ? '–' : number(values[i], 3)}`)));
+        `${name} ${values[i] === null || values[i] === undefined ? '–' : `${number(values[i], 3)} ${units.get(name) ?? ''}`}`)));
+    /** The points of the first point's unit have the left axis, all others the right one. */
+    const axes = () => {
+        const [first] = chosen;
+        const others = [...chosen].filter((name) => units.get(name) !== units.get(first));
+        const unitsOf = (all) => [...new Set(all.map((name) => units.get(name)).filter(Boolean))].join(', ');
+        const axis = {axisLabelFormatter: (v) => number(v, 2), axisLabelWidth: 46};
+        return {axes: {y: axis, y2: axis}, series: Object.fromEntries(others.map((name) => [name, {axis: 'y2'}])),
+            ylabel: unitsOf([...chosen].filter((name) => !others.includes(name))), y2label: others.length > 0 ? unitsOf(others) : ''};
+    };
+    /** True once the first look has shown that less time than a day is kept, and a shorter span is read. */
+    const narrow = (all) => {
+        if (isChosen) return false;
+        isChosen = true;
+        const kept = Date.now() - Math.min(...all.flatMap(({samples}) => samples.slice(0, 1).map((one) => Date.parse(one.time))));
+        const [fit] = SPANS.filter(([hours]) => Number(hours) * HOUR >= kept);
+        if (!fit || Number(fit[0]) * HOUR >= span) return false;
+        spans.value = fit[0];
+        span = Number(fit[0]) * HOUR;
+        read();
+        return true;
+    };
     const draw = async (all, step) => {
         const Dygraph = await library();
         const rows = rowsOf(all, step);
@@ -70,7 +93,7 @@ export function historyView({argument, detail}) {
         if (rows.length < 2) return;
         graph = new Dygraph(box, rows, {labels: ['t', ...chosen], colors: COLOURS.map(colour), customBars: true, strokeWidth: 1.5, fillAlpha: 0.25,
             axisLineColor: colour('border'), gridLineColor: colour('border'), animatedZooms: false, showRangeSelector: true, rangeSelectorHeight: 30,
-            axes: {y: {axisLabelFormatter: (v) => number(v, 2), axisLabelWidth: 46}},
+            ...axes(),
             underlayCallback: (canvas, area, drawn) => marks(canvas, area, drawn, entries),
             highlightCallback: (event, x, points) => say(x, points.map((point) => point.yval))});
         for (const handle of box.querySelectorAll('img')) handle.alt = '';
@@ -87,6 +110,7 @@ export function historyView({argument, detail}) {
             const [journal, ...all] = await Promise.all([get(path('journal') + kinds), ...[...chosen].map((name) => get(target(name)))]);
             entries = journal.entries.filter((entry) => [...chosen].some((name) => name === `${entry.station}/${entry.point}`));
             failed.hidden = true;
+            if (narrow(all)) return;
             await draw(all, step);
         } catch (error) {
             failed.hidden = error.status === 0;
@@ -99,11 +123,15 @@ export function historyView({argument, detail}) {
         for (const other of picks.querySelectorAll('input')) other.disabled = chosen.size >= MOST && !other.checked;
         read();
     };
-    const spans = choice(t('history.span'), SPANS, '24', (hours) => { span = Number(hours) * HOUR; read(); });
+    const spans = choice(t('history.span'), SPANS, '24', (hours) => { isChosen = true; span = Number(hours) * HOUR; read(); });
     const learn = async () => {
         for (const station of live.stations) {
             const {points} = await get(path('stations', station.name, 'points'));
-            for (const point of points) if (point.type !== 'string') names.push(`${station.name}/${point.name}`);
+            for (const point of points) {
+                if (point.type === 'string') continue;
+                names.push(`${station.name}/${point.name}`);
+                units.set(names.at(-1), word('unit', point.unit));
+            }
         }
         if (chosen.size === 0 && names.length > 0) chosen.add(names[0]);
         picks.append(...names.map((name) => {

@@ -88,7 +88,7 @@ class Live extends EventTarget {
         this.#asking = true;
         this.#due = false;
         try {
-            const [lines, stations] = await Promise.all([get(path('lines')), get(path('stations')), this.#look()]);
+            const [lines, stations] = await Promise.all([get(path('lines')), get(path('stations') + (document.hidden ? '' : '?overview=true')), this.#look()]);
             this.#hear(lines.lines, stations.stations);
         } catch (error) {
             if (error.status === 401) return this.#refuse();

@@ -1,10 +1,12 @@
 // Lines with their load, and their stations as tiles.
+import {alarms} from './alarms.js';
 import {get, offers, path, seesWhole} from './api.js';
 import {attribute, h, list, replace, text} from './dom.js';
 import {findingNote, findingText} from './finding.js';
 import {clockTime, duration, number, t, word} from './language.js';
 import {live} from './live.js';
 import {sparkline} from './plot.js';
+import {shownValue} from './point_values.js';
 import {latency} from './timeline.js';
 import {traceOf} from './trace.js';
 
@@ -38,6 +40,17 @@ function lastAnswer({state, last_success_ms: ms}) {
     return tone(state) === 'good' && !live.old ? t('last.answer', {ago}) : t('last.answer.at', {ago, time: clockTime(live.heard - ms)});
 }
 
+/** A point of a tile: {node, update}. What is not good now is grey, with its quality. */
+function tileValue(first) {
+    const value = h('strong');
+    const node = h('span', {class: 'tile-value'}, h('span', {class: 'muted'}, first.name), ' ', value);
+    return {node, update: (point) => {
+        const quality = live.old && point.quality === 'good' ? 'stale' : point.quality;
+        attribute(value, 'class', quality === 'good' ? '' : 'muted');
+        text(value, quality === 'good' ? shownValue(point) : `${shownValue(point)} (${word('quality', quality)})`);
+    }};
+}
+
 /** A station's tile: {node, update}. */
 function tile(first) {
     const name = h('span', {class: 'name'}, first.name);
@@ -46,9 +59,10 @@ function tile(first) {
     const figure = h('span', {class: 'figure'});
     const facts = h('span', {class: 'muted'});
     const finding = h('span', {class: 'tile-finding'});
+    const values = h('span', {class: 'tile-values'});
     const node = h('a', {class: 'tile', href: `#/station/${encodeURIComponent(first.name)}`, 'data-station': first.name},
         h('span', {class: 'head'}, name, state.node), h('span', {class: 'muted'}, `${first.line}:${first.id} · ${first.profile ?? t('no.profile')}`),
-        h('span', {class: 'head'}, spark.node, figure), facts, finding);
+        values, h('span', {class: 'head'}, spark.node, figure), facts, finding);
     return {node, update: (station) => {
         attribute(node, 'class', `tile ${tone(station.state)} ${station.state}`);
         state.update(station.state);
@@ -58,6 +72,7 @@ function tile(first) {
         spark.update(over.map((one) => one.total), {ticked: true});
         const mean = tone(station.state) === 'bad' || live.old ? null : latency(timeline.of(station.id)).think.mean;
         text(figure, mean === null ? '–' : `${t('think')} ${duration(mean)}`);
+        list(values, station.overview ?? [], (point) => point.name, tileValue);
         text(facts, lastAnswer(station));
         const told = line?.told?.find((one) => one.station === station.id);
         text(finding, told ? findingText(told).text : '');
@@ -74,6 +89,9 @@ async function recall(line, history) {
 }
 
 const showFindings = (place, told) => list(place, told, (one) => `${one.cause} ${one.station} ${one.text}`, (one) => ({node: findingNote(one)}));
+
+/** Those in trouble before the others, each in the order of the file. */
+const troubleFirst = (all, isBad) => [...all.filter(isBad), ...all.filter((one) => !isBad(one))];
 
 /** A line's card with its tiles: {node, update}. */
 function card(first) {
@@ -105,7 +123,7 @@ function card(first) {
         spark.update(history, {most: LOADED});
         text(facts, [line.device, line.mode === 'listen' ? t('listens') : null, t('waiting', {count: line.queue_depth})].filter(Boolean).join(' · '));
         showFindings(findings, found);
-        list(tiles, live.stations.filter((station) => station.line === line.name), (station) => station.name, tile);
+        list(tiles, troubleFirst(live.stations.filter((station) => station.line === line.name), (station) => tone(station.state) === 'bad'), (station) => station.name, tile);
     }};
 }
 
@@ -134,6 +152,9 @@ export function troubles() {
     return {down: live.lines.filter((line) => !line.up).length, bad: live.stations.filter((station) => tone(station.state) === 'bad').length};
 }
 
+/** Is there nothing that anybody should look at, besides states? */
+const isWell = () => !live.old && live.lines.length > 0 && live.findings.length + alarms.waiting.length === 0 && live.lines.every((line) => line.findings.length === 0);
+
 export function overviewView() {
     const lines = h('div');
     const counts = h('p', {class: 'counts', role: 'status'});
@@ -144,12 +165,13 @@ export function overviewView() {
         const {down, bad} = troubles();
         const said = [t('counts', {lines: live.lines.length, stations: live.stations.length, bad: live.old ? '?' : bad})];
         if (down > 0) said.push(t('counts.down', {down}));
+        if (bad + down === 0 && isWell()) said.push(t('counts.well'));
         text(counts, said.join(' · '));
         attribute(counts, 'class', bad + down > 0 ? 'counts bad' : 'counts');
         const found = live.findings.filter((one) => !one.line);
         showFindings(findings, found);
         own.hidden = found.length === 0;
-        list(lines, linesWithFindings(update), (line) => line.name, card);
+        list(lines, troubleFirst(linesWithFindings(update), (line) => !line.up), (line) => line.name, card);
         if (live.lines.length === 0) replace(lines, h('p', {class: 'empty'}, t('no.lines')));
     };
     const ends = live.lines.slice(0, TRACED).map((line) => {

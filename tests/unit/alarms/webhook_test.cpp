@@ -99,7 +99,9 @@ TEST(Url, IsTakenApart) {
     EXPECT_EQ(url->path, "/api/v2/alerts?x=1");
     EXPECT_EQ(parse_url("http://[::1]")->host, "::1");
     EXPECT_EQ(parse_url("http://[::1]")->port, 80);
-    for (const char* wrong : {"", "alerts:9093", "https://a", "http://", "http://a:0", "http://a:x",
+    EXPECT_EQ(parse_url("https://a/b")->port, 443);
+    EXPECT_TRUE(parse_url("https://a/b")->secure);
+    for (const char* wrong : {"", "alerts:9093", "mailto:a", "http://", "http://a:0", "http://a:x",
                               "http://user@a", "http://a/b c"})
         EXPECT_FALSE(parse_url(wrong)) << wrong;
 }

@@ -143,7 +143,7 @@ realtime: {priority: 20, lock_memory: true}
 audit: {file: /var/log/audit.jsonl, rotate: 10MiB, keep: 5, on_failure: refuse_writes}
 alarms: [{name: wiring, finding: any}, {name: lost, line: a, down: true}]
 store: {days: 90}
-alarm_webhook: {url: "http://10.0.0.1/x"}
+alarm_webhook: {url: "https://10.0.0.1/x", ca: /run/secrets/ops}
 )";
 
 /// Keys that the values of their neighbours there rule out.

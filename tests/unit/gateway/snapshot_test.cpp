@@ -139,7 +139,7 @@ TEST_F(SnapshotTest, TellsEachEventOnlyToThoseWhoWantWhatItIsAbout) {
     const auto of_line = hub.listen(elsewhere);
     for (const auto& listener : {of_press, of_point, of_line}) listener->take();
     poll();
-    publish_points(events, *plant.find("press"), {0}, now);
+    publish_points(events, plant.at("floor1", 31), {0}, now);
     publish(events, plant, "floor1", bus::TransactionEvent{31, 3, Outcome::ok, 5ms});
     publish(events, plant, "floor1", bus::TransactionEvent{5, 3, Outcome::ok, 5ms});
     publish(events, plant, "floor1", bus::LineEvent{true, {}});
@@ -153,9 +153,9 @@ TEST_F(SnapshotTest, TellsWhatHasBecomeOfPointsAndNotOfPollBlocks) {
     const auto listener = hub.listen({});
     listener->take();
     poll();
-    publish_points(events, *plant.find("press"), {1}, now);
+    publish_points(events, plant.at("floor1", 31), {1}, now);
     EXPECT_EQ(listener->take(), "");
-    publish_points(events, *plant.find("press"), {0, 1}, now);
+    publish_points(events, plant.at("floor1", 31), {0, 1}, now);
     const std::string told = listener->take();
     EXPECT_THAT(told, HasSubstr(R"("name":"temperature")"));
     EXPECT_THAT(told, HasSubstr(R"("line":"floor1","station":"press")"));

@@ -86,6 +86,24 @@ TEST_F(MqttJson, PublishesLabelsMissingValuesLinesAndStations) {
     for (const char* part : parts) EXPECT_THAT(all, HasSubstr(part));
 }
 
+TEST_F(MqttJson, AnAlarmsPayloadIsRetainedAndSentAgainWithAnotherStateOnly) {
+    Subjects subjects = small_plant();
+    subjects.add_alarm("press-hot");
+    Publisher publisher(settings(), subjects);
+    publisher.connected();
+    take_all(publisher);
+    State active;
+    active.text = "active";
+    active.body = R"({"state":"active","value":81})";
+    EXPECT_TRUE(publisher.offer(7, active));
+    active.body = R"({"state":"active","value":82})";
+    EXPECT_FALSE(publisher.offer(7, active)) << "a value is no change of the alarm";
+    const auto all = take_all(publisher);
+    ASSERT_EQ(all.size(), 1U);
+    EXPECT_EQ(all[0].message,
+              (Message{"plant/hall/alarm/press-hot", R"({"state":"active","value":81})", 1, true}));
+}
+
 TEST_F(MqttJson, WillAndFarewellAreRetained) {
     EXPECT_EQ(publisher_.will(), (Message{"plant/hall/status", R"({"state":"offline"})", 1, true}));
     EXPECT_THAT(publisher_.farewell(kNoon).payload, HasSubstr(R"({"state":"offline","time":)"));
