@@ -11,6 +11,7 @@ std::string to_string(Parity parity) {
 }
 
 std::string to_string(const SerialFormat& format) {
+    if (format.baud == SerialFormat::kNoWire) return "Modbus/TCP";
     const char parity = format.parity == Parity::none   ? 'N'
                         : format.parity == Parity::even ? 'E'
                                                         : 'O';
@@ -34,6 +35,7 @@ Duration byte_time(const SerialFormat& format) {
 }
 
 Duration silent_interval(const SerialFormat& format) {
+    if (format.baud == SerialFormat::kNoWire) return Duration::zero();
     if (format.mode == SerialMode::ascii) return std::max<Duration>(wire_time(format, 2), 1ms);
     constexpr int kFixedAbove = 19200;
     if (format.baud > kFixedAbove) return 1750us;

@@ -175,20 +175,28 @@ void ScanRun::tell() {
 
 namespace {
 
+bool is_modbus_tcp(const std::string& device) { return device.starts_with("modbus-tcp://"); }
+
 /// The settings from the command line; nothing, with a message on stderr, if they are wrong.
 std::optional<scan::Settings> parse_options(const ScanOptions& options) {
     scan::Settings settings;
-    settings.remote = options.device.starts_with("tcp://");
+    settings.remote = options.device.starts_with("tcp://") || is_modbus_tcp(options.device);
     settings.speak_anyway = options.speak;
     settings.quick = options.quick;
     std::optional<std::string> wrong;
     if (settings.remote && !line::parse_tcp_device(options.device)) {
-        wrong = "DEVICE must be tcp://HOST:PORT with a port from 1 to 65535, not '" +
-                options.device + '\'';
+        wrong =
+            "DEVICE must be tcp://HOST:PORT or modbus-tcp://HOST:PORT, with a port from 1 to "
+            "65535, not '" +
+            options.device + '\'';
     } else if (options.device.empty() || options.device == "sim") {
-        wrong = "DEVICE must be a serial device such as /dev/ttyUSB0, or tcp://HOST:PORT";
+        wrong =
+            "DEVICE must be a serial device such as /dev/ttyUSB0, tcp://HOST:PORT, or "
+            "modbus-tcp://HOST:PORT";
     } else if (settings.remote && !(options.baud.empty() && options.parity.empty())) {
-        wrong = "--baud and --parity are the far end's own on a tcp:// device: leave them out";
+        wrong =
+            "--baud and --parity are the far end's own on a tcp:// or modbus-tcp:// device: leave "
+            "them out";
     }
     if (!wrong && !options.baud.empty()) wrong = scan::parse_baud(options.baud, settings);
     if (!wrong && !options.parity.empty()) wrong = scan::parse_parity(options.parity, settings);
@@ -207,6 +215,7 @@ std::string absolute(const std::string& path) {
 bool run_scan(const ScanOptions& options, const scan::Settings& settings, ScanOutcome& outcome) {
     line::Settings device;
     device.device = options.device;
+    device.modbus_tcp = is_modbus_tcp(options.device);
     boost::asio::io_context io(1);
     ScanRun run(io, settings, *outcome.profiles, device);
     run.run();

@@ -51,11 +51,15 @@ std::string tcp_hint(std::string_view typed) {
 
 /// For a device of a scheme that other programs have (Telegraf, Home Assistant, pyserial).
 std::string scheme_hint(std::string_view scheme, std::string_view rest) {
-    if (scheme.starts_with("mod"))
-        return "; Modbus/TCP devices as lines are not there yet: write tcp:// only where the far "
-               "end takes RTU frames over TCP (raw, transparent)";
+    const std::string place(rest.substr(0, rest.find_first_of("/?")));
+    if (scheme.starts_with("mod")) {
+        const bool has_port = line::parse_tcp_device("tcp://" + place).has_value();
+        return write("modbus-tcp://" + place + (has_port ? "" : ":502")) +
+               " for a device that speaks Modbus/TCP, or tcp:// where the far end takes RTU frames "
+               "over TCP (raw, transparent)";
+    }
     if (scheme == "file") return write(rest.starts_with('/') ? rest : "/dev/" + std::string(rest));
-    const std::string device = "tcp://" + std::string(rest.substr(0, rest.find_first_of("/?")));
+    const std::string device = "tcp://" + place;
     if (scheme == "rfc2217" || scheme == "telnet")
         return "; " + std::string(scheme) +
                " mixes bytes of its own in: set the device server's port to raw TCP (ser2net: "
@@ -157,7 +161,8 @@ std::string device_hint(std::string_view typed) {
         return "; COM ports are those of Windows: here it is /dev/ttyUSB0 (adapters) or /dev/ttyS0";
     if (text.starts_with("tty") || text.starts_with("dev/") || text.starts_with("serial"))
         return write("/dev/" + std::string(typed.substr(text.starts_with("dev/") ? 4 : 0)));
-    if (line::parse_tcp_device("tcp://" + text)) return write("tcp://" + text);
+    if (line::parse_tcp_device("tcp://" + text))
+        return write((text.ends_with(":502") ? "modbus-tcp://" : "tcp://") + text);
     return "";
 }
 

@@ -17,6 +17,8 @@ namespace {
 
 using yaml::Node;
 
+constexpr std::string_view kModbusTcp = "modbus-tcp://";
+
 const Keys<Line>& line_serial_keys();
 const Keys<arbiter::QueueSettings>& queue_keys();
 const Keys<arbiter::OfflineSettings>& offline_keys();
@@ -34,14 +36,18 @@ bool check_comment(Reader& in, const std::string& device) {
 
 void check_tcp_device(Reader& in, const std::string& device) {
     const auto endpoint = line::parse_tcp_device(device);
+    if (endpoint && device.starts_with(kModbusTcp)) return;
     if (!endpoint)
         return in.problem("device",
-                          "device must be tcp://HOST:PORT with a port from 1 to 65535, not " +
-                              yaml::quote(device) + device_hint(device));
+                          "device must be " +
+                              std::string(device.starts_with(kModbusTcp) ? kModbusTcp : "tcp://") +
+                              "HOST:PORT with a port from 1 to 65535, not " + yaml::quote(device) +
+                              device_hint(device));
     if (endpoint->port == "502")  // node-modbus-serial#171, tf03mqtt#4
         in.warn("device",
                 "port 502 is the one of Modbus/TCP, and a tcp:// line sends RTU frames: set the "
-                "device server to raw (transparent) mode, on any port");
+                "device server to raw (transparent) mode, on any port; for a device that speaks "
+                "Modbus/TCP write modbus-tcp://");
 }
 
 /// Two lines cannot open one device.
@@ -68,11 +74,16 @@ bool read_device(Reader& in, Line& line) {
         line.kind = Line::Kind::tcp;
         line.arbiter.may_stall = true;
         check_tcp_device(in, device);
+    } else if (device.starts_with(kModbusTcp)) {
+        line.kind = Line::Kind::tcp;
+        line.device.modbus_tcp = true;
+        line.device.serial.baud = SerialFormat::kNoWire;
+        check_tcp_device(in, device);
     } else if (device[0] != '/') {
-        in.problem(
-            "device",
-            "device must be an absolute path such as /dev/ttyUSB0, tcp://HOST:PORT or sim, not " +
-                yaml::quote(device) + device_hint(device));
+        in.problem("device",
+                   "device must be an absolute path such as /dev/ttyUSB0, tcp://HOST:PORT, "
+                   "modbus-tcp://HOST:PORT or sim, not " +
+                       yaml::quote(device) + device_hint(device));
     } else {
         check_path(in, device);
     }
@@ -113,8 +124,9 @@ const Keys<Line>& line_keys() {
             .required()
             .example("floor1")
             .change_needs(kOpensPort)
-            .value(text_shape("device", {"^(/|tcp://.+:[0-9]+$|sim$)", false},
-                              "Serial device, tcp://HOST:PORT (RTU over TCP), or sim (simulated "
+            .value(text_shape("device", {"^(/|(modbus-)?tcp://.+:[0-9]+$|sim$)", false},
+                              "Serial device, tcp://HOST:PORT (RTU over TCP), "
+                              "modbus-tcp://HOST:PORT (a device on Ethernet), or sim (simulated "
                               "panels)."),
                    read_device, [](const Line& line) { return line.device.device; })
             .required()
@@ -136,13 +148,15 @@ const Keys<Line>& line_keys() {
                 shape_of("serial", Kind::map, "Character format and framing."),
                 []() -> const Table& { return line_serial_keys(); },
                 [](Reader& in, Line& line) {
-                    in.loading.line->serial_known = read_serial(
-                        in, [&](Reader& serial) { line_serial_keys().read(serial, line); });
+                    in.loading.line->serial_known =
+                        read_serial(
+                            in, [&](Reader& serial) { line_serial_keys().read(serial, line); }) &&
+                        !line.device.modbus_tcp;
                     line.arbiter.serial = line.device.serial;
                     return in.has("serial");
                 },
                 [](const SettingWriter& out, const Line& line, const SettingWriter*) {
-                    line_serial_keys().show(out.below("serial"), line);
+                    if (!line.device.modbus_tcp) line_serial_keys().show(out.below("serial"), line);
                 })
             .change_needs(kOpensPort)
             .map(
@@ -301,7 +315,21 @@ std::vector<yaml::Elsewhere> keys_elsewhere() {
     return all;
 }
 
+/// A device on Ethernet has no wire that could be set up.
+void check_modbus_tcp(Reader& in, Line& line) {
+    for (const std::string_view key : {"serial", "rs485", "echo"})
+        if (in.has(key))
+            in.problem(key, std::string(key) + " belongs to a serial line: " +
+                                yaml::quote(line.device.device) + " has none; leave it out");
+    line.arbiter.echo = EchoMode::off;
+    if (line.listens)
+        in.problem("mode",
+                   "mode listen needs a line that others can be heard on; a device of "
+                   "modbus-tcp:// answers us alone");
+}
+
 void check_line(Reader& in, Line& line) {
+    if (line.device.modbus_tcp) check_modbus_tcp(in, line);
     line.device.listen_only = line.listens;
     if (line.listens && line.kind == Line::Kind::simulated)
         in.problem("mode",

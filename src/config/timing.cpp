@@ -203,6 +203,7 @@ void check_gap(Loading& loading, const LineContext& work, const Station& station
 Duration automatic_hole(const Line& line) {
     constexpr std::size_t kChunk = 32;
     if (line.device.serial.mode == SerialMode::ascii) return 1s;
+    if (line.device.modbus_tcp) return 10ms;
     if (line.kind == Line::Kind::tcp) return 700ms;
     return 60ms + wire_time(line.device.serial, kChunk);
 }
@@ -262,6 +263,11 @@ void warn_of_broadcasts(Reader& in, const Line& line) {
 bool load_line_timing(Reader& in, LineContext& work) {
     const SerialFormat& serial = work.line.device.serial;
     work.line.arbiter.reply_hole = automatic_hole(work.line);
+    // A reply is known by its transaction id, so that nothing is waited for between two requests.
+    if (work.line.device.modbus_tcp) {
+        work.timing.frame_gap = Duration::zero();
+        work.timing.settings.late_window = Duration::zero();
+    }
     const Node* node = in.map("timing", kExample);
     if (node != nullptr) {
         Reader own(in.loading, *node, "timing");

@@ -109,7 +109,7 @@ RunningLine::RunningLine(boost::asio::any_io_executor executor, rt::Clock& clock
 bus::Settings RunningLine::settings_of(const config::Line& line) {
     bus::Settings settings = explain::bus_settings(line);
     if (simulated_) settings.device = kSimulatedDevice;
-    settings.arbiter.may_stall = is_remote(line, simulate_);
+    settings.arbiter.may_stall = is_remote(line, simulate_) && !line.device.modbus_tcp;
     settings.observe = [this, name = line.name](const bus::BusEvent& event) {
         on_event(name, event);
     };

@@ -33,6 +33,7 @@ bool is_broken_address(std::string_view host) {
 
 std::optional<TcpEndpoint> parse_tcp_device(std::string_view device) {
     constexpr std::string_view kScheme = "tcp://";
+    if (device.starts_with("modbus-tcp://")) device.remove_prefix(7);
     if (!device.starts_with(kScheme)) return std::nullopt;
     device.remove_prefix(kScheme.size());
     const std::size_t colon = device.rfind(':');

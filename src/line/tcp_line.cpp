@@ -5,6 +5,7 @@
 #include <netinet/tcp.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <algorithm>
 #include <atomic>
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/connect.hpp>
@@ -16,6 +17,7 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/prefer.hpp>
 #include <boost/system/error_code.hpp>
+#include <cerrno>
 #include <charconv>
 #include <csignal>
 #include <functional>
@@ -29,6 +31,7 @@
 #include <utility>
 
 #include "descriptor_line.hpp"
+#include "mbap.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/rt/acceptor.hpp"
 #include "panelgate/rt/log.hpp"
@@ -201,6 +204,7 @@ class TcpLine final : public DescriptorLine {
             TcpEndpoint endpoint)
         : DescriptorLine(executor, clock, std::move(settings)),
           endpoint_(std::move(endpoint)),
+          mbap_(this->settings().modbus_tcp ? std::optional<Mbap>(std::in_place) : std::nullopt),
           lookup_(executor, endpoint_),
           socket_(executor),
           patience_(clock.make_alarm()) {}
@@ -235,7 +239,10 @@ class TcpLine final : public DescriptorLine {
             [alive = alive(), this, attempt = attempt_] { return *alive && attempt == attempt_; };
     }
 
+    ssize_t get_replies(std::span<std::uint8_t> room);
+
     TcpEndpoint endpoint_;
+    std::optional<Mbap> mbap_;  ///< of a device that speaks Modbus/TCP
     NameLookup lookup_;
     tcp::socket socket_;  ///< while it connects
     std::unique_ptr<rt::Alarm> patience_;
@@ -290,6 +297,7 @@ void TcpLine::connected() {
     if (!refused.empty()) return failed(refused);
     has_begun_ = false;
     set_telnet(false);
+    if (mbap_) mbap_->restart();
     opened();
 }
 
@@ -322,7 +330,18 @@ bool begins_like_telnet(ByteView bytes) {
 
 }  // namespace
 
+ssize_t TcpLine::get_replies(std::span<std::uint8_t> room) {
+    const ssize_t size = DescriptorLine::get(room.first(std::min(room.size(), Mbap::kRead)));
+    if (size <= 0) return size;
+    const auto frames = mbap_->replies(room.first(static_cast<std::size_t>(size)));
+    errno = frames ? EAGAIN : EPROTO;
+    if (!frames || frames->empty()) return -1;
+    std::ranges::copy(*frames, room.begin());
+    return static_cast<ssize_t>(frames->size());
+}
+
 ssize_t TcpLine::get(std::span<std::uint8_t> room) {
+    if (mbap_) return get_replies(room);
     const ssize_t size = DescriptorLine::get(room);
     if (size <= 0 || std::exchange(has_begun_, true)) return size;
     const bool telnet = begins_like_telnet(room.first(static_cast<std::size_t>(size)));
@@ -344,9 +363,10 @@ void TcpLine::was_lost(bool unanswered) {
     if (hang_ups_ < kMany || std::exchange(told_hang_ups_, true)) return;
     rt::log(rt::LogLevel::warn, "device server hangs up on requests",
             {{"device", settings().device},
-             {"advice",
-              "set its mode to raw (transparent): one that speaks Modbus/TCP refuses "
-              "RTU frames; or another client has its port"}});
+             {"advice", mbap_ ? "it may speak RTU over TCP (write tcp://), or another client has "
+                                "its only connection"
+                              : "set its mode to raw (transparent): one that speaks Modbus/TCP "
+                                "refuses RTU frames; or another client has its port"}});
 }
 
 void TcpLine::write(ByteView bytes) {
@@ -355,8 +375,10 @@ void TcpLine::write(ByteView bytes) {
     const TimePoint now = clock().now();
     older_ = unacknowledged_since().value_or(now);
     last_write_ = now;
-    last_size_ = bytes.size();
-    DescriptorLine::write(bytes);
+    const Bytes adu = mbap_ ? mbap_->request(bytes) : Bytes();
+    const ByteView sent = mbap_ ? ByteView(adu) : bytes;
+    last_size_ = sent.size();
+    DescriptorLine::write(sent);
 }
 
 /// When the oldest byte was written that the server's system has not acknowledged.

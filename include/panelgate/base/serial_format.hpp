@@ -28,6 +28,9 @@ inline constexpr std::array<std::pair<std::string_view, SerialMode>, 2> kSerialM
 /// Character format and transmission mode of a line. The default is the standard's: RTU at 19200
 /// 8E1 (serial line V1.02, 2.5.1).
 struct SerialFormat {
+    /// Rate of a device on Ethernet, whose frames take no time that counts.
+    static constexpr int kNoWire = 1'000'000'000;
+
     int baud = 19200;  ///< bit/s, above 0
     int data_bits = 8;
     Parity parity = Parity::even;
@@ -41,7 +44,7 @@ struct SerialFormat {
     friend bool operator==(const SerialFormat&, const SerialFormat&) = default;
 };
 
-/// Formats "38400 8N1", "9600 7E1 ASCII".
+/// Formats "38400 8N1", "9600 7E1 ASCII"; "Modbus/TCP" without a wire.
 std::string to_string(const SerialFormat& format);
 
 /// Transmission time of one character.

@@ -28,7 +28,7 @@ struct Rs485 {
 };
 
 struct Settings {
-    std::string device;  ///< path of a serial device, or tcp://HOST:PORT
+    std::string device;  ///< path of a serial device, tcp://HOST:PORT or modbus-tcp://HOST:PORT
     SerialFormat serial;
     Rs485 rs485;                  ///< for a serial device
     Duration reopen_min = 100ms;  ///< back-off between attempts to open, doubled each time
@@ -39,15 +39,17 @@ struct Settings {
     /// Maximum input in bytes per second, apart from bursts of a second; or four times the line's
     /// rate, if that is more. A device that never stops must not block the other lines.
     std::size_t input_rate = 2 * 1024 * 1024;
-    bool simulated = false;  ///< our own pty, which has no parity: no warning about that
-    std::string owner{};     ///< "line 'floor1'": whose device it is, for messages
+    bool simulated = false;   ///< our own pty, which has no parity: no warning about that
+    std::string owner{};      ///< "line 'floor1'": whose device it is, for messages
+    bool modbus_tcp = false;  ///< the device speaks Modbus/TCP: its stations are unit ids
     friend bool operator==(const Settings&, const Settings&) = default;
 };
 
 /// True for a numeric host that is no IPv4 address, such as 10.0.0.300: no name looks like this.
 bool is_broken_address(std::string_view host);
 
-/// A serial device server: "tcp://HOST:PORT", "tcp://[::1]:4001"; std::nullopt for anything else.
+/// A serial device server: "tcp://HOST:PORT", "tcp://[::1]:4001"; or a device that speaks
+/// Modbus/TCP: "modbus-tcp://HOST:PORT". std::nullopt for anything else.
 /// The host is a name of letters, digits, '-', '_' and '.', or an address.
 struct TcpEndpoint {
     std::string host;

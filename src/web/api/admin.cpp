@@ -135,11 +135,12 @@ std::string text_state(const Api& api, const Who& who) {
     return ",\"text\":" + json_text(text);
 }
 
-std::string configuration_text(const Api& api, const Who& who, const std::string& configuration) {
+/// What stands before the configuration itself.
+std::string configuration_head(const Api& api, const Who& who) {
     return "{\"version\":" + json_text(boost::json::value(api.providers.version)) +
            ",\"role\":" + json_text(boost::json::value(who.standing.name())) +
            ",\"rights\":" + json_text(rights_list(who)) + text_state(api, who) +
-           ",\"configuration\":" + configuration + ",\"rest\":" + json_text(offered()) + "}\n";
+           ",\"configuration\":";
 }
 
 /// The configuration of the stations that may be seen. "whole": traces of the line may be, too.
@@ -190,17 +191,20 @@ Handling get_configuration(HttpRequest request, const Api* api) {
     if (api->configuration->size() >= kKeptConfigurations) api->configuration->clear();
     std::shared_ptr<KeptAnswer>& kept = (*api->configuration)[key];
     if (!kept) {
-        const std::string& text = *api->providers.configuration;
-        kept = std::make_shared<KeptAnswer>(
-            configuration_text(*api, who,
-                               all ? text : seen_configuration(text, *api->directory, sight)),
-            "application/json");
+        const auto make = [head = configuration_head(*api, who), whole = all,
+                           text = api->providers.configuration, directory = api->lent,
+                           caller = request.caller->who()] {
+            const std::string seen =
+                whole ? *text : seen_configuration(*text, *directory, Sight(*directory, caller));
+            return head + seen + ",\"rest\":" + json_text(offered()) + "}\n";
+        };
+        kept = std::make_shared<KeptAnswer>(make, "application/json");
     }
     co_return KeptAnswer::give(kept, request);
 }
 
 Handling get_openapi(HttpRequest request, const Api*) {
-    static const auto kept = std::make_shared<KeptAnswer>(openapi_text(), "application/json");
+    static const auto kept = std::make_shared<KeptAnswer>(openapi_text, "application/json");
     co_return KeptAnswer::give(kept, request);
 }
 

@@ -177,26 +177,28 @@ HttpResponse table_answer(const HttpRequest& request, Table table) {
     return response;
 }
 
-KeptAnswer::KeptAnswer(std::string text, std::string_view content_type)
-    : text_(std::make_shared<const std::string>(std::move(text))),
-      tag_(tag_of(*text_)),
-      content_type_(content_type) {}
-
 HttpResponse KeptAnswer::give(const std::shared_ptr<KeptAnswer>& self, const HttpRequest& request) {
     HttpResponse response;
     response.content_type = self->content_type_;
-    const bool known = add_etag(response, header(request, "if-none-match"), self->tag_);
-    response.headers.emplace_back("Vary", "Accept-Encoding");
-    if (known) return response;
-    response.shared_body = self->text_;
-    if (!accepts_gzip(header(request, "accept-encoding"))) return response;
-    response.headers.emplace_back("Content-Encoding", "gzip");
-    response.finish = [self](HttpResponse& made) {
-        if (!self->packed_)
-            self->packed_ = std::make_shared<const std::string>(packed(*self->text_));
-        made.shared_body = self->packed_;
-    };
+    response.finish = [self, known = std::string(header(request, "if-none-match")),
+                       takes_gzip = accepts_gzip(header(request, "accept-encoding"))](
+                          HttpResponse& made) { self->give(made, known, takes_gzip); };
     return response;
+}
+
+void KeptAnswer::give(HttpResponse& response, const std::string& if_none_match, bool takes_gzip) {
+    if (const auto make = std::exchange(make_, nullptr)) {
+        text_ = std::make_shared<const std::string>(make());
+        tag_ = tag_of(*text_);
+    }
+    const bool known = add_etag(response, if_none_match, tag_);
+    response.headers.emplace_back("Vary", "Accept-Encoding");
+    if (known) return;
+    response.shared_body = text_;
+    if (!takes_gzip) return;
+    if (!packed_) packed_ = std::make_shared<const std::string>(packed(*text_));
+    response.headers.emplace_back("Content-Encoding", "gzip");
+    response.shared_body = packed_;
 }
 
 namespace {

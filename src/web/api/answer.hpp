@@ -73,15 +73,19 @@ HttpResponse table_answer(const HttpRequest& request, Table table);
 /// reused.
 class KeptAnswer {
   public:
-    /// `content_type` must have static lifetime.
-    KeptAnswer(std::string text, std::string_view content_type);
+    /// `make` composes the text in the faces' loop, once. `content_type` must have static lifetime.
+    KeptAnswer(std::function<std::string()> make, std::string_view content_type)
+        : make_(std::move(make)), content_type_(content_type) {}
 
     /// The answer with its ETag: 304 if the client has it already, gzip if the client accepts it.
     static HttpResponse give(const std::shared_ptr<KeptAnswer>& self, const HttpRequest& request);
 
   private:
+    void give(HttpResponse& response, const std::string& if_none_match, bool takes_gzip);
+
+    std::function<std::string()> make_;  ///< of the faces' loop, as what follows; null: made
     SharedText text_;
-    SharedText packed_;  ///< of the faces' loop; null: not requested yet
+    SharedText packed_;  ///< null: not requested yet
     std::string tag_;
     std::string_view content_type_;
 };

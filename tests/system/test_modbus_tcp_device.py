@@ -1,0 +1,173 @@
+"""Devices on Ethernet as lines: modbus-tcp://HOST:PORT. A foreign server, and one with faults."""
+import random
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+
+import config
+import harness
+from harness import read_registers, write_register
+from test_points import until
+
+FOREIGN = """
+import asyncio, socket
+from pymodbus.datastore import ModbusSequentialDataBlock as Block, ModbusServerContext, ModbusSlaveContext
+from pymodbus.server import StartAsyncTcpServer
+def unit(first):
+    return ModbusSlaveContext(hr=Block(0, list(range(first, first + 300))), zero_mode=True)
+asyncio.run(StartAsyncTcpServer(ModbusServerContext({1: unit(1000), 2: unit(2000)}, single=False),
+                                address=("127.0.0.1", PORT)))
+"""
+
+
+def value_of(unit, address):
+    return (unit * 1000 + address) & 0xFFFF
+
+
+class Device:
+    """A Modbus/TCP server: a register holds value_of(). `fault(request)` gives what is sent instead of the
+    reply, as a list of bytes; None: the reply; and whether the connection goes on. A context manager."""
+
+    def __init__(self, fault=lambda device, reply: [reply]):
+        self.fault = fault
+        self.late = None
+        self.asked = 0
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.port = self._server.getsockname()[1]
+
+    def __enter__(self):
+        threading.Thread(target=self._serve, daemon=True).start()
+        return self
+
+    def __exit__(self, *_):
+        self._server.close()
+
+    def _serve(self):
+        while True:
+            try:
+                peer, _ = self._server.accept()
+            except OSError:
+                return
+            threading.Thread(target=self._answer, args=(peer,), daemon=True).start()
+
+    def _answer(self, peer):
+        try:
+            while len(head := peer.recv(12, socket.MSG_WAITALL)) == 12:
+                number, _, _, unit, function, address, count = struct.unpack(">HHHBBHH", head)
+                values = [value_of(unit, address + i) for i in range(count)]
+                pdu = struct.pack(f">BB{count}H", function, 2 * count, *values)
+                self.asked += 1
+                for part in self.fault(self, struct.pack(">HHHB", number, 0, len(pdu) + 1, unit) + pdu):
+                    if part is None:
+                        peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                        return
+                    peer.sendall(part)
+        except OSError:
+            pass
+        finally:
+            peer.close()
+
+
+def ethernet(port, name="eth", stations="{id: 1, name: hall}, {id: 2, name: meter}"):
+    return (f"  - {{name: {name}, device: 'modbus-tcp://127.0.0.1:{port}', retries: 0, "
+            f"timing: {{response_timeout: 100ms}}, stations: [{stations}]}}\n")
+
+
+class Ethernet(unittest.TestCase):
+    def test_a_foreign_server_is_read_written_polled_and_scanned(self):
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            port = free.getsockname()[1]
+        server = subprocess.Popen([sys.executable, "-c", FOREIGN.replace("PORT", str(port))])
+        self.addCleanup(server.wait)
+        self.addCleanup(server.terminate)
+        stations = "{id: 1, name: hall, points: [{name: t, at: '400101', every: 50ms}]}, {id: 2, name: meter}"
+        text = config.gateway(config.line(), ethernet(port, stations=stations),
+                              modbus="listen: '127.0.0.1:0', units: {1: eth/1, 2: eth/2, 31: floor1/31}")
+        with harness.configured(text) as program:
+            program.log.wait_for("line up line=eth")
+            with program.client() as client:
+                self.assertEqual(client.ask(1, read_registers(5, 2)), bytes([3, 4]) + struct.pack(">HH", 1005, 1006))
+                self.assertEqual(client.ask(2, write_register(7, 4242)), write_register(7, 4242))
+                self.assertEqual(client.ask(2, read_registers(7, 1)), bytes([3, 2]) + struct.pack(">H", 4242))
+                self.assertEqual(client.ask(31, read_registers(0, 1))[0], 3, "the serial line beside it")
+            until(lambda: program.get("/api/v1/stations/hall/points/t")[1]["value"] == 1100)
+        found = harness.run("scan", f"modbus-tcp://127.0.0.1:{port}", "--stations", "1-4")
+        self.assertRegex(found.stdout, "2 stations")
+
+    def test_a_late_reply_never_answers_another_request(self):
+        def fault(device, reply):
+            if device.asked == 1:
+                device.late = reply
+                return []  # it comes later, in front of the next reply
+            return [device.late, reply] if device.asked == 2 else [reply]
+        with Device(fault) as device, harness.configured(self.plant(device)) as program, \
+                program.client() as client:
+            self.assertEqual(client.ask(1, read_registers(10, 1)), bytes([0x83, 0x0B]))
+            self.assertEqual(client.ask(1, read_registers(20, 1)), bytes([3, 2]) + struct.pack(">H", 1020))
+
+    def plant(self, *devices):
+        lines = [ethernet(device.port, f"eth{i}", f"{{id: 1, name: a{i}}}, {{id: 2, name: b{i}}}")
+                 for i, device in enumerate(devices)]
+        units = ", ".join(f"{10 * i + n}: eth{i}/{n}" for i in range(len(devices)) for n in (1, 2))
+        return config.gateway(*lines, modbus=f"listen: '127.0.0.1:0', units: {{{units}}}")
+
+    def test_faults_of_all_kinds_give_no_wrong_value_and_one_answer_each(self):
+        chance = random.Random(7)
+
+        def fault(device, reply):
+            kind = chance.randrange(20)
+            if kind == 0:  # of nobody
+                return [bytes([reply[0] ^ 0x40]) + reply[1:]]
+            if kind == 1:
+                return [reply, reply]
+            if kind == 2:  # half of it, and the end
+                return [reply[:len(reply) // 2], None]
+            if kind == 3:  # no Modbus/TCP
+                return [b"HTTP/1.1 400 Bad Request\r\n\r\n"]
+            if kind == 4:
+                device.late = reply
+                return []
+            if kind == 5 and device.late:
+                return [device.late, reply]
+            return [reply[:3], reply[3:]] if kind == 6 else [reply]
+        with Device(fault) as device, Device() as sound, \
+                harness.configured(self.plant(device, sound)) as program:
+            answers = {3: 0, 0x83: 0}
+
+            def ask(base, times):
+                with program.client() as client:
+                    for i in range(times):
+                        unit, address = 1 + i % 2, i * 7 % 5000
+                        pdu = client.ask(base + unit, read_registers(address, 3))
+                        answers[pdu[0]] += 1
+                        if pdu[0] == 3:
+                            self.assertEqual(pdu[2:], struct.pack(">3H", *(value_of(unit, address + k)
+                                                                           for k in range(3))))
+                        else:
+                            self.assertIn(pdu[1], (0x0A, 0x0B))
+                            self.assertLess(base, 10, "the sound device")
+            asking = [threading.Thread(target=ask, args=(base, times)) for base, times in ((0, 60), (10, 300))]
+            for one in asking:
+                one.start()
+            for one in asking:
+                one.join()
+            self.assertEqual(sum(answers.values()), 360)
+            self.assertGreater(answers[3], 300)
+
+    def test_what_has_no_wire_is_refused(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = f"{folder}/panelgate.yaml"
+            with open(file, "w", encoding="utf-8") as out:
+                out.write(config.gateway("  - {name: eth, device: 'modbus-tcp://10.0.0.7:502', serial: {baud: 9600}, "
+                                         "mode: listen, stations: [{id: 1, name: a}]}\n"))
+            said = harness.run("check", "-c", file).stderr
+        self.assertIn("serial belongs to a serial line: 'modbus-tcp://10.0.0.7:502' has none", said)
+        self.assertIn("mode listen needs a line that others can be heard on", said)
+
+
+if __name__ == "__main__":
+    unittest.main()
