@@ -232,6 +232,9 @@ const Keys<Settings>& mqtt_keys() {
             .word("write", &Settings::write, kWrites,
                   "points: who may publish TOPIC/+/+/set, or DCMD, writes points.")
             .weaker(By::coming, "points")
+            .boolean("home_assistant", &Settings::home_assistant,
+                     "Home Assistant finds stations and points by itself (device discovery).")
+            .only_with("format", {"json"}, "is for format: json", true)
             .below(
                 shape_of("tls", Kind::map,
                          "TLS at the broker, with mqtts://. Without it the system's CAs count."),

@@ -7,6 +7,7 @@
 
 #include "panelgate/access/line_rules.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/mqtt/home_assistant.hpp"
 #include "panelgate/profile/judge.hpp"
 
 namespace panelgate::explain {
@@ -175,6 +176,15 @@ mqtt::Subjects subjects_of(const config::Config& config) {
     if (config.mqtt->format != mqtt::Format::json) return subjects;
     for (const alarms::Settings* alarm : by_name(config.alarms))
         if (sight.alarm(config, *alarm)) subjects.add_alarm(alarm->name);
+    if (!config.mqtt->home_assistant) return subjects;
+    for (const config::Station* station : stations) {
+        mqtt::HomeStation home{station->name, station->profile->name};
+        for (const points::Point* point : by_name(station->points))
+            if (sight.point(*station, *point)) home.points.push_back(point);
+        if (home.points.empty()) continue;
+        mqtt::Notice notice = mqtt::home_assistant_notice(*config.mqtt, home);
+        subjects.add_notice(std::move(notice.topic), std::move(notice.payload));
+    }
     return subjects;
 }
 

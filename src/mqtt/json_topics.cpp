@@ -79,6 +79,8 @@ std::optional<Message> JsonTopics::before(std::size_t, const States&, std::uint6
 }
 
 std::optional<Message> JsonTopics::behind(std::size_t step, const States& states) {
+    const Subject& subject = subjects_[step];
+    if (subject.kind == Subject::Kind::notice) return Message{subject.name, subject.text, 1, true};
     if (!states[step]) return std::nullopt;
     return message(step, *states[step]);
 }
@@ -96,6 +98,8 @@ std::string JsonTopics::name_of(std::size_t subject) const {
             return top + "line/" + one.name + "/state";
         case Subject::Kind::station:
             return top + "station/" + one.name + "/state";
+        case Subject::Kind::notice:
+            return one.name;
         case Subject::Kind::alarm:
             return top + "alarm/" + one.name;
         case Subject::Kind::point:

@@ -44,6 +44,8 @@ std::optional<std::size_t> subject_of(const Subjects& subjects, const json::obje
             return subjects.find_station(name);
         case Subject::Kind::alarm:
             return subjects.find_alarm(name);
+        case Subject::Kind::notice:
+            return std::nullopt;
         case Subject::Kind::point:
             break;
     }

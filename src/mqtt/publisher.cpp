@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "json_topics.hpp"
+#include "panelgate/mqtt/home_assistant.hpp"
 #include "sparkplug.hpp"
 
 namespace panelgate::mqtt {
@@ -58,6 +59,13 @@ void Publisher::clear_stale_topics(const Publisher& before) {
         if (went.size() < most) went.insert(message.topic);
     for (const std::string& topic : format_->retained()) went.erase(topic);
     for (const std::string& topic : went) cleared_.add({topic, "", 1, true});
+    for (std::size_t i = 0; i < subjects_->size(); ++i) {
+        const Subject& now = (*subjects_)[i];
+        const auto former = before.subjects_->find_notice(now.name);
+        if (now.kind != Subject::Kind::notice || !former) continue;
+        std::string farewell = home_assistant_farewell((*before.subjects_)[*former].text, now.text);
+        if (!farewell.empty()) cleared_.add({now.name, std::move(farewell), 1, true});
+    }
 }
 
 void Publisher::know(std::size_t subject, State state) {

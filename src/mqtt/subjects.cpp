@@ -37,6 +37,14 @@ void Subjects::add_alarm(std::string name) {
     all_.push_back(std::move(made));
 }
 
+void Subjects::add_notice(std::string topic, std::string payload) {
+    Subject made;
+    made.kind = Subject::Kind::notice;
+    made.name = std::move(topic);
+    made.text = std::move(payload);
+    all_.push_back(std::move(made));
+}
+
 std::size_t Subjects::end_of(std::size_t station) const {
     std::size_t end = station + 1;
     while (end < all_.size() && all_[end].kind == Subject::Kind::point) ++end;
@@ -66,6 +74,10 @@ std::optional<std::size_t> Subjects::find_station(std::string_view name) const {
 
 std::optional<std::size_t> Subjects::find_alarm(std::string_view name) const {
     return find(Subject::Kind::alarm, name);
+}
+
+std::optional<std::size_t> Subjects::find_notice(std::string_view topic) const {
+    return find(Subject::Kind::notice, topic);
 }
 
 std::optional<std::size_t> Subjects::find_point(std::size_t station, std::string_view name) const {

@@ -288,6 +288,31 @@ class Configuration(unittest.TestCase):
                 until(lambda: kept(folder) == 0)
                 self.assertEqual(metric(program, "dropped_total"), 0)
 
+    def test_home_assistant_finds_points_whose_topics_are_there_and_forgets_those_that_go(self):
+        points = ["{name: level, at: UW200, unit: celsius}", "{name: valve, at: UB2100, writable: true}"]
+        station = "{{id: 31, name: press, profile: autonics-gplp-s, points: [{}]}}"
+        found = f"homeassistant/device/{TOPIC.replace('/', '_')}_press/config"
+        more = ", write: points, home_assistant: true"
+        with Broker() as broker, tempfile.TemporaryDirectory() as folder, Listener(broker, "#") as listener:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            file.write_text(plant(broker, station.format(", ".join(points)), more=more))
+            with harness.Program("run", "-c", str(file)) as program:
+                told = listener.wait_for(found)
+                self.assertEqual({name: one["p"] for name, one in told["cmps"].items()},
+                                 {"level": "sensor", "valve": "switch"})
+                self.assertEqual(told["cmps"]["level"]["unit_of_measurement"], "°C")
+                for one in told["cmps"].values():
+                    for place in one["availability"] + [{"topic": one["state_topic"]}]:
+                        listener.wait_for(place["topic"])
+                valve = told["cmps"]["valve"]
+                listener.publish(valve["command_topic"], valve["payload_on"])
+                listener.wait_for(valve["state_topic"], lambda body: body["value"] is True)
+                file.write_text(plant(broker, station.format(points[0]), more=more))
+                self.assertEqual(program.rest("POST", "/api/v1/reload")[0], 200)
+                self.assertEqual(listener.wait_for(found, lambda body: body["cmps"].get("valve", {}) == {"p": "switch"})
+                                 ["cmps"]["level"]["p"], "sensor")
+                listener.wait_for(found, lambda body: list(body["cmps"]) == ["level"], after=1)
+
     def test_a_reload_keeps_the_connection_or_what_waits(self):
         with Broker() as broker, Listener(broker) as listener, tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "panelgate.yaml"

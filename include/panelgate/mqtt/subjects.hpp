@@ -26,19 +26,20 @@ struct Message {
 
 /// Something whose state is published.
 struct Subject {
-    enum class Kind : std::uint8_t { line, station, point, alarm };
+    enum class Kind : std::uint8_t { line, station, point, alarm, notice };
     Kind kind = Kind::point;
-    std::string name;
+    std::string name;         ///< of a notice: its topic
     std::size_t station = 0;  ///< of a point: its station's subject number
     std::string unit{};       ///< of a point, like the rest
     points::Type type = points::Type::u16;
     bool scaled = false;  ///< the value is not the raw number
+    std::string text{};   ///< of a notice: its payload
 
     friend bool operator==(const Subject&, const Subject&) = default;
 };
 
 /// The published subjects in a fixed order: lines; then each station followed by its points; then
-/// alarms, of JsonTopics alone. A subject's number is its index, and never changes.
+/// alarms and notices, of JsonTopics alone. A subject's number is its index, and never changes.
 class Subjects {
   public:
     void add_line(std::string name);
@@ -46,6 +47,8 @@ class Subjects {
     void add_station(std::string name);
     void add_point(const points::Point& point);
     void add_alarm(std::string name);
+    /// Adds a message that never changes.
+    void add_notice(std::string topic, std::string payload);
 
     std::size_t size() const { return all_.size(); }
     const Subject& operator[](std::size_t subject) const { return all_[subject]; }
@@ -60,6 +63,7 @@ class Subjects {
     std::optional<std::size_t> find_line(std::string_view name) const;
     std::optional<std::size_t> find_station(std::string_view name) const;
     std::optional<std::size_t> find_alarm(std::string_view name) const;
+    std::optional<std::size_t> find_notice(std::string_view topic) const;
     std::optional<std::size_t> find_point(std::size_t station, std::string_view name) const;
     std::optional<std::size_t> find_point(std::string_view station, std::string_view name) const;
 

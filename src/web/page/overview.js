@@ -90,8 +90,10 @@ async function recall(line, history) {
 
 const showFindings = (place, told) => list(place, told, (one) => `${one.cause} ${one.station} ${one.text}`, (one) => ({node: findingNote(one)}));
 
-/** Those in trouble before the others, each in the order of the file. */
-const troubleFirst = (all, isBad) => [...all.filter(isBad), ...all.filter((one) => !isBad(one))];
+/** The worst first (`rank` 0), each rank in the order of the file. */
+const worstFirst = (all, rank) => [...all].sort((one, other) => rank(one) - rank(other));
+const rankOfLine = (line) => line.up ? line.findings.length > 0 || live.findings.some((one) => one.line === line.name) ? 1 : 2 : 0;
+const rankOfStation = (station) => tone(station.state) === 'bad' ? 0 : 1;
 
 /** A line's card with its tiles: {node, update}. */
 function card(first) {
@@ -123,7 +125,7 @@ function card(first) {
         spark.update(history, {most: LOADED});
         text(facts, [line.device, line.mode === 'listen' ? t('listens') : null, t('waiting', {count: line.queue_depth})].filter(Boolean).join(' · '));
         showFindings(findings, found);
-        list(tiles, troubleFirst(live.stations.filter((station) => station.line === line.name), (station) => tone(station.state) === 'bad'), (station) => station.name, tile);
+        list(tiles, worstFirst(live.stations.filter((station) => station.line === line.name), rankOfStation), (station) => station.name, tile);
     }};
 }
 
@@ -171,7 +173,7 @@ export function overviewView() {
         const found = live.findings.filter((one) => !one.line);
         showFindings(findings, found);
         own.hidden = found.length === 0;
-        list(lines, troubleFirst(linesWithFindings(update), (line) => !line.up), (line) => line.name, card);
+        list(lines, worstFirst(linesWithFindings(update), rankOfLine), (line) => line.name, card);
         if (live.lines.length === 0) replace(lines, h('p', {class: 'empty'}, t('no.lines')));
     };
     const ends = live.lines.slice(0, TRACED).map((line) => {

@@ -135,7 +135,7 @@ access:
        faces: [http], listeners: ["127.0.0.1:502"], stations: [a/1], functions: [6],
        range: "400001"}
     - {name: yes, allow: [write], range: {table: holding-registers, address: 5, count: 2}}
-mqtt: {broker: "mqtts://b:8883", topic: x, qos: 1, client_id: x, username: x, store: 200,
+mqtt: {broker: "mqtts://b:8883", topic: x, qos: 1, home_assistant: true, client_id: x, username: x, store: 200,
        password_file: /run/secrets/ops, keep_alive: 60s, write: none, ca: /run/secrets/ops,
        certificate: /run/secrets/ops, key: /run/secrets/ops}
 relays: [{from: a-1/400001, to: a-1/400101, on_change: true, refresh: 60s}]
