@@ -222,7 +222,13 @@ const Keys<StationBody, StationView>& station_keys() {
                 "points", [](auto& of) -> auto& { return of.station.points; }, point_keys,
                 "[{name: temperature, at: UW100}]", points::kMaxPoints, load_point,
                 &points::Point::name, "Values by name.")
-            .weaker(By::added);
+            .weaker(By::added)
+            .value(
+                shape_of("points_file", Kind::text,
+                         "Table of further points (CSV): a row a point, a column a key."),
+                [](Reader& in, StationBody& of) { return read_points_file(in, of.station); },
+                [](const StationView& of) { return of.station.points_file; })
+            .example("press.csv");
     return kKeys;
 }
 

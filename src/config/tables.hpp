@@ -81,6 +81,7 @@ std::optional<Line> load_line(Reader& root, const yaml::Node& node);
 /// Reads a line's station, and its settings into those of the line's arbiter.
 void load_station(Reader& owner, const yaml::Node& node, Line& line);
 std::optional<points::Poll> load_poll(Reader& owner, const yaml::Node& node);
+bool read_points_file(Reader& in, Station& station);
 std::optional<points::Point> load_point(Reader& owner, const yaml::Node& node);
 std::optional<tcp_server::Settings> load_listener(Reader& root, const yaml::Node& node);
 /// The keys that say which panels a client reaches; its units are from `first` to `last`.

@@ -1,11 +1,14 @@
 """Points, polls, the memory of max_age, guards and relays, on the real program."""
 import contextlib
+import csv
+import io
 import pathlib
 import re
 import struct
 import tempfile
 import threading
 import unittest
+import urllib.request
 
 import config
 import harness
@@ -133,6 +136,38 @@ SELDOM = config.gateway(config.line(stations="""
          {name: level, at: UW100, writable: true, every: 1min},
          {name: other, at: UW300, every: 1min},
          {name: running, at: UB1632, every: 1min}]}"""), http=config.ADMIN)
+
+
+class Table(unittest.TestCase):
+    POINTS = """
+         {name: level, at: UW100, type: i16, scale: 0.1, offset: -3, unit: celsius, writable: true, min: -1.5, max: 400,
+          no_value: [-32768, 7], report: {deadband: 0.5, at_most: 1s, at_least: 1min}, overview: true},
+         {name: total, at: UW102, type: u32, word_order: CDAB, every: 250ms},
+         {name: recipe, at: UW110, type: string, length: 5},
+         {name: running, at: UB1632, writable: true}, {name: door, at: UW131, bit: 3},
+         {name: mode, at: UW105, labels: {0: "stopped", 1: "it's, \\"on\\""}, writable: true}"""
+
+    def table_of(self, text):
+        with harness.configured(text) as program:
+            asked = urllib.request.Request(f"http://127.0.0.1:{program.http_port()}/api/v1/points",
+                                           headers={"Accept": "text/csv"})
+            with urllib.request.urlopen(asked, timeout=harness.PATIENCE) as answer:
+                return answer.read().decode()
+
+    def test_points_out_as_csv_and_in_again_are_equal(self):
+        station = "{{id: 31, name: press, profile: autonics-gplp-s, {}}}"
+        told = self.table_of(config.gateway(config.line(stations=station.format(f"points: [{self.POINTS}]"))))
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "press.csv"
+            file.write_text(told, newline="")
+            again = self.table_of(config.gateway(config.line(stations=station.format(f"points_file: {file}"))))
+
+        def keys(text):
+            rows = list(csv.DictReader(io.StringIO(text)))
+            return [{name: cell for name, cell in row.items() if name not in ("value", "label", "quality", "age_ms")}
+                    for row in rows]
+        self.assertEqual(len(keys(told)), 6)
+        self.assertEqual(keys(told), keys(again))
 
 
 class Written(unittest.TestCase):

@@ -47,7 +47,8 @@ struct Station {
     bool automatic_gap = true;  ///< `frame_gap` is not set, so it depends on the baud rate
     bool translate = true;      ///< functions that its panel lacks are sent as equivalent ones
     sim::Misbehaviour faults;   ///< faults of the simulated panel
-    std::vector<points::Point> points;
+    std::vector<points::Point> points;  ///< of the file itself, then of `points_file`
+    std::string points_file;            ///< path; "": none
     std::vector<points::Poll> polls;
     friend bool operator==(const Station&, const Station&) = default;
 };

@@ -15,11 +15,52 @@ namespace {
 
 using points::Point;
 
-constexpr std::string_view kColumns[] = {"name",   "value", "label", "unit",    "quality",
-                                         "age_ms", "at",    "type",  "writable"};
-constexpr std::string_view kColumnsOfAll[] = {"line",  "station", "name",    "value",
-                                              "label", "unit",    "quality", "age_ms",
-                                              "at",    "type",    "writable"};
+// The columns behind `writable` make the text a `points_file`.
+constexpr std::string_view kColumns[] = {
+    "name", "value",    "label",  "unit",     "quality",    "age_ms", "at",
+    "type", "writable", "bit",    "length",   "word_order", "scale",  "offset",
+    "min",  "max",      "labels", "no_value", "every",      "report", "overview"};
+constexpr std::string_view kColumnsOfAll[] = {
+    "line", "station", "name",     "value",    "label",  "unit",       "quality", "age_ms",
+    "at",   "type",    "writable", "bit",      "length", "word_order", "scale",   "offset",
+    "min",  "max",     "labels",   "no_value", "every",  "report",     "overview"};
+
+std::string ms_text(Duration duration) { return std::to_string(whole_ms(duration)) + "ms"; }
+
+/// Lists and maps as the configuration has them.
+std::string labels_text(const Point& point) {
+    std::string text;
+    for (const auto& [raw, label] : point.labels)
+        text += (text.empty() ? "{" : ", ") + std::to_string(raw) + ": " +
+                json_text(json::value(label));
+    return text.empty() ? text : text + '}';
+}
+
+std::string report_text(const points::ReportRule& rule) {
+    std::string text;
+    const auto add = [&](const std::string& part) { text += (text.empty() ? "{" : ", ") + part; };
+    if (rule.deadband) add("deadband: " + number_text(*rule.deadband));
+    if (rule.at_most) add("at_most: " + ms_text(*rule.at_most));
+    if (rule.at_least) add("at_least: " + ms_text(*rule.at_least));
+    return text.empty() ? text : text + '}';
+}
+
+/// What a `points_file` has besides the members of a point.
+void add_keys(json::object& object, const Point& point) {
+    if (point.bit) object["bit"] = *point.bit;
+    if (point.length > 0) object["length"] = point.length;
+    if (point.word_order != points::WordOrder::abcd) object["word_order"] = label(point.word_order);
+    if (point.scale != 1) object["scale"] = point.scale;
+    if (point.offset != 0) object["offset"] = point.offset;
+    if (!point.labels.empty()) object["labels"] = labels_text(point);
+    std::string raws;
+    for (const std::int64_t raw : point.no_value)
+        raws += (raws.empty() ? "[" : ", ") + std::to_string(raw);
+    if (!raws.empty()) object["no_value"] = raws + ']';
+    object["every"] = ms_text(point.every);
+    if (!point.report.empty()) object["report"] = report_text(point.report);
+    if (point.overview) object["overview"] = true;
+}
 
 /// Adds what an input form needs, and the poll interval.
 void describe_settings(json::object& object, const Point& point) {
@@ -95,8 +136,12 @@ Handling get_points(HttpRequest request, const Api* api) {
     add_points(seen, station, Sight(*api->directory, request.caller->who()), now.steady, raw);
     Table table{.directory = api->lent, .name = "points", .columns = kColumns};
     table.count = seen.size();
-    table.entry = [now, seen = std::move(seen), with_raw = raw](std::size_t i) {
-        return describe(now, *seen[i].point, seen[i].reading, with_raw ? &seen[i].items : nullptr);
+    table.entry = [now, seen = std::move(seen), with_raw = raw,
+                   as_csv = wants_csv(request.headers["accept"])](std::size_t i) {
+        json::object object =
+            describe(now, *seen[i].point, seen[i].reading, with_raw ? &seen[i].items : nullptr);
+        if (as_csv) add_keys(object, *seen[i].point);
+        return object;
     };
     co_return table_answer(request, std::move(table));
 }
@@ -109,13 +154,15 @@ Handling get_all_points(HttpRequest request, const Api* api) {
         add_points(seen, station, sight, now.steady, false);
     Table table{.directory = api->lent, .name = "points", .columns = kColumnsOfAll};
     table.count = seen.size();
-    table.entry = [now, seen = std::move(seen)](std::size_t i) {
+    table.entry = [now, seen = std::move(seen),
+                   as_csv = wants_csv(request.headers["accept"])](std::size_t i) {
         const Seen& one = seen[i];
         json::object object;
         object["line"] = one.station->line;
         object["station"] = one.station->name;
         for (const auto& [name, value] : describe(now, *one.point, one.reading, nullptr))
             object[name] = value;
+        if (as_csv) add_keys(object, *one.point);
         return object;
     };
     co_return table_answer(request, std::move(table));

@@ -39,10 +39,10 @@ std::string text_of(const fs::path& path) {
 config::MemoryFiles all_files() {
     const tls::Issued ca = tls::issue_ca("CA", {0, 1});
     const tls::Issued gateway = tls::issue_server(ca, {"gateway"}, {0, 1});
-    std::map<std::string, std::string> texts{{"/run/secrets/ops", "secret-0123456789"},
-                                             {"/run/secrets/other", "other-0123456789"},
-                                             {"/run/secrets/two", "second-0123456789"},
-                                             {"/profiles/own.yaml", text_of(kGeneric)}};
+    std::map<std::string, std::string> texts{
+        {"/run/secrets/ops", "secret-0123456789"}, {"/run/secrets/other", "other-0123456789"},
+        {"/run/secrets/two", "second-0123456789"}, {"/points/a.csv", "name,at\nq,400005\n"},
+        {"/points/b.csv", "name,at\nr,400006\n"},  {"/profiles/own.yaml", text_of(kGeneric)}};
     for (const std::string name : {"/tls/a", "/tls/b"}) {
         texts[name + ".crt"] = gateway.certificate;
         texts[name + ".key"] = gateway.key;
@@ -100,6 +100,7 @@ constexpr const char* kFurther = R"(lines:
     simulate: {echo: true}
     stations:
       - id: 1
+        points_file: /points/a.csv
         timing: {response_timeout: adaptive, adaptive_floor: 30ms, adaptive_ceiling: 700ms,
                  frame_gap: auto, late_window: auto, think_time: 2ms, station_gap: 20ms,
                  after_write: 1s}
@@ -155,7 +156,7 @@ mqtt: {broker: "mqtts://b:8883", format: sparkplug, group: x, node: x,
 )";
 
 constexpr const char* kWords =
-    "0 points sparkplug mqtts://c "
+    "0 points /points/b.csv sparkplug mqtts://c "
     "1 2 3 7 0.2 8 16 20ms 2s 1s none even on off kernel rts low rtu ascii tcp take "
     "refuse read_only high_first master line station pass deny silent exception "
     "viewer operator warn json u16 i16 BADC UW120 GDT220 UB190 400009 400109 "

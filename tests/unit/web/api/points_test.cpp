@@ -210,8 +210,10 @@ TEST_F(ApiPoints, AreATableForSpreadsheets) {
     EXPECT_EQ(reply.header("Content-Type"), "text/csv; charset=utf-8; header=present");
     EXPECT_EQ(reply.header("Vary"), "Accept");
     EXPECT_EQ(reply.body(),
-              "name,value,label,unit,quality,age_ms,at,type,writable\r\n"
-              "oil,9,,bar,good,0,UW7,u16,true\r\nserial,9,,,good,0,UW8,u16,false\r\n");
+              "name,value,label,unit,quality,age_ms,at,type,writable,bit,length,word_order,scale,"
+              "offset,min,max,labels,no_value,every,report,overview\r\n"
+              "oil,9,,bar,good,0,UW7,u16,true,,,,,,0,100,,,1000ms,,\r\n"
+              "serial,9,,,good,0,UW8,u16,false,,,,,,,,,,1000ms,,\r\n");
 }
 
 TEST_F(ApiPoints, OfManyVaryWithBothHeadersThatTheyHeed) {
