@@ -5,17 +5,16 @@
 #include <optional>
 
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/modbus/framing.hpp"
 
 namespace panelgate::line {
 
-/// Turns frames of RTU into ADUs of Modbus/TCP and back (Messaging on TCP/IP V1.0b, 3.1), so that a
-/// device on Ethernet is asked as a line is: one request at a time. A reply counts if its
-/// transaction id is that of the last request; all others come too late. Pure.
+/// Turns RTU frames into ADUs of Modbus/TCP and back, so that a device on Ethernet is asked as a
+/// line is: one request at a time. A reply counts if its transaction id is that of the last
+/// request; all others come too late. Pure.
 class Mbap {
   public:
-    static constexpr std::size_t kHeader = 7;  ///< bytes in front of the PDU: id, 0, length, unit
-    static constexpr std::size_t kLargest = 260;  ///< bytes of an ADU
-    /// What replies() may be given at once, so that its frames fit into kRead + kLargest bytes.
+    /// Bytes that replies() may be given at once: with what waits the frames fit into 1024 bytes.
     static constexpr std::size_t kRead = 512;
 
     /// The ADU for a frame: address, PDU and CRC.
@@ -24,13 +23,16 @@ class Mbap {
     /// Modbus/TCP, and the connection must be closed.
     std::optional<Bytes> replies(ByteView received);
     /// A new connection begins.
-    void restart();
+    void restart() {
+        framer_ = {};
+        waits_ = false;
+    }
 
   private:
-    std::uint16_t id_ = 0;  ///< of the last request
-    std::uint8_t unit_ = 0;
-    bool waits_ = false;  ///< for a reply to the last request
-    Bytes partial_;       ///< the beginning of an ADU
+    modbus::MbapFramer framer_;
+    std::uint16_t id_ = 0;   ///< of the last request
+    std::uint8_t unit_ = 0;  ///< the same
+    bool waits_ = false;     ///< for a reply to the last request
 };
 
 }  // namespace panelgate::line

@@ -60,8 +60,7 @@ TEST(Mbap, ABroadcastHasNoReply) {
 }
 
 TEST(Mbap, WhatIsNoModbusTcpEndsTheConnection) {
-    const Bytes wrong[] = {{0, 1, 0, 7, 0, 3, 5, 3, 2},    // protocol
-                           {0, 1, 0, 0, 0, 1, 5, 3, 2},    // too short
+    const Bytes wrong[] = {{0, 1, 0, 0, 0, 1, 5, 3, 2},    // too short
                            {0, 1, 0, 0, 0, 255, 5, 3, 2},  // too long
                            modbus::encode_adu(5, Bytes{3, 2, 0, 1, 2, 3})};
     for (const Bytes& bytes : wrong) {
