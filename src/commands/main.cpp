@@ -313,7 +313,9 @@ class CommandLine {
 
     /// The options that `scan` and `init` share.
     void add_search(CLI::App* command) {
-        command->add_option("DEVICE", scan_.device, "a serial device, or tcp://HOST:PORT")
+        command
+            ->add_option("DEVICE", scan_.device,
+                         "a serial device, tcp://HOST:PORT or modbus-tcp://HOST:PORT")
             ->required();
         command->add_option("--baud", scan_.baud, "rates to try, such as 9600,38400");
         command->add_option("--parity", scan_.parity, "none, even, odd or a list of them");

@@ -372,7 +372,7 @@ std::string starter_yaml(const Found& found) {
     if (!found.profiles_dir.empty()) text += "profiles_dir: " + quoted(found.profiles_dir) + '\n';
     text +=
         "lines:\n  - name: line1\n    device: " + quoted(found.device) + '\n' +
-        scan::serial_yaml(found.result) +
+        scan::serial_yaml(found.device, found.result) +
         "    timing: {response_timeout: 500ms}   # a panel that is silent for longer has failed\n"
         "    stations:\n";
     for (const scan::StationFinding& finding : found.result.stations)

@@ -159,6 +159,8 @@ void check_webhook(Reader& in, alarms::WebhookSettings& hook) {
         in.problem("url", "https needs ca: the file of the CA that has signed the certificate of " +
                               url->host);
     if (!url->secure && !hook.ca.empty()) in.problem("ca", "ca is for https://");
+    if (url->secure && !hook.ca.empty() && !in.loading.content_of(hook.ca))
+        in.problem("ca", "cannot read " + hook.ca);
 }
 
 const Keys<Settings>& alarm_keys() {

@@ -53,8 +53,9 @@ std::string tcp_hint(std::string_view typed) {
 std::string scheme_hint(std::string_view scheme, std::string_view rest) {
     const std::string place(rest.substr(0, rest.find_first_of("/?")));
     if (scheme.starts_with("mod")) {
-        const bool has_port = line::parse_tcp_device("tcp://" + place).has_value();
-        return write("modbus-tcp://" + place + (has_port ? "" : ":502")) +
+        const std::string tail = line::parse_tcp_device("tcp://" + place) ? "" : ":502";
+        if (!line::parse_tcp_device("tcp://" + place + tail)) return tcp_hint(rest);
+        return write("modbus-tcp://" + place + tail) +
                " for a device that speaks Modbus/TCP, or tcp:// where the far end takes RTU frames "
                "over TCP (raw, transparent)";
     }

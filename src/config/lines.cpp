@@ -317,7 +317,7 @@ std::vector<yaml::Elsewhere> keys_elsewhere() {
 
 /// A device on Ethernet has no wire that could be set up.
 void check_modbus_tcp(Reader& in, Line& line) {
-    for (const std::string_view key : {"serial", "rs485", "echo"})
+    for (const std::string_view key : {"serial", "rs485", "echo", "simulate"})
         if (in.has(key))
             in.problem(key, std::string(key) + " belongs to a serial line: " +
                                 yaml::quote(line.device.device) + " has none; leave it out");

@@ -212,6 +212,10 @@ Duration automatic_hole(const Line& line) {
 void check_common(Reader& in, const LineContext& work, Timing& timing, const Given& given) {
     resolve_timeout(in, timing);
     if (given.has("frame_gap") && timing.frame_gap) check_shortest_gap(in, work, *timing.frame_gap);
+    if (in.has("frame_gap") && work.line.device.modbus_tcp)
+        in.problem("frame_gap",
+                   "frame_gap belongs to a serial line: modbus-tcp:// has none; for a pause behind "
+                   "each reply write station_gap");
     if (given.has("late_window") && timing.settings.late_window == Duration::zero())
         in.warn("late_window",
                 "late_window: 0ms expects no late reply: one that comes all the same may pass for "

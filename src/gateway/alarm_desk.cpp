@@ -75,7 +75,7 @@ void AlarmDesk::apply(const std::vector<alarms::Settings>& settings,
     by_point_.clear();
     for (std::size_t i = 0; i < alarms_.size(); ++i)
         if (!alarms_.settings(i).point.empty()) by_point_.emplace(point_of(alarms_.settings(i)), i);
-    if (ready_) announce_all();
+    announce_all();
     if (asked_) return;
     asked_ = true;
     using Kept = std::vector<std::pair<std::string, std::string>>;
@@ -99,6 +99,7 @@ void AlarmDesk::restore(const std::vector<std::pair<std::string, std::string>>& 
 }
 
 void AlarmDesk::announce_all() const {
+    if (!ready_) return;
     for (std::size_t i = 0; i < alarms_.size(); ++i)
         announce_(alarms_.settings(i), alarms_.status(i));
 }

@@ -46,7 +46,8 @@ AlarmHook::AlarmHook(boost::asio::any_io_executor executor, rt::Clock& clock)
     : clock_(clock), alarm_(clock.make_alarm()), executor_(std::move(executor)) {}
 
 void AlarmHook::apply(const std::optional<alarms::WebhookSettings>& settings) {
-    if (hook_ && settings && hook_->settings() == *settings) return;
+    if (hook_ && settings && hook_->settings().format == settings->format)
+        return hook_->apply(*settings);
     hook_.reset();
     alarm_->cancel();
     if (!settings) return;

@@ -76,7 +76,6 @@ void BrokerDesk::wait_for(const std::shared_ptr<std::atomic<bool>>& closed) {
 void BrokerDesk::take_over(BrokerDesk& before) {
     publisher_.take_over(before.publisher_);
     outbox_ = std::exchange(before.outbox_, std::nullopt);
-    if (outbox_) outbox_->renumbered();
     counters_ = before.counters();
     if (settings_.broker() == before.settings_.broker()) under_way_ = before.under_way_;
 }

@@ -388,7 +388,7 @@ void Gateway::start() {
     if (line_histories_) line_histories_->start();
     servers_.apply(*snapshot_->config, snapshot_->plant, directory(),
                    shown_text(*snapshot_->config), longest_answer());
-    northbound_.start();
+    northbound_.start([this] { alarms_.announce_all(); });
     watch_certificates();
     expired_until_ = rt::wall_now();
     watch_expiry();

@@ -129,6 +129,7 @@ void BrokerSession::keep(const mqtt::Outbox::Texts& texts) {
 }
 
 void BrokerSession::start() {
+    is_started_ = true;
     for (std::size_t i = 0; i < places_.size(); ++i)
         if (auto state = seen(i))
             at_desk([i, state = std::move(*state)](BrokerDesk& desk) { desk.know(i, state); });
@@ -184,7 +185,7 @@ std::optional<mqtt::State> BrokerSession::seen(std::size_t subject) const {
 }
 
 void BrokerSession::look(std::size_t subject) {
-    if (!desk_->has_room()) return;
+    if (!is_started_ || !desk_->has_room()) return;
     Place& place = places_[subject];
     if (place.point != nullptr && !place.point->report.empty()) return look_by_rule(subject, place);
     auto state = seen(subject);
@@ -230,7 +231,7 @@ void BrokerSession::keep(mqtt::Counters counters) {
 
 void BrokerSession::on_alarm(const std::string& name, mqtt::State state) {
     const auto subject = subjects_.find_alarm(name);
-    if (!subject || !desk_->has_room()) return;
+    if (!subject || !is_started_ || !desk_->has_room()) return;
     at_desk([subject = *subject, state = std::move(state)](BrokerDesk& desk) {
         desk.offer(subject, state);
     });
@@ -242,6 +243,7 @@ void BrokerSession::on_bus_event(const std::string& line, const bus::BusEvent& e
     const auto* of_line = std::get_if<bus::LineEvent>(&event);
     const auto subject = subjects_.find_line(line);
     if (of_line == nullptr || !subject || (of_line->up && !of_line->why.empty())) return;
+    if (!is_started_) return;
     mqtt::State state;
     state.value = of_line->up;
     state.text = of_line->up ? "up" : "down: " + of_line->why;
@@ -335,18 +337,19 @@ void Northbound::renew(const tls::Material& files) {
     if (session_) session_->renew(files);
 }
 
-void Northbound::start() {
+void Northbound::start(std::function<void()> started) {
     const auto kept = std::make_shared<mqtt::Outbox::Texts>();
     journal_.ask(
         [kept](const store::Database* from) {
             if (from != nullptr) *kept = from->kept(mqtt::Outbox::kPrefix);
         },
-        [this, kept, life = std::weak_ptr(alive_)] {
+        [this, kept, started = std::move(started), life = std::weak_ptr(alive_)] {
             if (life.expired() || stopped_) return;
             running_ = true;
             if (!session_) return;
             if (!journal_.file().empty()) session_->restore(*kept);
             session_->start();
+            started();
         });
 }
 

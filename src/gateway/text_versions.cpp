@@ -57,18 +57,20 @@ void TextVersions::restore(const Records& kept, Keep keep) {
         if (auto one = parse(record)) kept_.push_back(std::move(*one));
     std::ranges::sort(kept_, {}, [](const Kept& one) { return one.version.version; });
     keep_ = std::move(keep);
+    is_restored_ = true;
     for (const Kept& one : own) add(one.text, one.version.who, one.version.time);
 }
 
 std::vector<web::TextVersion> TextVersions::list() const {
     std::vector<web::TextVersion> versions;
+    if (!is_restored_) return versions;
     for (const Kept& one : kept_) versions.insert(versions.begin(), one.version);
     return versions;
 }
 
 std::optional<std::string> TextVersions::text(std::uint64_t version) const {
     for (const Kept& one : kept_)
-        if (one.version.version == version) return one.text;
+        if (is_restored_ && one.version.version == version) return one.text;
     return std::nullopt;
 }
 

@@ -19,8 +19,8 @@ std::optional<Bytes> Mbap::replies(ByteView received) {
         if (std::holds_alternative<modbus::Broken>(*event)) return std::nullopt;
         const auto* adu = std::get_if<modbus::Adu>(&*event);
         if (adu == nullptr || !waits_ || adu->transaction != id_) continue;
-        waits_ = false;
-        const Bytes frame = modbus::encode_adu(unit_, adu->pdu);
+        waits_ = adu->unit != unit_;
+        const Bytes frame = modbus::encode_adu(adu->unit, adu->pdu);
         frames.insert(frames.end(), frame.begin(), frame.end());
     }
     return frames;

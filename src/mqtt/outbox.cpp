@@ -79,16 +79,13 @@ Outbox::Texts Outbox::next(const Publisher& publisher) {
     Texts texts;
     const auto& waits = publisher.store().entries();
     const auto is_full = [&] { return texts.size() >= kTurn; };
-    const auto forget = [&](std::vector<std::uint64_t>& numbers, const auto& is_gone) {
-        std::erase_if(numbers, [&](std::uint64_t number) {
-            if (is_full() || !is_gone(number)) return false;
-            texts.emplace_back(key_of(number), "");
-            return true;
-        });
-    };
-    forget(stale_, [](std::uint64_t) { return true; });
-    forget(kept_, [&](std::uint64_t number) { return !waits.contains(number); });
-    if (publisher.is_connected() || !stale_.empty()) return texts;
+    for (; !stale_.empty() && !is_full(); stale_.pop_back()) texts.emplace_back(stale_.back(), "");
+    std::erase_if(kept_, [&](std::uint64_t number) {
+        if (is_full() || waits.contains(number)) return false;
+        texts.emplace_back(key_of(number), "");
+        return true;
+    });
+    if (publisher.is_connected()) return texts;
     auto at = kept_.empty() ? waits.begin() : waits.upper_bound(kept_.back());
     for (; at != waits.end() && !is_full(); ++at) {
         texts.emplace_back(key_of(at->first), text_of(publisher.subjects(), at->second));
@@ -100,9 +97,13 @@ Outbox::Texts Outbox::next(const Publisher& publisher) {
 void Outbox::restore(Publisher& publisher, const Texts& kept) {
     for (const auto& [key, text] : kept) {
         const auto number = to_number<std::uint64_t>(std::string_view(key).substr(kPrefix.size()));
-        if (number) stale_.push_back(*number);
-        if (auto change = parse(publisher.subjects(), text))
-            publisher.restore(change->first, std::move(change->second));
+        auto change = number ? parse(publisher.subjects(), text) : std::nullopt;
+        if (!change) {
+            stale_.push_back(key);
+            continue;
+        }
+        kept_.push_back(*number);
+        publisher.restore(*number, change->first, std::move(change->second));
     }
 }
 

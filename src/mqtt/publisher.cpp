@@ -44,7 +44,7 @@ void Publisher::take_over(const Publisher& before) {
         if (here[i]) states_[*here[i]] = before.states_[i];
     }
     for (const auto& [number, waits] : before.store_.entries())
-        if (here[waits.subject]) change(*here[waits.subject], waits.state);
+        if (here[waits.subject]) restore(number, *here[waits.subject], waits.state);
     if (settings_.broker() != before.settings_.broker()) return;
     for (const auto& [number, message] : before.results_.entries()) results_.add(message);
     clear_stale_topics(before);

@@ -171,7 +171,8 @@ std::string nothing_answered(const Result& result) {
 
 }  // namespace
 
-std::string serial_yaml(const Result& result) {
+std::string serial_yaml(const std::string& device, const Result& result) {
+    if (device.starts_with("modbus-tcp://")) return "";
     const SerialFormat format = result.format.value_or(SerialFormat{});
     const std::string supposed =
         result.remote ? "    # what the far end is set to; supposed from the panels found\n" : "";
@@ -210,7 +211,7 @@ std::string report_yaml(const std::string& device, const Result& result,
         text += "# incomplete: the scan was interrupted\n";
     if (!profiles_dir.empty()) text += "profiles_dir: " + yaml_text(profiles_dir) + '\n';
     text += "lines:\n  - name: line1\n    device: " + yaml_text(device) + '\n' +
-            serial_yaml(result) + "    stations:\n";
+            serial_yaml(device, result) + "    stations:\n";
     for (const StationFinding& finding : result.stations) text += yaml_station(finding);
     return text + "modbus_tcp:\n  - listen: 127.0.0.1:1502\n";  // a configuration needs a server
 }

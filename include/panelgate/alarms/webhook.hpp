@@ -24,6 +24,8 @@ class Webhook {
 
     explicit Webhook(WebhookSettings settings) : settings_(std::move(settings)) {}
 
+    /// Other settings with the same format: what waits is sent by these.
+    void apply(WebhookSettings settings) { settings_ = std::move(settings); }
     void on_change(const Change& change);
     /// The body of a request that is due. settle() must follow before the next call.
     std::optional<std::string> next(TimePoint now);

@@ -42,6 +42,8 @@ class AlarmDesk : public web::AlarmSource {
     /// Values of the points among these wants of the station's polls.
     void on_points(const Station& station, const std::vector<std::size_t>& wants);
 
+    /// Announces every alarm, if the states are known already.
+    void announce_all() const;
     std::vector<web::AlarmView> list() const override;
     Acknowledged acknowledge(const std::string& name, const std::string& who) override;
 
@@ -57,7 +59,6 @@ class AlarmDesk : public web::AlarmSource {
 
     alarms::Alarms::Time time() const;
     void restore(const std::vector<std::pair<std::string, std::string>>& kept);
-    void announce_all() const;
     void look();
     Sights look_around() const;
     std::optional<alarms::Change> look_at(std::size_t alarm, const Sights& sights);

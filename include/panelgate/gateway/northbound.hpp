@@ -126,6 +126,7 @@ class BrokerSession : public std::enable_shared_from_this<BrokerSession> {
     std::map<const Station*, Numbers> numbers_;
     std::unique_ptr<rt::Alarm> alarm_;  ///< of the sweep
     std::size_t swept_ = 0;
+    bool is_started_ = false;
     mqtt::Counters counters_;
     TopicRefusals refused_;             ///< null: nobody wants to know
     WhoRef who_;                        ///< who writes: whoever may publish at the broker
@@ -145,8 +146,9 @@ class Northbound {
     /// Serves this snapshot from now on; without `mqtt:` nothing. If broker, points and stations
     /// are the same, the connection stays; else it is made anew, and queued messages are kept.
     void show(const std::shared_ptr<const Snapshot>& snapshot);
-    /// Connects to the broker as soon as the journal has told what waits from before.
-    void start();
+    /// Connects to the broker as soon as the journal has told what waits from before; nothing is
+    /// published earlier. Then `started` is called: alarms are to be reported once more.
+    void start(std::function<void()> started);
     /// Sends the last message. No effect if it was sent already.
     void stop();
     /// True if the broker has got the last message, or it is not waited for any more.

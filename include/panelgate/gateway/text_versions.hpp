@@ -29,7 +29,7 @@ class TextVersions {
     /// The records of a former program come before the texts added so far; from now on `keep` gets
     /// each new one. Records that cannot be read are left out.
     void restore(const Records& kept, Keep keep);
-    /// The newest first.
+    /// The newest first; none before restore(), because numbers are not known before.
     std::vector<web::TextVersion> list() const;
     std::optional<std::string> text(std::uint64_t version) const;
 
@@ -41,7 +41,8 @@ class TextVersions {
     static std::optional<Kept> parse(const std::string& record);
 
     std::vector<Kept> kept_;  ///< the newest last
-    Keep keep_;               ///< null until restore()
+    Keep keep_;
+    bool is_restored_ = false;
 };
 
 }  // namespace panelgate::gateway

@@ -23,12 +23,10 @@ class Outbox {
     /// Puts the changes of these texts, as they were kept, into the publisher's store. Changes of
     /// subjects that are gone are left out.
     void restore(Publisher& publisher, const Texts& kept);
-    /// The changes have other numbers now: another publisher has taken them over.
-    void renumbered() { stale_ = std::exchange(kept_, {}); }
 
   private:
-    std::vector<std::uint64_t> kept_;   ///< numbers, rising
-    std::vector<std::uint64_t> stale_;  ///< numbers whose keys are to be forgotten
+    std::vector<std::uint64_t> kept_;  ///< numbers, rising
+    std::vector<std::string> stale_;   ///< keys to be forgotten
 };
 
 }  // namespace panelgate::mqtt

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -35,6 +36,14 @@ class Kept {
             ++dropped_;
         }
         entries_.emplace_hint(entries_.end(), free_++, std::move(entry));
+    }
+    /// Puts an entry from before back under its own number, before any other is added.
+    void restore(std::uint64_t number, Entry entry) {
+        entries_.emplace(number, std::move(entry));
+        free_ = std::max(free_, number + 1);
+        if (entries_.size() <= limit_) return;
+        entries_.erase(entries_.begin());
+        ++dropped_;
     }
     /// Returns the next entry and marks it as in flight; null if none waits.
     const typename Numbered::value_type* next() {
@@ -83,8 +92,10 @@ class Publisher {
     /// Sets a subject's state before there is a connection, if it has none: births publish it, and
     /// it takes no room in the store.
     void know(std::size_t subject, State state);
-    /// Puts a change from before a restart behind those in the store.
-    void restore(std::size_t subject, State state) { change(subject, std::move(state)); }
+    /// Puts a change from before back into the store, under its own number: before any offer().
+    void restore(std::uint64_t number, std::size_t subject, State state) {
+        store_.restore(number, {number, subject, std::move(state)});
+    }
     /// Updates a subject's state. True if the state will be published: if it changed, or `again`.
     bool offer(std::size_t subject, State state, bool again = false);
     /// Publishes its current state again.

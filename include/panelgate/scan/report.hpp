@@ -86,12 +86,13 @@ std::string report_text(const std::string& device, const Result& result,
                         const std::string& ending = {});
 
 /// The same as a configuration of one line, complete and valid if a station was found. `device` is
-/// an absolute path or tcp://HOST:PORT; `profiles_dir` is empty or an absolute path.
+/// an absolute path, tcp:// or modbus-tcp://HOST:PORT; `profiles_dir` is empty or an absolute path.
 std::string report_yaml(const std::string& device, const Result& result,
                         const std::string& profiles_dir = {});
 
-/// Returns the line `serial:` of that configuration, indented, with a comment where it is supposed.
-std::string serial_yaml(const Result& result);
+/// Returns the line `serial:` of that configuration, indented, with a comment where it is supposed;
+/// "" of a device on Ethernet.
+std::string serial_yaml(const std::string& device, const Result& result);
 
 /// Returns the entries of these stations only, for the `stations:` of the named line.
 std::string stations_yaml(const std::string& line, const std::vector<StationFinding>& stations);

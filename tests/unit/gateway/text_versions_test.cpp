@@ -18,6 +18,7 @@ const WallTime kNow{std::chrono::microseconds(1'700'000'000'123'456)};
 
 TEST(TextVersions, KeepTheLastTenThatDiffer) {
     TextVersions versions;
+    versions.restore({}, nullptr);
     for (int i = 1; i <= 12; ++i) {
         versions.add("text " + std::to_string(i), "ops", kNow);
         versions.add("text " + std::to_string(i), "again", kNow);
@@ -58,6 +59,7 @@ TEST(TextVersions, GoOnBehindThoseOfAFormerProgram) {
 TEST(TextVersions, ATextThatRanBeforeTheStoreAnsweredIsKept) {
     TextVersions versions;
     versions.add("lines: []\n", "start", kNow);
+    EXPECT_THAT(versions.list(), SizeIs(0)) << "its number is not known";
     std::size_t kept = 0;
     versions.restore({}, [&](const std::string&, const std::string&) { ++kept; });
     EXPECT_EQ(kept, 1U);

@@ -32,10 +32,10 @@ TEST(Mbap, ARequestHasANewTransactionIdAndNoCrc) {
     EXPECT_EQ(mbap.request(modbus::encode_adu(5, kRead)), adu(2, 5, kRead));
 }
 
-TEST(Mbap, AReplyIsAFrameOfTheUnitThatWasAskedHoweverTheBytesCome) {
+TEST(Mbap, AReplyIsAFrameHoweverItsBytesCome) {
     Mbap mbap;
     mbap.request(modbus::encode_adu(5, kRead));
-    const Bytes bytes = adu(1, 255, kReply);  // devices that echo another unit id
+    const Bytes bytes = adu(1, 5, kReply);
     for (std::size_t i = 0; i + 1 < bytes.size(); ++i)
         EXPECT_THAT(mbap.replies(ByteView(bytes).subspan(i, 1)).value(), IsEmpty());
     EXPECT_EQ(mbap.replies(ByteView(bytes).last(1)).value(), modbus::encode_adu(5, kReply));
@@ -50,6 +50,13 @@ TEST(Mbap, LateForeignRepeatedAndUnaskedRepliesAreLeftOut) {
     for (const Bytes& one : {adu(99, 6, kReply), adu(2, 6, kReply), adu(2, 6, kReply)})
         all.insert(all.end(), one.begin(), one.end());
     EXPECT_EQ(mbap.replies(all).value(), modbus::encode_adu(6, kReply));
+}
+
+TEST(Mbap, AReplyOfAnotherUnitIsThatUnitsAndTheOneAskedMayStillAnswer) {
+    Mbap mbap;
+    mbap.request(modbus::encode_adu(5, kRead));
+    EXPECT_EQ(mbap.replies(adu(1, 6, kReply)).value(), modbus::encode_adu(6, kReply));
+    EXPECT_EQ(mbap.replies(adu(1, 5, kReply)).value(), modbus::encode_adu(5, kReply));
 }
 
 TEST(Mbap, ABroadcastHasNoReply) {
