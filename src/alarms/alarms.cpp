@@ -107,14 +107,13 @@ std::optional<TimePoint> Alarms::next() const {
     return next;
 }
 
-std::optional<Change> Alarms::acknowledge(Time time, std::string_view name, std::string by) {
+std::optional<Change> Alarms::acknowledge(std::string_view name, std::string by) {
     const auto found = find(name);
     if (!found) return std::nullopt;
     Alarm& alarm = alarms_[*found];
     Status& status = alarm.status;
     if (status.state != State::active && status.state != State::cleared) return std::nullopt;
     status.state = status.state == State::active ? State::acknowledged : State::normal;
-    status.since = time.wall;
     status.by = std::move(by);
     return Change{Change::Kind::acknowledged, &alarm.settings, status};
 }

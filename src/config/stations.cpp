@@ -329,6 +329,11 @@ void read_station(Reader& in, StationBody body) {
     settings.max_bits = read_limit(*station.profile, {kReadCoils, kReadDiscreteInputs}, 2000);
     settings.vouched = station.profile->name != "generic";  // generic only repeats the standard
     in.finish();
+    constexpr std::ptrdiff_t kTile = 3;  // values on a tile
+    if (std::ranges::count_if(station.points, &points::Point::overview) > kTile)
+        in.problem("points",
+                   "at most 3 points of a station have overview: true; its tile has no "
+                   "room for more");
     if (station.listens) check_listening(in, settings, station);
 }
 

@@ -197,7 +197,7 @@ std::vector<web::AlarmView> AlarmDesk::list() const {
 web::AlarmSource::Acknowledged AlarmDesk::acknowledge(const std::string& name,
                                                       const std::string& who) {
     if (!alarms_.find(name)) return Acknowledged::unknown;
-    const auto change = alarms_.acknowledge(time(), name, who);
+    const auto change = alarms_.acknowledge(name, who);
     if (!change) return Acknowledged::nothing;
     on_change(change);
     return Acknowledged::done;

@@ -148,6 +148,7 @@ struct ConfigurationText::Job {
     std::shared_ptr<const config::Config> running;
     std::string before{};  ///< the file's text until then
     web::TextVerdict verdict{};
+    bool is_back = false;  ///< the file is as it was before
 
     web::TextVerdict::State check_and_write();
     void put_back();
@@ -179,7 +180,7 @@ web::TextVerdict::State ConfigurationText::Job::check_and_write() try {
 
 /// Runs in the worker. What somebody else has written meanwhile stays.
 void ConfigurationText::Job::put_back() {
-    if (read(file).sha256 == verdict.sha256) replace_file(file, before);
+    is_back = read(file).sha256 == verdict.sha256 && replace_file(file, before).empty();
 }
 
 ConfigurationText::ConfigurationText(boost::asio::any_io_executor executor, Reloader& reloader,
@@ -259,7 +260,11 @@ void ConfigurationText::reload(const std::shared_ptr<Job>& job) {
             return job->handler(std::move(job->verdict));
         job->verdict.state = web::TextVerdict::State::not_applied;
         job->verdict.why = job->verdict.reload->why;
-        worker_->run([job] { job->put_back(); }, [job] { job->handler(std::move(job->verdict)); });
+        worker_->run([job] { job->put_back(); },
+                     [this, job] {
+                         if (job->is_back) reloader_.taken_back();
+                         job->handler(std::move(job->verdict));
+                     });
     });
 }
 

@@ -130,6 +130,8 @@ void BrokerSession::keep(const mqtt::Outbox::Texts& texts) {
 
 void BrokerSession::start() {
     is_started_ = true;
+    for (auto& [subject, state] : std::exchange(early_, {}))
+        at_desk([subject, state](BrokerDesk& desk) { desk.know(subject, state); });
     for (std::size_t i = 0; i < places_.size(); ++i)
         if (auto state = seen(i))
             at_desk([i, state = std::move(*state)](BrokerDesk& desk) { desk.know(i, state); });
@@ -243,11 +245,14 @@ void BrokerSession::on_bus_event(const std::string& line, const bus::BusEvent& e
     const auto* of_line = std::get_if<bus::LineEvent>(&event);
     const auto subject = subjects_.find_line(line);
     if (of_line == nullptr || !subject || (of_line->up && !of_line->why.empty())) return;
-    if (!is_started_) return;
     mqtt::State state;
     state.value = of_line->up;
     state.text = of_line->up ? "up" : "down: " + of_line->why;
     state.time = rt::wall_now();
+    if (!is_started_) {
+        early_[*subject] = std::move(state);
+        return;
+    }
     at_desk([subject = *subject, state](BrokerDesk& desk) { desk.offer(subject, state); });
     look_at_stations(line, {});  // they are unknown now
 }

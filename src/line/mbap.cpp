@@ -6,6 +6,19 @@
 
 namespace panelgate::line {
 
+namespace {
+
+/// A gateway's own 0A and 0B (AP V1.1b3, 7): no unit has answered, as on a serial line.
+bool says_nobody_answered(ByteView pdu) {
+    constexpr std::uint8_t kException = 0x80;
+    constexpr std::uint8_t kPathUnavailable = 0x0A;
+    constexpr std::uint8_t kNoResponse = 0x0B;
+    return pdu.size() == 2 && (pdu[0] & kException) != 0 &&
+           (pdu[1] == kPathUnavailable || pdu[1] == kNoResponse);
+}
+
+}  // namespace
+
 Bytes Mbap::request(ByteView frame) {
     unit_ = frame[0];
     waits_ = unit_ != modbus::kBroadcast;
@@ -20,6 +33,7 @@ std::optional<Bytes> Mbap::replies(ByteView received) {
         const auto* adu = std::get_if<modbus::Adu>(&*event);
         if (adu == nullptr || !waits_ || adu->transaction != id_) continue;
         waits_ = adu->unit != unit_;
+        if (says_nobody_answered(adu->pdu)) continue;
         const Bytes frame = modbus::encode_adu(adu->unit, adu->pdu);
         frames.insert(frames.end(), frame.begin(), frame.end());
     }

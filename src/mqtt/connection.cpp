@@ -202,7 +202,10 @@ int Connection::publish(const Message& message) {
 
 void Connection::subscribe(const std::string& filter) {
     int id = 0;
-    if (mosquitto_subscribe(session_.get(), &id, filter.c_str(), 0) == MOSQ_ERR_SUCCESS)
+    // A broker of MQTT 5 then tells a message that was published as retained from another one.
+    const int options = protocol_ == Protocol::mqtt5 ? MQTT_SUB_OPT_RETAIN_AS_PUBLISHED : 0;
+    if (mosquitto_subscribe_v5(session_.get(), &id, filter.c_str(), 0, options, nullptr) ==
+        MOSQ_ERR_SUCCESS)
         asked_[id] = filter;
 }
 

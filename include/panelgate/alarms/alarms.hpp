@@ -25,7 +25,7 @@ std::optional<State> state_of(std::string_view label);
 /// An alarm as it is now.
 struct Status {
     State state = State::normal;
-    WallTime since{};               ///< of the state
+    WallTime since{};               ///< when the condition began or ended
     std::optional<double> value{};  ///< that was read last, of an alarm of a point
     std::string by{};               ///< who acknowledged last; "": nobody
 
@@ -66,7 +66,7 @@ class Alarms {
     std::optional<TimePoint> next() const;
     /// An operator has seen the alarm. Returns nothing for an unknown name, and for an alarm that
     /// is normal or acknowledged.
-    std::optional<Change> acknowledge(Time time, std::string_view name, std::string by);
+    std::optional<Change> acknowledge(std::string_view name, std::string by);
 
     std::size_t size() const { return alarms_.size(); }
     const Settings& settings(std::size_t alarm) const { return alarms_[alarm].settings; }

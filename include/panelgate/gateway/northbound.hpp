@@ -127,6 +127,7 @@ class BrokerSession : public std::enable_shared_from_this<BrokerSession> {
     std::unique_ptr<rt::Alarm> alarm_;  ///< of the sweep
     std::size_t swept_ = 0;
     bool is_started_ = false;
+    std::map<std::size_t, mqtt::State> early_;  ///< of lines, before the start
     mqtt::Counters counters_;
     TopicRefusals refused_;             ///< null: nobody wants to know
     WhoRef who_;                        ///< who writes: whoever may publish at the broker

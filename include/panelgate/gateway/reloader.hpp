@@ -76,6 +76,8 @@ class Reloader final : public web::ReloadSource {
     std::string barred(bool rollback) const override;
     void reload(web::ReloadWish wish, std::string cause, Handler handler) override;
     std::shared_ptr<const web::ReloadVerdict> last() const override { return last_; }
+    /// Whoever wrote the text that was refused has put the former text back.
+    void taken_back() { counters_.last_succeeded = true; }
     const config::ReloadCounters& counters() const { return counters_; }
     const std::string& file() const { return file_; }
     /// Why there is no file to be read; empty: there is.

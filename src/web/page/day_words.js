@@ -3,6 +3,7 @@ export const words = {
 "nav.alarms": ["Alarms", "Alarme", "알람", "アラーム"],
 "nav.journal": ["Events", "Ereignisse", "이벤트", "イベント"],
 "nav.history": ["History", "Verlauf", "이력", "履歴"],
+"counts.alarms": ["alarms nobody has acknowledged {count}", "nicht quittierte Alarme {count}", "미확인 알람 {count}", "未確認のアラーム {count}"],
 "counts.well": ["all is well", "alles in Ordnung", "모두 정상", "すべて正常"],
 "view.unknown": ["There is no such view, or you may not see it: this is the overview.", "Diese Ansicht gibt es nicht, oder Sie dürfen sie nicht sehen: Dies ist die Übersicht.", "해당 보기가 없거나 볼 권한이 없습니다. 개요를 표시합니다.", "その表示がないか、閲覧できません。概要を表示しています。"],
 "what": ["What", "Was", "내용", "内容"],

@@ -51,6 +51,7 @@ export function historyView({argument, detail}) {
     let entries = [];
     const names = [];
     const units = new Map();  // of each name
+    const bits = new Set();   // names of points that are on or off
     const chosen = new Set(argument && detail ? [`${argument}/${detail}`] : []);
     const box = h('div', {class: 'plot tall', role: 'img', 'aria-label': t('nav.history')});
     const said = h('p', {class: 'muted plot-values'});
@@ -67,7 +68,7 @@ export function historyView({argument, detail}) {
         const others = [...chosen].filter((name) => units.get(name) !== units.get(first));
         const unitsOf = (all) => [...new Set(all.map((name) => units.get(name)).filter(Boolean))].join(', ');
         const axis = {axisLabelFormatter: (v) => number(v, 2), axisLabelWidth: 46};
-        return {axes: {y: axis, y2: axis}, series: Object.fromEntries(others.map((name) => [name, {axis: 'y2'}])),
+        return {axes: {y: axis, y2: axis}, series: Object.fromEntries([...chosen].map((name) => [name, {...others.includes(name) ? {axis: 'y2'} : {}, stepPlot: bits.has(name)}])),
             ylabel: unitsOf([...chosen].filter((name) => !others.includes(name))), y2label: others.length > 0 ? unitsOf(others) : ''};
     };
     /** True once the first look has shown that less time than a day is kept, and a shorter span is read. */
@@ -85,11 +86,15 @@ export function historyView({argument, detail}) {
     const draw = async (all, step) => {
         const Dygraph = await library();
         const rows = rowsOf(all, step);
+        const now = Date.now();
+        const gap = all.map(() => [null, null, null]);
+        if (rows.length > 0) rows.unshift([new Date(Math.min(now - span, rows[0][0])), ...gap]);
+        if (rows.length > 1) rows.push([new Date(Math.max(now, rows.at(-1)[0].getTime() + 1)), ...gap]);
         if (ended) return;
         graph?.destroy();
         graph = null;
         none.hidden = rows.length > 0 || chosen.size === 0;
-        say(null, rows.at(-1)?.slice(1).map((one) => one[1]) ?? []);
+        say(null, rows.at(-2)?.slice(1).map((one) => one[1]) ?? []);
         if (rows.length < 2) return;
         graph = new Dygraph(box, rows, {labels: ['t', ...chosen], colors: COLOURS.map(colour), customBars: true, strokeWidth: 1.5, fillAlpha: 0.25,
             axisLineColor: colour('border'), gridLineColor: colour('border'), animatedZooms: false, showRangeSelector: true, rangeSelectorHeight: 30,
@@ -131,6 +136,7 @@ export function historyView({argument, detail}) {
                 if (point.type === 'string') continue;
                 names.push(`${station.name}/${point.name}`);
                 units.set(names.at(-1), word('unit', point.unit));
+                if (point.type === 'bool') bits.add(names.at(-1));
             }
         }
         if (chosen.size === 0 && names.length > 0) chosen.add(names[0]);

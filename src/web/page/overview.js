@@ -168,8 +168,9 @@ export function overviewView() {
         const said = [t('counts', {lines: live.lines.length, stations: live.stations.length, bad: live.old ? '?' : bad})];
         if (down > 0) said.push(t('counts.down', {down}));
         if (bad + down === 0 && isWell()) said.push(t('counts.well'));
+        if (alarms.waiting.length > 0) said.push(t('counts.alarms', {count: alarms.waiting.length}));
+        attribute(counts, 'class', bad + down + alarms.waiting.length > 0 ? 'counts bad' : 'counts');
         text(counts, said.join(' · '));
-        attribute(counts, 'class', bad + down > 0 ? 'counts bad' : 'counts');
         const found = live.findings.filter((one) => !one.line);
         showFindings(findings, found);
         own.hidden = found.length === 0;

@@ -43,21 +43,21 @@ TEST_F(AlarmsTest, EachTransitionOfTheFourStates) {
     alarms.apply({hot()});
     EXPECT_EQ(read(1, 81), "raised");
     EXPECT_EQ(state(), State::active);
-    EXPECT_TRUE(alarms.acknowledge(at(2), "hot", "mia"));
+    EXPECT_TRUE(alarms.acknowledge("hot", "mia"));
     EXPECT_EQ(state(), State::acknowledged);
-    EXPECT_FALSE(alarms.acknowledge(at(2), "hot", "tom")) << "somebody has";
+    EXPECT_FALSE(alarms.acknowledge("hot", "tom")) << "somebody has";
     EXPECT_EQ(read(3, 70), "cleared");
     EXPECT_EQ(state(), State::normal) << "an acknowledged alarm that ends is over";
-    EXPECT_FALSE(alarms.acknowledge(at(3), "hot", "mia")) << "nothing to acknowledge";
+    EXPECT_FALSE(alarms.acknowledge("hot", "mia")) << "nothing to acknowledge";
     EXPECT_EQ(read(4, 81), "raised");
     EXPECT_EQ(read(5, 70), "cleared");
     EXPECT_EQ(state(), State::cleared) << "nobody has seen it";
     EXPECT_EQ(read(6, 90), "raised");
     EXPECT_EQ(read(7, 70), "cleared");
-    EXPECT_TRUE(alarms.acknowledge(at(8), "hot", "mia"));
+    EXPECT_TRUE(alarms.acknowledge("hot", "mia"));
     EXPECT_EQ(state(), State::normal);
     EXPECT_EQ(alarms.status(0), (Status{State::normal, at(8).wall, 70, "mia"}));
-    EXPECT_FALSE(alarms.acknowledge(at(9), "cold", "mia")) << "there is none of this name";
+    EXPECT_FALSE(alarms.acknowledge("cold", "mia")) << "there is none of this name";
 }
 
 TEST_F(AlarmsTest, BetweenLimitAndBackNothingChanges) {

@@ -59,6 +59,18 @@ TEST(Mbap, AReplyOfAnotherUnitIsThatUnitsAndTheOneAskedMayStillAnswer) {
     EXPECT_EQ(mbap.replies(adu(1, 5, kReply)).value(), modbus::encode_adu(5, kReply));
 }
 
+TEST(Mbap, AGatewaysOwnExceptionsAreSilence) {
+    Mbap mbap;
+    std::uint16_t id = 0;
+    for (const Bytes& exception : {Bytes{0x83, 0x0A}, Bytes{0x83, 0x0B}}) {
+        mbap.request(modbus::encode_adu(5, kRead));
+        EXPECT_THAT(mbap.replies(adu(++id, 5, exception)).value(), IsEmpty());
+    }
+    mbap.request(modbus::encode_adu(5, kRead));
+    EXPECT_EQ(mbap.replies(adu(3, 5, Bytes{0x83, 2})).value(),
+              modbus::encode_adu(5, Bytes{0x83, 2}));
+}
+
 TEST(Mbap, ABroadcastHasNoReply) {
     Mbap mbap;
     const Bytes write{0x06, 0, 1, 0, 2};
