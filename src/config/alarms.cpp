@@ -47,8 +47,8 @@ void check_station(Reader& in, const Settings& alarm) {
     if (station == nullptr || !is_of_point) return;
     const auto& points = station->points;
     if (std::ranges::find(points, alarm.point, &points::Point::name) == points.end())
-        in.problem(key, yaml::no_such("point of " + alarm.station, alarm.point,
-                                      names_in(points, &points::Point::name)));
+        in.problem(key,
+                   yaml::no_such("point", alarm.point, names_in(points, &points::Point::name)));
 }
 
 void check_place(Reader& in, const Settings& alarm) {

@@ -42,6 +42,10 @@ void find_telnet(Case& c) {
 namespace {
 
 std::string silence_advice(const LineFacts& facts) {
+    if (facts.serial.baud == SerialFormat::kNoWire)
+        return "The TCP connection is up. Check the unit ids, whether the device's Modbus server "
+               "is "
+               "on, and whether the port speaks RTU over TCP (then write tcp://).";
     if (facts.over_tcp)
         return "The TCP connection is up. Check the server's mode (raw or transparent, not "
                "Modbus/TCP), whether it can open its serial port and no other program uses it, its "

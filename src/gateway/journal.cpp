@@ -90,7 +90,8 @@ std::string other_text(const audit::Members& record) {
     std::string text;
     for (const std::string_view key : {"method", "path", "at", "outcome", "cause", "rule", "why"}) {
         const std::string part = web::member_text(record, key);
-        if (!part.empty()) text += (text.empty() ? "" : " ") + part;
+        const bool is_who = key == "cause" && web::member_text(record, "kind") == "reload";
+        if (!part.empty() && !is_who) text += (text.empty() ? "" : " ") + part;
     }
     return text;
 }

@@ -119,6 +119,7 @@ class Editing(Browser):
         self.screenshot("configuration-conflict")
         self.find("#keep-mine").click()
         self.wait(lambda: not self.all("#conflict"))
+        self.assertIn("Nothing is written yet", self.text("#kept"))
         self.saved()
         self.wait(lambda: self.all(".success"))
         self.assertEqual(self.file.read_text(), self.content.replace("hall 1", "hall 7"))

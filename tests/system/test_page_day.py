@@ -40,7 +40,7 @@ class Day(Browser):
         row = 'tr[data-alarm="press-hot"]'
         self.wait(lambda: "normal" in self.text(row))
         self.set_point(50)
-        self.wait(lambda: "The press is too hotactive" in self.text(row))
+        self.wait(lambda: "The press is too hot press-hot · press/setpointactive" in self.text(row))
         self.wait(lambda: self.driver.title.startswith("⚠ 1 · Alarms"))
         self.assertEqual(self.text('#nav a[data-view="alarms"]'), "Alarms (1)")
         self.looks("alarms")

@@ -41,6 +41,12 @@ function beep() {
 
 const TONES = {active: 'bad', acknowledged: 'warn', cleared: 'warn', normal: 'good'};
 
+/** Its name, where the text is another, and what it watches. */
+function about({name, text: shown, station, point}) {
+    const said = [shown === name ? '' : name, [station, point].filter(Boolean).join('/')].filter(Boolean).join(' · ');
+    return said ? [' ', h('small', {class: 'muted'}, said)] : null;
+}
+
 function row(first) {
     const [state, since, value, by] = [h('span'), h('td', {class: 'figure'}), h('td', {class: 'number'}), h('td')];
     const failed = h('small', {class: 'problem'});
@@ -53,7 +59,7 @@ function row(first) {
         }
         alarms.ask().catch(() => {});
     }}, t('acknowledge'));
-    return {node: h('tr', {'data-alarm': first.name}, h('th', {scope: 'row', class: 'wide'}, first.text), h('td', null, state), since, value, h('td', null, word('severity', first.severity)), by, h('td', null, mayAcknowledge() ? button : null, failed)), update: (alarm) => {
+    return {node: h('tr', {'data-alarm': first.name}, h('th', {scope: 'row', class: 'wide'}, first.text, about(first)), h('td', null, state), since, value, h('td', null, word('severity', first.severity)), by, h('td', null, mayAcknowledge() ? button : null, failed)), update: (alarm) => {
         attribute(state, 'class', `badge ${TONES[alarm.state]}`);
         text(state, word('alarm', alarm.state));
         text(since, alarm.since === null ? '–' : clockTime(Date.parse(alarm.since)));

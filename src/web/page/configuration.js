@@ -124,7 +124,7 @@ class View {
         const take = (mine) => () => {
             Object.assign(draft, {base: theirs.text, etag: theirs.etag, text: mine ? draft.text : theirs.text});
             this.editor.set(draft.text);
-            replace(this.said);
+            replace(this.said, mine ? h('p', {class: 'muted', id: 'kept'}, t('text.kept')) : null);
         };
         replace(this.said, h('section', {class: 'card', id: 'conflict', role: 'alert'}, h('h2', null, t('text.conflict')), h('p', null, t('text.conflict.how')),
             differenceView(theirs.text, draft.text), h('div', {class: 'bar end'},

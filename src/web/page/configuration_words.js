@@ -20,6 +20,7 @@ export const words = {
 "text.conflict.how": ["From the file as it is to your text:", "Von der Datei, wie sie ist, zu Ihrem Text:", "현재 파일에서 내 텍스트로:", "現在のファイルからあなたのテキストへ:"],
 "text.theirs": ["Take the file", "Die Datei nehmen", "파일 사용", "ファイルを使う"],
 "text.mine": ["Keep my text", "Meinen Text behalten", "내 텍스트 유지", "自分のテキストを残す"],
+"text.kept": ["Your text stands here, beside the file as it is now. Nothing is written yet: save it.", "Ihr Text steht hier, verglichen mit der Datei, wie sie jetzt ist. Geschrieben ist noch nichts: speichern Sie.", "현재 파일과 비교된 내 텍스트입니다. 아직 저장되지 않았으니 저장하십시오.", "現在のファイルと比べたあなたのテキストです。まだ書き込まれていません。保存してください。"],
 "text.versions": ["Texts that ran", "Texte, die liefen", "실행된 텍스트", "動作したテキスト"],
 "text.version": ["Version", "Version", "버전", "版"],
 "text.who": ["By", "Durch", "변경자", "変更者"],

@@ -56,7 +56,8 @@ TEST_F(AlarmsTest, EachTransitionOfTheFourStates) {
     EXPECT_EQ(read(7, 70), "cleared");
     EXPECT_TRUE(alarms.acknowledge("hot", "mia"));
     EXPECT_EQ(state(), State::normal);
-    EXPECT_EQ(alarms.status(0), (Status{State::normal, at(8).wall, 70, "mia"}));
+    EXPECT_EQ(alarms.status(0), (Status{State::normal, at(7).wall, 70, "mia"}))
+        << "since its end; acknowledging is no other time";
     EXPECT_FALSE(alarms.acknowledge("cold", "mia")) << "there is none of this name";
 }
 

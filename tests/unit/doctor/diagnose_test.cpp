@@ -241,6 +241,14 @@ TEST_F(Diagnose, EveryFindingSaysWhatToDoAndWhy) {
     }
 }
 
+TEST_F(Diagnose, ADeviceOnEthernetHasNoWires) {
+    facts.serial.baud = SerialFormat::kNoWire;
+    const auto all = findings({{1, Mix().silent(9)}, {2, Mix().silent(9)}});
+    ASSERT_EQ(all.size(), 1U);
+    EXPECT_NE(all[0].advice.find("unit ids"), std::string::npos);
+    EXPECT_EQ(all[0].advice.find("wires"), std::string::npos);
+}
+
 /// A plain fault on a line that is otherwise healthy: the right finding, or none.
 struct Fault {
     const char* what;
