@@ -66,7 +66,7 @@ class Prometheus(harness.Helper):
 
     def until(self, condition, meanwhile=lambda: None, told=lambda: "that never was"):
         """What condition() gives as soon as it is true; `meanwhile` is done between two looks."""
-        end = time.monotonic() + 3 * PATIENCE  # an alert looks back over windows of its own
+        end = time.monotonic() + 5 * PATIENCE  # an alert looks back over windows of its own
         while not (found := condition()):
             assert time.monotonic() < end, told()
             meanwhile()

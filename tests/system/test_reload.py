@@ -30,6 +30,14 @@ def other(stations=MIXER, **keys):
     return config.line("other", stations=stations, **keys)
 
 
+def connected(port):
+    """A client, or None while nobody listens."""
+    try:
+        return harness.Client(port)
+    except ConnectionRefusedError:
+        return None
+
+
 def plant(*lines, modbus=config.FREE_PORT, **keys):
     return config.gateway(STEADY, *lines, http=config.ADMIN, modbus=modbus, **keys)
 
@@ -386,7 +394,7 @@ class Reload(unittest.TestCase):
                 running.reload(plant(other(), modbus=f'listen: "127.0.0.2:{port}"'))
                 text = plant(other(), modbus=f'listen: "{host}:{port}"')
                 self.assertEqual(running.reload(text)[1]["outcome"], "applied", host)
-                client = harness.Client(port)
+                client = until(lambda: connected(port))  # the port is opened once the former listener has left it
                 self.assertEqual(client.ask(1, read_registers(100))[0], 3)
                 text = plant(other(IO), modbus=f'listen: "{host}:{port}"')
                 self.assertEqual(running.reload(text)[1]["outcome"], "applied", host)
