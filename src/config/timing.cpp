@@ -267,7 +267,7 @@ void warn_of_broadcasts(Reader& in, const Line& line) {
 bool load_line_timing(Reader& in, LineContext& work) {
     const SerialFormat& serial = work.line.device.serial;
     work.line.arbiter.reply_hole = automatic_hole(work.line);
-    // A reply is known by its transaction id, so that nothing is waited for between two requests.
+    // Modbus/TCP replies carry a transaction id: no gap and no late window before the next request.
     if (work.line.device.modbus_tcp) {
         work.timing.frame_gap = Duration::zero();
         work.timing.settings.late_window = Duration::zero();

@@ -78,15 +78,9 @@ void AlarmDesk::apply(const std::vector<alarms::Settings>& settings,
     announce_all();
     if (asked_) return;
     asked_ = true;
-    using Kept = std::vector<std::pair<std::string, std::string>>;
-    const auto kept = std::make_shared<Kept>();
-    journal_.ask(
-        [kept](const store::Database* from) {
-            if (from != nullptr) *kept = from->kept(kAlarmKey);
-        },
-        [this, kept, life = std::weak_ptr(alive_)] {
-            if (!life.expired()) restore(*kept);
-        });
+    journal_.ask_kept(kAlarmKey, [this, life = std::weak_ptr(alive_)](const Journal::Texts& kept) {
+        if (!life.expired()) restore(kept);
+    });
 }
 
 void AlarmDesk::restore(const std::vector<std::pair<std::string, std::string>>& kept) {

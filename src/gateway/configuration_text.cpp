@@ -194,16 +194,11 @@ ConfigurationText::ConfigurationText(boost::asio::any_io_executor executor, Relo
 }
 
 void ConfigurationText::keep_in(Journal& journal) {
-    const auto kept = std::make_shared<TextVersions::Records>();
-    journal.ask(
-        [kept](const store::Database* from) {
-            if (from != nullptr) *kept = from->kept(TextVersions::kPrefix);
-        },
-        [this, kept, &journal] {
-            versions_.restore(*kept, [&journal](const std::string& key, const std::string& record) {
-                journal.keep(key, record);
-            });
+    journal.ask_kept(TextVersions::kPrefix, [this, &journal](const Journal::Texts& kept) {
+        versions_.restore(kept, [&journal](const std::string& key, const std::string& record) {
+            journal.keep(key, record);
         });
+    });
 }
 
 std::string ConfigurationText::read_only() const { return reloader_.read_only(); }

@@ -279,6 +279,15 @@ void Journal::ask(std::function<void(const store::Database*)> read, std::functio
     store_->ask(answer);
 }
 
+void Journal::ask_kept(std::string_view prefix, std::function<void(const Texts&)> done) {
+    const auto kept = std::make_shared<Texts>();
+    ask(
+        [kept, prefix = std::string(prefix)](const store::Database* from) {
+            if (from != nullptr) *kept = from->kept(prefix);
+        },
+        [kept, done = std::move(done)] { done(*kept); });
+}
+
 void Journal::flush(const std::string& point) {
     const auto running = blocks_.find(point);
     if (store_ && running != blocks_.end()) write(point, running->second);

@@ -82,6 +82,7 @@ bool BrokerSession::fits(const Snapshot& snapshot) const {
 void BrokerSession::show(std::shared_ptr<const Snapshot> snapshot) {
     snapshot_ = std::move(snapshot);
     numbers_.clear();
+    told_.clear();
     renew(snapshot_->config->mqtt->files);
     const explain::BrokerSight sight(*snapshot_->config);
     const auto lines = std::ranges::count_if(
@@ -188,17 +189,17 @@ std::optional<mqtt::State> BrokerSession::seen(std::size_t subject) const {
 
 void BrokerSession::look(std::size_t subject) {
     if (!is_started_ || !desk_->has_room()) return;
-    Place& place = places_[subject];
+    const Place& place = places_[subject];
     if (place.point != nullptr && !place.point->report.empty()) return look_by_rule(subject, place);
     auto state = seen(subject);
     if (!state) return;
     at_desk([subject, state = std::move(*state)](BrokerDesk& desk) { desk.offer(subject, state); });
 }
 
-void BrokerSession::look_by_rule(std::size_t subject, Place& place) {
+void BrokerSession::look_by_rule(std::size_t subject, const Place& place) {
     const TimePoint now = clock_.now();
     const points::PointReading reading = place.station->points->read(*place.point, now);
-    const points::Report report = place.told.take(place.point->report, reading, now);
+    const points::Report report = told_[subject].take(place.point->report, reading, now);
     if (report == points::Report::none) return;
     at_desk([subject, state = state_of(reading), report](BrokerDesk& desk) {
         desk.offer(subject, state, report == points::Report::again);
@@ -343,19 +344,16 @@ void Northbound::renew(const tls::Material& files) {
 }
 
 void Northbound::start(std::function<void()> started) {
-    const auto kept = std::make_shared<mqtt::Outbox::Texts>();
-    journal_.ask(
-        [kept](const store::Database* from) {
-            if (from != nullptr) *kept = from->kept(mqtt::Outbox::kPrefix);
-        },
-        [this, kept, started = std::move(started), life = std::weak_ptr(alive_)] {
-            if (life.expired() || stopped_) return;
-            running_ = true;
-            if (!session_) return;
-            if (!journal_.file().empty()) session_->restore(*kept);
-            session_->start();
-            started();
-        });
+    journal_.ask_kept(mqtt::Outbox::kPrefix,
+                      [this, started = std::move(started),
+                       life = std::weak_ptr(alive_)](const Journal::Texts& kept) {
+                          if (life.expired() || stopped_) return;
+                          running_ = true;
+                          if (!session_) return;
+                          if (!journal_.file().empty()) session_->restore(kept);
+                          session_->start();
+                          started();
+                      });
 }
 
 void Northbound::stop() {

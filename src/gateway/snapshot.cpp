@@ -171,7 +171,6 @@ void remember(Station& station, const std::vector<std::size_t>& wants, TimePoint
 void publish_points(web::EventOutlet& events, Station& station,
                     const std::vector<std::size_t>& wants, TimePoint now) {
     if (!station.points) return;
-    station.told.resize(station.points->points().size());
     for (const std::size_t want : wants) {
         const points::Point* point = station.points->point_of(want);
         if (point == nullptr || !events.is_wanted()) continue;  // a poll block

@@ -24,7 +24,7 @@ class Webhook {
 
     explicit Webhook(WebhookSettings settings) : settings_(std::move(settings)) {}
 
-    /// Other settings with the same format: what waits is sent by these.
+    /// Takes new settings of the same format. Waiting changes are posted to the new URL.
     void apply(WebhookSettings settings) { settings_ = std::move(settings); }
     void on_change(const Change& change);
     /// The body of a request that is due. settle() must follow before the next call.

@@ -8,6 +8,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "panelgate/audit/record.hpp"
@@ -54,6 +56,10 @@ class Journal {
     /// Runs `read` in the store's thread (null: nothing can be read), then `done` in this loop.
     /// Both may be called after the journal's end.
     void ask(std::function<void(const store::Database*)> read, std::function<void()> done);
+    using Texts = std::vector<std::pair<std::string, std::string>>;  ///< key, text
+    /// Calls `done` in this loop with the kept texts whose keys begin with `prefix`; with none if
+    /// nothing can be read. As ask() otherwise.
+    void ask_kept(std::string_view prefix, std::function<void(const Texts&)> done);
     /// Hands over the values of a point, "STATION/POINT", that the store does not have yet.
     void flush(const std::string& point);
     /// Nothing before apply().

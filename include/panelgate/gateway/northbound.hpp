@@ -90,7 +90,6 @@ class BrokerSession : public std::enable_shared_from_this<BrokerSession> {
     struct Place {
         const Station* station = nullptr;  ///< null: a line or an alarm
         const points::Point* point = nullptr;
-        points::Told told{};  ///< of a point with a report rule
     };
     struct Order;
     /// The running writes. Passed from session to session, for answers that come later.
@@ -108,7 +107,7 @@ class BrokerSession : public std::enable_shared_from_this<BrokerSession> {
     void at_desk(std::function<void(BrokerDesk&)> work) const;
     std::optional<mqtt::State> seen(std::size_t subject) const;
     void look(std::size_t subject);
-    void look_by_rule(std::size_t subject, Place& place);
+    void look_by_rule(std::size_t subject, const Place& place);
     void look_at_stations(const std::string& line, std::optional<std::uint8_t> id);
     void sweep();
     mqtt::State state_of(const points::PointReading& reading) const;
@@ -124,7 +123,8 @@ class BrokerSession : public std::enable_shared_from_this<BrokerSession> {
     mqtt::Subjects subjects_;
     std::vector<Place> places_;  ///< by subject
     std::map<const Station*, Numbers> numbers_;
-    std::unique_ptr<rt::Alarm> alarm_;  ///< of the sweep
+    std::map<std::size_t, points::Told> told_;  ///< by subject, of points with a report rule
+    std::unique_ptr<rt::Alarm> alarm_;          ///< of the sweep
     std::size_t swept_ = 0;
     bool is_started_ = false;
     std::map<std::size_t, mqtt::State> early_;  ///< of lines, before the start

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -39,7 +40,8 @@ struct Station : bus::StationRef {
     std::shared_ptr<sim::SimulatedBus> simulated;
     std::optional<points::StationPoints> points;    ///< the values of its polls, if it has points
     std::optional<points::StationHistory> history;  ///< their history, if REST is served
-    std::vector<points::Told> told;                 ///< by point: what events have told
+    /// What events have told of points with a report rule, by point.
+    std::map<std::size_t, points::Told> told;
     /// The unit id of the station at the first listener that serves the station.
     std::optional<int> unit;
 };
