@@ -22,14 +22,14 @@ constexpr Duration kLongest = 24h;
 bool read_point(Reader& in, Settings& alarm) {
     const auto text = in.text("point");
     if (!text) return false;
-    const std::size_t slash = text->find('/');
-    if (slash == text->npos || slash == 0 || slash + 1 == text->size()) {
+    const auto path = parse_point_path(*text);
+    if (!path) {
         in.problem("point", "point must be STATION/POINT such as oven/temperature, not " +
                                 yaml::quote(*text));
         return false;
     }
-    alarm.station = text->substr(0, slash);
-    alarm.point = text->substr(slash + 1);
+    alarm.station = path->station;
+    alarm.point = path->point;
     return true;
 }
 
@@ -41,14 +41,10 @@ std::vector<std::string_view> names_in(const List& list, Name name) {
 }
 
 void check_station(Reader& in, const Settings& alarm) {
-    const bool is_of_point = !alarm.point.empty();
-    const std::string_view key = is_of_point ? "point" : "station";
-    const Station* const station = find_station(in, key, alarm.station);
-    if (station == nullptr || !is_of_point) return;
-    const auto& points = station->points;
-    if (std::ranges::find(points, alarm.point, &points::Point::name) == points.end())
-        in.problem(key,
-                   yaml::no_such("point", alarm.point, names_in(points, &points::Point::name)));
+    if (alarm.point.empty())
+        find_station(in, "station", alarm.station);
+    else
+        find_point(in.loading, in.mark("point"), {alarm.station, alarm.point});
 }
 
 void check_place(Reader& in, const Settings& alarm) {

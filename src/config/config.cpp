@@ -28,4 +28,19 @@ const Line* find_line(const Config& config, std::string_view name) {
     return found == config.lines.end() ? nullptr : &*found;
 }
 
+const Station* station_named(const Config& config, std::string_view name) {
+    for (const Line& line : config.lines)
+        for (const Station& station : line.stations)
+            if (station.name == name) return &station;
+    return nullptr;
+}
+
+const points::Point* point_named(const Config& config, std::string_view station,
+                                 std::string_view point) {
+    const Station* const owner = station_named(config, station);
+    if (owner == nullptr) return nullptr;
+    const auto found = std::ranges::find(owner->points, point, &points::Point::name);
+    return found == owner->points.end() ? nullptr : &*found;
+}
+
 }  // namespace panelgate::config

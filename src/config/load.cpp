@@ -278,6 +278,11 @@ const Keys<Config>& root_keys() {
                 optional_section("alarm_webhook", "{url: http://127.0.0.1:9093/api/v2/alerts}",
                                  &Config::webhook, webhook_keys, check_webhook),
                 shown_section("alarm_webhook", &Config::webhook, webhook_keys))
+            .maps("images", &Config::images, image_keys,
+                  "[{name: plant, unit: 100, points: [press/temperature]}]",
+                  images::Settings::kMost, load_image, &images::Settings::name,
+                  "Points of many stations that clients read as one unit.")
+            .weaker(By::added)
             .map("store", &Config::store, store_keys, "{days: 30}",
                  "Events and history of days, in one file.");
     return kKeys;

@@ -271,14 +271,36 @@ void load_relay(Reader& root, const Node& node, Config& config, std::vector<Rout
 
 }  // namespace
 
-const Station* find_station(Reader& in, std::string_view key, const std::string& name) {
-    const Loading& loading = in.loading;
-    for (const Line& line : loading.config.lines)
-        for (const Station& station : line.stations)
-            if (station.name == name) return &station;
+namespace {
+
+const Station* find_station(Loading& loading, yaml::Mark mark, const std::string& name) {
+    if (const Station* const station = station_named(loading.config, name)) return station;
     const std::vector<std::string_view> names(loading.station_names.begin(),
                                               loading.station_names.end());
-    if (!loading.names_missing) in.problem(key, yaml::no_such("station", name, names));
+    if (!loading.names_missing) loading.problems.add(mark, yaml::no_such("station", name, names));
+    return nullptr;
+}
+
+}  // namespace
+
+const Station* find_station(Reader& in, std::string_view key, const std::string& name) {
+    return find_station(in.loading, in.mark(key), name);
+}
+
+std::optional<PointPath> parse_point_path(const std::string& text) {
+    const std::size_t slash = text.find('/');
+    if (slash == text.npos || slash == 0 || slash + 1 == text.size()) return std::nullopt;
+    return PointPath{text.substr(0, slash), text.substr(slash + 1)};
+}
+
+const points::Point* find_point(Loading& loading, yaml::Mark mark, const PointPath& path) {
+    const Station* const station = find_station(loading, mark, path.station);
+    if (station == nullptr) return nullptr;
+    const auto found = std::ranges::find(station->points, path.point, &points::Point::name);
+    if (found != station->points.end()) return &*found;
+    std::vector<std::string_view> names;
+    for (const points::Point& point : station->points) names.push_back(point.name);
+    loading.problems.add(mark, yaml::no_such("point", path.point, names));
     return nullptr;
 }
 

@@ -70,6 +70,7 @@ const Keys<audit::Settings>& audit_keys();
 const Keys<store::Settings>& store_keys();
 const Keys<alarms::Settings>& alarm_keys();
 const Keys<alarms::WebhookSettings>& webhook_keys();
+const Keys<images::Settings>& image_keys();
 const Keys<points::ReportRule>& report_keys();
 void check_report(Reader& in, points::Point& point);
 void check_webhook(Reader& in, alarms::WebhookSettings& hook);
@@ -90,6 +91,7 @@ Keys<tcp_server::Settings> make_reach_keys(std::int64_t first, std::int64_t last
 void check_overlap(Reader& in, const tcp_server::Settings& settings);
 std::optional<serial_server::Settings> load_master(Reader& root, const yaml::Node& node);
 std::optional<alarms::Settings> load_alarm(Reader& root, const yaml::Node& node);
+std::optional<images::Settings> load_image(Reader& root, const yaml::Node& node);
 /// Reads the relays, which must not overlap or form a circle.
 bool load_relays(Reader& root, Config& config);
 /// Reads `access.roles`, which other maps name.
@@ -126,6 +128,15 @@ void check_rs485(Reader& in, const line::Rs485& rs485);
 void check_path(Reader& in, const std::string& path);
 /// Finds a station by its name; null, and a problem at `key`, if there is none.
 const Station* find_station(Reader& in, std::string_view key, const std::string& name);
+/// STATION/POINT
+struct PointPath {
+    std::string station;
+    std::string point;
+};
+/// Returns nothing for a text of another form.
+std::optional<PointPath> parse_point_path(const std::string& text);
+/// Finds a point; null, and a problem at `mark`, if there is none.
+const points::Point* find_point(Loading& loading, yaml::Mark mark, const PointPath& path);
 /// Finds an item by its notation; nothing, and a problem at `key`, if the panel has none.
 std::optional<profile::Item> find_item(Reader& in, std::string_view key, const std::string& text,
                                        const profile::PanelProfile& profile);

@@ -57,6 +57,17 @@ bool lets_in(const rt::AccessList& allow, const std::string& address) {
     return address.empty() || (!none && allow.allows(peer));
 }
 
+namespace {
+
+/// An image leads to the stations of its points.
+void add_station(const config::Config& config, std::string_view name, Destinations& reach) {
+    for (const config::Line& line : config.lines)
+        for (const config::Station& station : line.stations)
+            if (station.name == name) reach[line.name].set(station.id);
+}
+
+}  // namespace
+
 Destinations destinations_of(const tcp_server::Settings& listener, const config::Config& config,
                              Unlisted unlisted) {
     const tcp_server::UnitMap units = unit_map(listener, config, unlisted);
@@ -65,6 +76,8 @@ Destinations destinations_of(const tcp_server::Settings& listener, const config:
         const auto place = units.place(static_cast<std::uint8_t>(unit));
         if (place) reach[place->line].set(place->station);
     }
+    for (const images::Settings& image : config.images)
+        for (const images::Entry& entry : image.entries) add_station(config, entry.station, reach);
     for (const std::string& line : units.broadcast_names(0)) reach[line].set(0);
     return reach;
 }

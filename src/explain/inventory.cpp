@@ -173,6 +173,23 @@ Heading heading_of(const web::Settings& http) {
     return {std::move(text), " listen anonymous allow hosts "};
 }
 
+std::string text_of(const modbus::Span& items) {
+    const bool bits = modbus::is_bit_table(items.table);
+    std::string text = bits ? "bit " : items.count == 1 ? "register " : "registers ";
+    text += std::to_string(items.first);
+    return items.count == 1 ? text : text + " to " + std::to_string(items.end() - 1);
+}
+
+Heading heading_of(const images::Settings& image, const images::Layout& layout) {
+    using modbus::Table;
+    std::string text = "image " + image.name + ": unit " + std::to_string(image.unit) + " with " +
+                       std::to_string(layout.size(Table::holding_registers)) + " registers and " +
+                       std::to_string(layout.size(Table::coils)) +
+                       " bits, a value that is not good " +
+                       (image.stale == images::Stale::last ? "stays" : "is 0B");
+    return {std::move(text), " name unit points stale quality "};
+}
+
 /// An entry of a list that is known by its name, or a map of the file.
 Heading heading_of(const SettingTree& tree) {
     const std::string key(tree.key());
@@ -209,6 +226,7 @@ class Writer {
     void add_line(const SettingTree& tree);
     void add_listener(const SettingTree& tree);
     void add_master(const SettingTree& tree);
+    void add_image(const SettingTree& tree);
     /// "max_age 2s, timing.frame_gap 5ms"
     std::string rest_of(const SettingTree& tree, std::string_view told,
                         const std::string& above) const;
@@ -262,6 +280,7 @@ void Writer::add(const std::string& indent, const SettingTree& tree) {
     if (keys == "lines") return add_line(tree);
     if (keys == "modbus_tcp") return add_listener(tree);
     if (keys == "serial_masters") return add_master(tree);
+    if (keys == "images") return add_image(tree);
     if (keys == "http") return add(indent, tree, heading_of(*config_->http));
     add(indent, tree, heading_of(tree));
 }
@@ -298,6 +317,19 @@ void Writer::add_master(const SettingTree& tree) {
         *std::ranges::find(config_->serial_masters, tree.name(), &serial_server::Settings::name);
     add("", tree, heading_of(master));
     text_ += text_of(master.access.units);
+}
+
+void Writer::add_image(const SettingTree& tree) {
+    const images::Settings& image =
+        *std::ranges::find(config_->images, tree.name(), &images::Settings::name);
+    const images::Layout layout = layout_of(image, *config_);
+    add("", tree, heading_of(image, layout));
+    for (const images::Place& place : layout.places()) {
+        const points::Point& point = *place.point;
+        text_ += "  " + text_of(place.items) + " is " + place.entry->station + '/' + point.name +
+                 ", " + std::string(label(point.type)) + (point.writable ? ", writable" : "") +
+                 (place.quality ? ", quality at " + std::to_string(*place.quality) : "") + '\n';
+    }
 }
 
 }  // namespace

@@ -41,6 +41,7 @@ struct Destination {
     const config::Line* line = nullptr;        ///< nullptr: all lines of the listener
     std::uint8_t id = 0;                       ///< 0: a broadcast
     const config::Station* station = nullptr;  ///< nullptr: a broadcast, or not listed
+    std::string image{};                       ///< "image plant"; "": a panel
 };
 
 /// Where the units of a listener or serial master lead, to compare it with another configuration.
@@ -91,6 +92,7 @@ std::optional<Destination> UnitRoutes::route(std::uint8_t unit) const {
     const auto place = map_.place(unit);
     if (!place) return std::nullopt;
     const config::Line* line = places_->line_named(place->line);
+    if (line == nullptr) return Destination{nullptr, place->station, nullptr, place->line};
     const auto station = std::ranges::find(line->stations, place->station, &config::Station::id);
     const bool is_listed = station != line->stations.end();
     return Destination{line, place->station, is_listed ? &*station : nullptr};
@@ -108,6 +110,7 @@ bool is_same_line(const config::Line* before, const config::Line* after) {
 /// at a place has changed, it is the same one.
 bool is_same_panel(const Destination& was, const Destination& is, const Places& before,
                    const Places& after) {
+    if (!was.image.empty() || !is.image.empty()) return was.image == is.image;
     const bool both_listed = was.station != nullptr && is.station != nullptr;
     if (both_listed && was.station->name == is.station->name) return true;
     if (was.id != is.id || !is_same_line(was.line, is.line)) return false;
@@ -117,6 +120,7 @@ bool is_same_panel(const Destination& was, const Destination& is, const Places& 
 }
 
 std::string destination_text(const Destination& place) {
+    if (!place.image.empty()) return place.image;
     if (place.line == nullptr) return "a broadcast to all stations";
     const std::string line = " of line " + place.line->name;
     if (place.id == 0) return "a broadcast to all stations" + line;
@@ -128,7 +132,7 @@ std::string destination_text(const Destination& place) {
 std::string remedy(std::uint8_t unit, const Destination& was, const Destination& is,
                    const Places& after) {
     if (is.id == 0) return "set broadcast: deny, or inform its clients first";
-    if (is.station == nullptr && is.id == unit)
+    if (is.image.empty() && is.station == nullptr && is.id == unit)
         return "set unlisted_stations: refuse there, or inform its clients first";
     std::string text = "inform its clients first";
     if (was.station == nullptr) return text;

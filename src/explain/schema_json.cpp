@@ -244,6 +244,8 @@ class Schema {
         const bool of_maps = !below(shape.path).empty();
         json::object item = of_maps ? map_at(shape.path) : or_variable(text_of(shape));
         if (of_maps) item["type"] = "object";
+        if (shape.may_be_text)
+            item = {{"anyOf", json::array{std::move(item), text_of(shape), reference("variable")}}};
         json::object made{{"type", type_of(shape, "array")}, {"items", std::move(item)}};
         if (shape.fewest != 0) made["minItems"] = shape.fewest;
         if (shape.most_entries != 0) made["maxItems"] = shape.most_entries;
@@ -254,7 +256,7 @@ class Schema {
         json::object made = shape.kind == Kind::map    ? map_of(shape)
                             : shape.kind == Kind::list ? list_of(shape)
                                                        : any_of(shape);
-        if (shape.may_be_text)
+        if (shape.may_be_text && shape.kind != Kind::list)
             made = {{"anyOf", json::array{std::move(made), text_of(shape), reference("variable")}}};
         const std::string text = description_of(shape);
         if (!text.empty()) made["description"] = text;

@@ -72,7 +72,12 @@ bool is_default(const config::Setting& setting,
 std::vector<std::string> list_items(const std::string& list) {
     yaml::Problems problems("");
     std::vector<std::string> items;
-    for (const yaml::Node& item : yaml::parse(list, problems).items) items.push_back(item.scalar);
+    for (const yaml::Node& item : yaml::parse(list, problems).items) {
+        std::string keys;  // of a map, in a line
+        for (const yaml::Entry& entry : item.entries)
+            keys += (keys.empty() ? "" : ", ") + entry.key + ": " + entry.value.scalar;
+        items.push_back(keys.empty() ? item.scalar : '{' + keys + '}');
+    }
     return items;
 }
 

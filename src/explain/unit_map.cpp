@@ -1,5 +1,7 @@
 #include "panelgate/explain/unit_map.hpp"
 
+#include "panelgate/images/settings.hpp"
+
 namespace panelgate::explain {
 
 tcp_server::LineInfo line_info(const config::Line& line, Unlisted unlisted) {
@@ -10,10 +12,19 @@ tcp_server::LineInfo line_info(const config::Line& line, Unlisted unlisted) {
     return info;
 }
 
+tcp_server::LineInfo image_info(const images::Settings& image) {
+    tcp_server::LineInfo info;
+    info.name = "image " + image.name;  // no line can be called so
+    info.stations = {image.unit};
+    info.is_image = true;
+    return info;
+}
+
 tcp_server::UnitMap unit_map(const tcp_server::Settings& listener, const config::Config& config,
                              Unlisted unlisted) {
     std::vector<tcp_server::LineInfo> lines;
     for (const config::Line& line : config.lines) lines.push_back(line_info(line, unlisted));
+    for (const images::Settings& image : config.images) lines.push_back(image_info(image));
     return {listener, lines};
 }
 

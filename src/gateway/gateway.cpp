@@ -94,7 +94,7 @@ Gateway::Gateway(web::Loops loops, std::shared_ptr<const config::Config> config,
     for (std::size_t i = 0; i < lines.size(); ++i)
         known_.lines.emplace(std::pair(config->lines[i].name, lines[i]->listens()), lines[i]);
     doors_.open(config);
-    show(make_snapshot(std::move(config), std::move(lines)));
+    show(make_snapshot(std::move(config), std::move(lines), images_));
     relays_ = std::make_unique<points::Relays>(clock_, routes_of(*snapshot_));
     relay_listener_ = relays_->write_listener();
     relays_->on_state([](const points::RelayStatus& relay) {
@@ -225,10 +225,13 @@ void Gateway::show(const std::shared_ptr<Snapshot>& snapshot) {
         keep_histories(*snapshot, snapshot_.get(), *line_histories_);
         snapshot->directory =
             directory_of(snapshot->plant, *snapshot->config->profiles->find("generic"));
+        for (const images::Settings& image : snapshot->config->images)
+            snapshot->directory.images.push_back({&image, layout_of(image, *snapshot->config)});
         for (std::size_t i = 0; i < snapshot->histories.size(); ++i)
             snapshot->directory.lines[i].history = snapshot->histories[i].get();
     }
     snapshot_ = snapshot;
+    images_.show(snapshot_);
     audit_.show(snapshot_);
     journal_.show(snapshot_);
     northbound_.show(snapshot_);
@@ -239,6 +242,7 @@ void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedTex
     Plant draft;
     for (std::size_t i = 0; i < lines.size(); ++i)
         draft.add(config->lines[i], lines[i]->bus(), nullptr);
+    images_.add_to(draft, *config);
     const auto directory = [this] { return directory_in(snapshot_); };
     servers_.open(*config, draft, {directory, [this] { return providers(); }});
     // Nothing below throws.
@@ -248,7 +252,7 @@ void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedTex
     rest_wires(*config, lines);
     retire_lines(lines);
     apply_lines(*config, lines);
-    show(make_snapshot(std::move(config), std::move(lines)));
+    show(make_snapshot(std::move(config), std::move(lines), images_));
     std::erase_if(minutes_, [&all = snapshot_->config->lines](const auto& one) {
         return std::ranges::find(all, one.first, &config::Line::name) == all.end();
     });

@@ -72,6 +72,7 @@ std::vector<tcp_server::LineInfo> Plant::listener_lines(explain::Unlisted unlist
         infos.push_back(line_info(*line.configured, unlisted));
         infos.back().bus = line.bus;
     }
+    infos.insert(infos.end(), images_.begin(), images_.end());
     return infos;
 }
 

@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "panelgate/base/series.hpp"
+#include "panelgate/gateway/images.hpp"
 #include "panelgate/gateway/running_line.hpp"
 #include "panelgate/points/point.hpp"
 #include "panelgate/points/station_points.hpp"
@@ -184,7 +185,8 @@ void publish_points(web::EventOutlet& events, Station& station,
 }
 
 std::shared_ptr<Snapshot> make_snapshot(std::shared_ptr<const config::Config> config,
-                                        std::vector<std::shared_ptr<RunningLine>> lines) {
+                                        std::vector<std::shared_ptr<RunningLine>> lines,
+                                        Images& images) {
     auto snapshot = std::make_shared<Snapshot>();
     snapshot->config = std::move(config);
     snapshot->lines = std::move(lines);
@@ -193,6 +195,7 @@ std::shared_ptr<Snapshot> make_snapshot(std::shared_ptr<const config::Config> co
         RunningLine& runs = *snapshot->lines[i];
         snapshot->plant.add(line, runs.bus(), runs.simulated());
     }
+    images.add_to(snapshot->plant, *snapshot->config);
     std::size_t at = 0;  // the plant's stations are in this order
     for (std::size_t i = 0; i < snapshot->lines.size(); ++i) {
         for (const config::Station& station : snapshot->config->lines[i].stations)

@@ -32,7 +32,13 @@ Items words_in(ByteView data) {
     return items;
 }
 
-/// Returns the items that a write contains; empty if only the panel knows the result.
+/// False only if the panel refused the write.
+bool may_have_written(const tap::Transaction& heard) {
+    return heard.doubtful || !modbus::exception_of(heard.reply);
+}
+
+}  // namespace
+
 Items items_written(ByteView request, std::uint32_t count) {
     constexpr std::size_t kOne = 3;   // function and address
     constexpr std::size_t kMany = 6;  // ... quantity and byte count
@@ -49,13 +55,6 @@ Items items_written(ByteView request, std::uint32_t count) {
             return {};
     }
 }
-
-/// False only if the panel refused the write.
-bool may_have_written(const tap::Transaction& heard) {
-    return heard.doubtful || !modbus::exception_of(heard.reply);
-}
-
-}  // namespace
 
 HeardValues::HeardValues(const std::vector<Want>& wants, SharedMemory memory)
     : wants_(wants), memory_(std::move(memory)), readings_(wants_.size()) {}

@@ -1,7 +1,6 @@
 #include "panelgate/tcp_server/unit_map.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <stdexcept>
 
 #include "panelgate/modbus/function.hpp"
@@ -13,9 +12,12 @@ UnitMap::UnitMap(const Settings& settings, const std::vector<LineInfo>& lines) {
     for (const auto& [unit, target] : settings.units)
         aliases_[unit] = Place{index_of(target.line), target.station};
     for (const std::string& name : settings.lines) own_.push_back(index_of(name));
-    if (own_.empty()) {
-        own_.resize(lines.size());
-        std::iota(own_.begin(), own_.end(), std::size_t{0});
+    const bool all = own_.empty();
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+        if (lines[i].is_image)
+            add_stations(i, lines[i].stations);
+        else if (all)
+            own_.push_back(i);
     }
     for (const std::size_t line : own_) add_stations(line, lines[line].stations);
     if (own_.size() != 1 || !lines[own_.front()].pass_unlisted) return;

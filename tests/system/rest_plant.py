@@ -53,6 +53,8 @@ def running():
                               modbus=config.FREE_PORT + ", lines: [floor1]",
                               relays="[{from: press/UW160, to: press/UW170, every: 1s}]")
         text += "alarms: [{name: press-hot, point: press/setpoint, above: 55}]\n"
+        text += ("images: [{name: plant, unit: 100, points: [press/setpoint, {skip: 1}, press/weight], "
+                 "stale: last, quality: true}]\n")
         with harness.configured(text) as program:
             while not is_settled(program):
                 pass  # each look is a request to the program

@@ -13,6 +13,8 @@
 #include "panelgate/alarms/settings.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/audit/settings.hpp"
+#include "panelgate/images/layout.hpp"
+#include "panelgate/images/settings.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/points/settings.hpp"
@@ -96,6 +98,7 @@ struct Config {
     std::vector<alarms::Settings> alarms{};
     std::optional<alarms::WebhookSettings> webhook{};  ///< of alarms
     store::Settings store{};                           ///< events and history
+    std::vector<images::Settings> images{};
     /// Where each line's name stands, by that name.
     std::map<std::string, yaml::Mark> line_marks;
     /// Warnings of legal but questionable settings ("8N1 is outside the standard"), as
@@ -105,6 +108,13 @@ struct Config {
 
 /// Gives stations of `next` the running configuration's profile object if it is equal.
 void share_profiles(Config& next, const Config& running);
+
+/// Null: there is none.
+const Station* station_named(const Config& config, std::string_view name);
+const points::Point* point_named(const Config& config, std::string_view station,
+                                 std::string_view point);
+/// The map of one of the configuration's images; the configuration outlives it.
+images::Layout layout_of(const images::Settings& image, const Config& config);
 
 /// Access to files, for profiles_dir and token files. read() returns a file's content; nothing if
 /// it cannot be read.

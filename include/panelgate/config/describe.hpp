@@ -69,7 +69,7 @@ struct KeyShape {
     std::string change = {};       ///< what a change of it needs beside a reload; or ""
     int order = 0;                 ///< among the keys of its map
     Weaker weaker = {};
-    bool may_be_text = false;  ///< of Kind::map: a text says the same
+    bool may_be_text = false;  ///< of Kind::map, and of a list's maps: a text says the same
 };
 
 /// A dependency between two keys of a map; a merge may supply the other.

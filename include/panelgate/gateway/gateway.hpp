@@ -19,6 +19,7 @@
 #include "panelgate/gateway/certificates.hpp"
 #include "panelgate/gateway/discoveries.hpp"
 #include "panelgate/gateway/findings.hpp"
+#include "panelgate/gateway/images.hpp"
 #include "panelgate/gateway/journal.hpp"
 #include "panelgate/gateway/northbound.hpp"
 #include "panelgate/gateway/running_line.hpp"
@@ -130,6 +131,7 @@ class Gateway {
         ~KnownLines();
         std::map<std::pair<std::string, bool>, std::shared_ptr<RunningLine>> lines;
     } known_;
+    Images images_{loops_.plant, clock_, audit_.stray_writes()};
     std::unique_ptr<Discoveries> discoveries_;       ///< null until `http:` is configured
     std::unique_ptr<LineHistories> line_histories_;  ///< the same
     std::unique_ptr<points::Relays> relays_;

@@ -53,6 +53,11 @@ class Plant {
     /// Adds a line with all its stations. `simulated`: null for a real line.
     void add(const config::Line& line, bus::BusClient& bus,
              const std::shared_ptr<sim::SimulatedBus>& simulated);
+    /// Adds an image, which listeners serve by `bus`.
+    void add(const images::Settings& image, bus::BusClient& bus) {
+        images_.push_back(explain::image_info(image));
+        images_.back().bus = &bus;
+    }
     /// Sets the unit ids of this listener for the stations that no earlier listener has reached.
     void add_units(const tcp_server::UnitMap& units);
 
@@ -70,12 +75,13 @@ class Plant {
     /// The station's name, or its id if it is not listed; "" for a broadcast (station 0).
     std::string name_of(std::string_view line, std::uint8_t id) const;
 
-    /// The lines as listeners see them.
+    /// The lines and images as listeners see them.
     std::vector<tcp_server::LineInfo> listener_lines(
         explain::Unlisted unlisted = explain::Unlisted::as_the_line) const;
 
   private:
     std::deque<Line> lines_;
+    std::vector<tcp_server::LineInfo> images_;
     std::deque<Station> stations_;
 };
 

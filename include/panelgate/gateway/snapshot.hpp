@@ -94,9 +94,11 @@ struct Snapshot {
     Snapshot& operator=(const Snapshot&) = delete;
 };
 
+class Images;
 /// Makes the snapshot of running lines with a configuration, in the order of the configuration.
 std::shared_ptr<Snapshot> make_snapshot(std::shared_ptr<const config::Config> config,
-                                        std::vector<std::shared_ptr<RunningLine>> lines);
+                                        std::vector<std::shared_ptr<RunningLine>> lines,
+                                        Images& images);
 /// Starts the histories of its points and continues those of unchanged stations in `before` (may be
 /// null); `lines` does so for its lines.
 void keep_histories(Snapshot& snapshot, const Snapshot* before, LineHistories& lines);

@@ -21,6 +21,10 @@
 
 namespace panelgate::points {
 
+/// Returns the items that a write (05, 06, 0F, 10) contains, bits as 0 and 1; empty if only the
+/// panel knows the result. `count`: items of the write.
+std::vector<std::uint16_t> items_written(ByteView request, std::uint32_t count);
+
 /// Values of one station's wants, heard on a line with another master. A read that covers a want
 /// completely sets its value, and so does a confirmed write. A doubtful or unconfirmed write makes
 /// stale what it may have changed. Pure.

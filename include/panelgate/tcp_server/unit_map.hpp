@@ -20,6 +20,9 @@ struct LineInfo {
     bus::BusClient* bus = nullptr;       ///< null: asked of a configuration that does not run
     std::vector<std::uint8_t> stations;  ///< configured station addresses
     bool pass_unlisted = true;
+    /// An image, whose one station is its unit: each listener serves it, and it is no line that a
+    /// listener names or broadcasts to.
+    bool is_image = false;
     friend bool operator==(const LineInfo&, const LineInfo&) = default;
 };
 
@@ -39,10 +42,10 @@ class UnitMap {
     /// Throws std::invalid_argument if the settings name an unknown line.
     UnitMap(const Settings& settings, const std::vector<LineInfo>& lines);
 
-    /// Returns the target of an alias, or of a station listed by exactly one line of the listener;
-    /// on a listener with a single line that passes unlisted stations, also of the rest of 1..247.
-    /// Everything else, including unit 0 without an alias and 248..255 unless listed, is
-    /// Fault::not_routed.
+    /// Returns the target of an alias, of an image, or of a station listed by exactly one line of
+    /// the listener; on a listener with a single line that passes unlisted stations, also of the
+    /// rest of 1..247. Everything else, including unit 0 without an alias and 248..255 unless
+    /// listed, is Fault::not_routed.
     Result<Target> route(std::uint8_t unit) const;
     /// As route(), by the line's name.
     std::optional<UnitTarget> place(std::uint8_t unit) const;
@@ -53,6 +56,7 @@ class UnitMap {
     std::vector<std::string> broadcast_names(std::uint8_t unit) const;
     /// True for an alias or a configured station.
     bool is_listed(std::uint8_t unit) const { return is_alias(unit) || listed_[unit]; }
+    /// True for an alias: a unit that the settings name.
     bool is_alias(std::uint8_t unit) const { return aliases_.contains(unit); }
     /// Returns the listener's own lines, in the order of the settings.
     std::vector<bus::BusClient*> lines() const { return buses_of(own_); }

@@ -107,6 +107,8 @@ constexpr Row kRows[] = {
     {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange, kShowsNone, kWrites, "round"},
     {"GET", "/api/v1/stations/{}/points/{}/history", get_point_history, kSee, kShowsPoint, kPlain,
      "from to step"},
+    {"GET", "/api/v1/images", get_images, kSee, kShowsNone, kTagged},
+    {"GET", "/api/v1/images/{}", get_image, kSee, kShowsNone, kTagged},
     {"GET", "/api/v1/alarms", get_alarms, kSee, kShowsNone, kTagged},
     {"POST", "/api/v1/alarms/{}/acknowledge", post_acknowledge, kChange, kShowsNone, kOnce},
     {"GET", "/api/v1/journal", get_journal, kSee, kShowsNone, kPlain,

@@ -42,7 +42,7 @@ config::MemoryFiles all_files() {
     std::map<std::string, std::string> texts{
         {"/run/secrets/ops", "secret-0123456789"}, {"/run/secrets/other", "other-0123456789"},
         {"/run/secrets/two", "second-0123456789"}, {"/points/a.csv", "name,at\nq,400005\n"},
-        {"/points/b.csv", "name,at\nr,400006\n"},  {"/profiles/own.yaml", text_of(kGeneric)}};
+        {"/points/b.csv", "name,at\nq,400005\nr,400006\n"},  {"/profiles/own.yaml", text_of(kGeneric)}};
     for (const std::string name : {"/tls/a", "/tls/b"}) {
         texts[name + ".crt"] = gateway.certificate;
         texts[name + ".key"] = gateway.key;
@@ -142,6 +142,7 @@ mqtt: {broker: "mqtts://b:8883", topic: x, qos: 1, home_assistant: true, client_
 relays: [{from: a-1/400001, to: a-1/400101, on_change: true, refresh: 60s}]
 realtime: {priority: 20, lock_memory: true}
 audit: {file: /var/log/audit.jsonl, rotate: 10MiB, keep: 5, on_failure: refuse_writes}
+images: [{name: plant, unit: 99, points: [a-1/q]}]
 alarms: [{name: wiring, finding: any}, {name: lost, line: a, down: true}]
 store: {days: 90}
 alarm_webhook: {url: "https://10.0.0.1/x", ca: /run/secrets/ops}

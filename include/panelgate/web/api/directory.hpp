@@ -13,6 +13,7 @@
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus_client.hpp"
+#include "panelgate/images/layout.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 
@@ -54,11 +55,17 @@ struct StationEntry : bus::StationRef {
     std::shared_ptr<const SimulatedPanel> simulated;  ///< null for a real panel
 };
 
+struct ImageEntry {
+    const images::Settings* settings = nullptr;  ///< never null; outlives the directory
+    images::Layout layout{};
+};
+
 /// The part of the plant that the API needs. Immutable; a changed plant gets a new one.
 struct Directory {
     const profile::PanelProfile* generic = nullptr;  ///< for unlisted stations
     std::vector<LineEntry> lines;
     std::vector<StationEntry> stations;
+    std::vector<ImageEntry> images{};
 
     const LineEntry* find_line(std::string_view name) const;
     /// The line of a station; the station must have a bus.
