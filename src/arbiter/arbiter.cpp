@@ -62,42 +62,19 @@ Quiet quiet_of(const Settings& settings) {
     return Quiet(frame_time(settings.serial, modbus::kMaxRtuAdu), silent_interval(settings.serial));
 }
 
-/// Why this group is sent now.
-Reason reason_of(TimePoint now, const Group& group, const JobQueue& queue) {
-    if (group.probe) return {.kind = Reason::Kind::probe};
-    if (group.learns_for != 0) return {.kind = Reason::Kind::learns_echo};
-    const Job& leader = group.jobs.front();
-    return {.kind = group.attempts > 1 ? Reason::Kind::again : Reason::Kind::turn,
-            .priority = leader.priority,
-            .station = leader.station,
-            .asked_function = leader.asked_function,
-            .passed_over = queue.last_was_passed_over(),
-            .attempt = group.attempts,
-            .answers = static_cast<std::uint32_t>(group.jobs.size()),
-            .waited = now - leader.arrived,
-            .waiting = queue.waiting(),
-            .client = leader.client};
-}
-
 }  // namespace
 
 Arbiter::Arbiter(Settings settings)
-    : settings_(completed(std::move(settings))),
+    : Desk(completed(std::move(settings))),
       orders_(crc_orders(settings_)),
       ascii_(transcript_of(settings_)),
-      stations_(settings_),
-      schedule_(settings_),
       quiet_(quiet_of(settings_)),
-      echo_memory_(settings_.echo),
-      outbox_(settings_) {}
+      echo_memory_(settings_.echo) {}
 
 void Arbiter::apply(Settings settings) {
     settings = completed(std::move(settings));
     const bool same_wire = is_same_wire(settings_, settings);
-    settings_ = std::move(settings);
-    stations_.apply(settings_);
-    schedule_.apply(settings_);
-    outbox_.apply(settings_);
+    adopt(std::move(settings));
     if (same_wire) return;
     orders_ = crc_orders(settings_);
     quiet_ = quiet_of(settings_);
@@ -106,73 +83,31 @@ void Arbiter::apply(Settings settings) {
 }
 
 Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
-    if (!up_ && !suspended_) return Fault::line_down;
-    if (auto known = from_memory(now, job)) {
-        outbox_.finish_from_memory(++last_ticket_, std::move(known->pdu), known->age);
-        return last_ticket_;
-    }
-    if (stations_.refuses(now, job)) {
-        const StationHealth is = health(job.station);
-        outbox_.decide(now, Decision::Kind::offline, job, is.next_probe() - now,
-                       static_cast<std::size_t>(is.silent_in_a_row()));
-        return Fault::offline;
-    }
-    job.ticket = ++last_ticket_;
-    job.arrived = now;
-    job.deadline = now + std::min(settings_.queue.deadline, job.within);
-    job.start_by = latest_start(settings_.serial, job);
-    job.alone = job.alone || !settings_.share_reads;
-    const Ticket ticket = job.ticket;
+    const bool has_open = active_ && active_->group().has(job.client, job.station);
+    if (auto answered = answer_at_once(now, job, has_open)) return *answered;
     if (active_ && active_->can_join(now, job) &&
         !schedule_.backlog().has(job.client, job.station)) {
+        const Ticket ticket = job.ticket;
         job.attempts = 1;
         job.transactions.add(active_->group().transaction);
         outbox_.on_started(now, job);
         active_->group().jobs.push_back(std::move(job));
         return ticket;
     }
-    const JobQueue::PushResult pushed = schedule_.backlog().queue().push(job);
-    for (const Job& shed : pushed.shed) {
-        outbox_.decide(now, Decision::Kind::shed, shed);
-        // A read may have been sent, in a joined one that failed, and has changed nothing.
-        const bool unsure = shed.attempts > 0 && !shed.request.is_read();
-        outbox_.finish(shed, unsure ? Fault::timeout : Fault::busy);
-    }
-    if (!pushed.taken) {
-        outbox_.decide(now, Decision::Kind::full, job, {}, queue_depth());
-        return Fault::busy;
-    }
-    step(now);
+    const Result<Ticket> ticket = enqueue(now, std::move(job));
+    if (ticket) step(now);
     return ticket;
 }
 
-/// A recently read value, where `max_age` allows it. Never for polls, which must read new values,
-/// nor while the client has a request open there: its own write must be older.
-std::optional<ReadCache::Hit> Arbiter::from_memory(TimePoint now, const Job& job) const {
-    const Duration max_age = stations_.settings(job.station).max_age;
-    const auto& span = job.request.span();
-    if (max_age <= Duration::zero() || job.priority == PriorityClass::poll || !span)
-        return std::nullopt;
-    if (schedule_.backlog().has(job.client, job.station) ||
-        (active_ && active_->group().has(job.client, job.station)))
-        return std::nullopt;
-    return memory_.find({job.station, *span}, now, max_age);
-}
-
 void Arbiter::deny(TimePoint now, const JobQueue::Test& match) {
-    for (const Job& job : schedule_.backlog().queue().remove_if(match))
-        outbox_.finish(job, Fault::denied);
-    // What became of these nobody knows: they were sent.
-    for (const Job& job : schedule_.backlog().remove_retries(match))
-        outbox_.finish(job, Fault::timeout);
+    deny_waiting(match);
     if (active_)
         for (Job& job : active_->group().jobs) job.barred = job.barred || match(job);
     step(now);
 }
 
 void Arbiter::cancel(TimePoint now, Client client) {
-    outbox_.on_client_gone(client);
-    for (const Job& job : schedule_.backlog().cancel(client)) outbox_.finish(job, Fault::cancelled);
+    cancel_waiting(client);
     if (active_) active_->group().on_client_gone(client);
     step(now);
 }
@@ -246,9 +181,7 @@ void Arbiter::on_line_down(TimePoint now) {
         outbox_.report(attempt, TransactionEnd::line_down);
         for (const Job& job : group.jobs) outbox_.finish(job, Fault::line_lost);
     }
-    if (keeps) return;
-    for (const Job& job : schedule_.backlog().clear())
-        outbox_.finish(job, job.attempts > 0 ? Fault::line_lost : Fault::line_down);
+    if (!keeps) clear_waiting();
 }
 
 void Arbiter::on_rx(TimePoint now, ByteView bytes) {
@@ -320,15 +253,7 @@ void Arbiter::check_active(TimePoint now) {
 
 void Arbiter::expire(TimePoint now) {
     expire_active(now);
-    for (const Job& job : schedule_.backlog().expire(now)) {
-        const bool sent = job.attempts > 0;
-        outbox_.decide(now, sent ? Decision::Kind::unanswered : Decision::Kind::expired, job,
-                       now - job.arrived);
-        outbox_.finish(job, sent ? Fault::timeout : Fault::expired);
-    }
-    for (const Group& group : schedule_.backlog().take_dropped()) {
-        give_up(now, group, group.silent ? Fault::timeout : Fault::damaged);
-    }
+    expire_waiting(now);
 }
 
 /// Fails the jobs of the transaction whose own deadline has passed; the others keep waiting for its
@@ -364,18 +289,6 @@ bool Arbiter::start_next(TimePoint now) {
     return true;
 }
 
-/// The station is asked: what it is known for decides about retries, and its silence is paid for.
-void Arbiter::ask(TimePoint now, Group& group) {
-    Station& station = stations_.of(group.station);
-    if (group.attempts == 1) {
-        group.repeatable = station.settings().retry_writes;
-        group.was_online = station.answers_now(group.request.is_read());
-    }
-    station.on_asked(now, group);
-    if (station.health().offline() && (group.probe || station.speculative()))
-        stations_.on_probe(now, group.station);
-}
-
 Attempt::Timing Arbiter::timing_of(TimePoint now, const Group& group, std::size_t size) const {
     Attempt::Timing timing = Attempt::timing_of(settings_, now, size, lead_);
     timing.pause = now - quiet_.since();
@@ -395,18 +308,10 @@ Attempt::Timing Arbiter::timing_of(TimePoint now, const Group& group, std::size_
 void Arbiter::start(TimePoint now, Group group) {
     Bytes adu = modbus::encode_adu(group.station, group.request.pdu(), orders_.of(group.station));
     outbox_.on_rested(quiet_.take_rested(now));
-    if (++group.attempts == 1) group.started = now;
-    group.transaction = ++transactions_;
-    for (Job& job : group.jobs) {
-        job.transactions.add(group.transaction);
-        if (job.attempts++ == 0) outbox_.on_started(now, job);
-    }
+    begin(now, group);
     Bytes wire = ascii_ ? modbus::to_ascii(adu) : adu;
     if (ascii_) ascii_->cut();
-    if (group.station != kBroadcast) ask(now, group);
     const Attempt::Timing timing = timing_of(now, group, adu.size());
-    if (!group.request.is_read()) memory_.on_write(now, group.station, group.request);
-    outbox_.written(group, false);
     const Reason why = reason_of(now, group, schedule_.backlog().queue());
     quiet_.on_sent(timing.sent, group.station);
     last_frame_ = adu;

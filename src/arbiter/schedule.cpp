@@ -31,6 +31,22 @@ Group internal_read(const Station& station, const modbus::Request& read) {
 
 }  // namespace
 
+Reason reason_of(TimePoint now, const Group& group, const JobQueue& queue) {
+    if (group.probe) return {.kind = Reason::Kind::probe};
+    if (group.learns_for != 0) return {.kind = Reason::Kind::learns_echo};
+    const Job& leader = group.jobs.front();
+    return {.kind = group.attempts > 1 ? Reason::Kind::again : Reason::Kind::turn,
+            .priority = leader.priority,
+            .station = leader.station,
+            .asked_function = leader.asked_function,
+            .passed_over = queue.last_was_passed_over(),
+            .attempt = group.attempts,
+            .answers = static_cast<std::uint32_t>(group.jobs.size()),
+            .waited = now - leader.arrived,
+            .waiting = queue.waiting(),
+            .client = leader.client};
+}
+
 Group Sharing::gather(TimePoint now, Job leader, const Station& station,
                       const Outstanding& outstanding, JobQueue& queue) const {
     Group group{.station = leader.station, .request = leader.request};
@@ -191,8 +207,8 @@ TimePoint Schedule::repeat_from(TimePoint now, const Group& group, const Station
 }
 
 std::optional<Group> Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
-                                    const EchoMemory& echo) {
-    const Line line{now, stations, quiet, echo};
+                                    const EchoMemory& echo, const MayStart& may_start) {
+    const Line line{now, stations, quiet, echo, may_start};
     echo_known_ = echo.state() != EchoState::unknown;
     if (now < quiet.free_at(stations.gap(quiet.station()))) return {};
     const bool alone = !backlog_.retries().empty() &&
@@ -223,6 +239,7 @@ bool Schedule::gap_is_over(const Line& line, std::uint8_t station) {
 std::optional<Group> Schedule::next_retry(const Line& line) {
     return backlog_.take_retry([&](const Group& waiting) {
         return repeat_from(line.now, waiting, line.stations) <= line.now &&
+               line.takes(waiting.station, waiting.request.is_read()) &&
                gap_is_over(line, waiting.station);
     });
 }
@@ -245,7 +262,8 @@ bool Schedule::goes_first(const Line& line, const Job& job) const {
 std::optional<Group> Schedule::next_probe(const Line& line) const {
     if (line.now < line.quiet.quarantined_until()) return std::nullopt;
     const auto station = line.stations.next_to_probe(line.now);
-    if (!station || !gap_is_over(line, *station)) return std::nullopt;
+    if (!station || !line.takes(*station, true) || !gap_is_over(line, *station))
+        return std::nullopt;
     const Station& asked = *line.stations.find(*station);
     Group group = internal_read(asked, line.stations.probe_for(line.now, asked));
     group.probe = true;
@@ -254,6 +272,7 @@ std::optional<Group> Schedule::next_probe(const Line& line) const {
 
 bool Schedule::may_run(const Line& line, const Job& job) const {
     return line.now >= line.quiet.quarantined_until() &&
+           line.takes(job.station, job.request.is_read()) &&
            line.now >= ready_at(line.now, line.stations, job) && !backlog_.has_retry(job.station);
 }
 

@@ -10,25 +10,15 @@
 
 namespace panelgate::arbiter {
 
-namespace {
-
 TransactionEnd end_of(Verdict verdict) {
     if (verdict == Verdict::silent) return TransactionEnd::timeout;
     return verdict == Verdict::wrong ? TransactionEnd::wrong : TransactionEnd::damaged;
 }
 
-/// What its jobs are told if nothing better comes.
 Fault fault_of(Verdict verdict) {
     if (verdict == Verdict::silent) return Fault::timeout;
     return verdict == Verdict::wrong ? Fault::wrong : Fault::damaged;
 }
-
-/// True if another attempt could still answer one of the jobs in time.
-bool in_time(TimePoint now, const Group& group) {
-    return std::ranges::any_of(group.jobs, [&](const Job& job) { return now < job.start_by; });
-}
-
-}  // namespace
 
 /// The last bit of a broadcast has left: no reply comes, the line rests for the turnaround.
 void Arbiter::end_broadcast(TimePoint now) {
@@ -83,13 +73,7 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
     outbox_.on_answered(now, attempt, reply, replied);
     if (attempt.is_clean() && teaches_echo(group.request)) echo_memory_.on_no_echo();
     outbox_.report(attempt, refused ? TransactionEnd::exception : TransactionEnd::ok);
-    if (refused) {
-        give_back(group);
-    } else if (group.span && station.settings().max_age > Duration::zero()) {
-        memory_.store({group.station, *group.span}, reply, group.started);
-    }
-    for (const Job& job : group.jobs)
-        outbox_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
+    hand_on(group, reply);
 }
 
 /// Closes the request of an answered attempt, and what its station was asked before. Returns false
@@ -132,7 +116,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     for (const Job& job : take_if(group.jobs, [](const Job& one) { return one.barred; }))
         outbox_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
     const std::uint8_t id = group.station;
-    if (in_time(now, group) && affordable && station.may_retry(group)) {
+    if (group.in_time(now) && affordable && station.may_retry(group)) {
         schedule_.retry(std::move(group));
     } else if (group.joined()) {
         give_back(group);  // health unaffected: the panel may only not answer this length (T14)
@@ -156,35 +140,6 @@ void Arbiter::reopen_if_mute(TimePoint now, const Attempt& attempt, Verdict verd
     mute_.next = now + mute_.pause;
     resetting_ = true;
     outbox_.reset("nothing was heard over the connection: what was sent may be held back");
-}
-
-void Arbiter::explain_condition(TimePoint now, std::uint8_t station, Condition before) {
-    const Condition is = stations_.condition(station);
-    if (is != before && before != Condition::unheard)
-        outbox_.decide(
-            {.at = now, .kind = Decision::Kind::condition, .station = station, .condition = is});
-}
-
-/// The parts of a joined read are sent again, except for clients that have left.
-void Arbiter::give_back(Group& group) {
-    for (const Job& job : schedule_.give_back(group)) outbox_.finish(job, Fault::cancelled);
-}
-
-/// No further attempt: all jobs are answered, and the station is judged.
-void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
-    for (const Job& job : group.jobs) outbox_.finish(job, fault);
-    JobQueue& queue = schedule_.backlog().queue();
-    if (group.learns_for != 0 && !was_heard(fault)) {
-        // P8: the write never left, and its station is silent.
-        const auto asked = [&](const Job& job) { return job.ticket == group.learns_for; };
-        for (const Job& job : queue.remove_if(asked)) outbox_.finish(job, fault);
-    }
-    Station& station = stations_.of(group.station);
-    const bool speculative = station.speculative();
-    if (!station.on_given_up(now, fault, group.request.is_read())) return;
-    if (!speculative) outbox_.event(StationEvent::Kind::offline, group.station);
-    const auto theirs = [&](const Job& job) { return job.station == group.station; };
-    for (const Job& job : queue.remove_if(theirs)) outbox_.finish(job, Fault::offline);
 }
 
 /// Ends the attempt: accounts for its time, and passes on what the echo filter buffered.

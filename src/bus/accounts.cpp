@@ -357,7 +357,7 @@ OutcomeCounts RequestCounters::outcomes(std::uint8_t station) const {
     return all;
 }
 
-std::vector<StationReport> RequestCounters::report(const arbiter::Arbiter& arbiter) const {
+std::vector<StationReport> RequestCounters::report(const Machine& arbiter) const {
     // A station that has never been heard is not up, and not yet known to be down.
     return report(arbiter.station_counters(), [&](std::uint8_t id) -> State {
         const arbiter::StationHealth& health = arbiter.health(id);

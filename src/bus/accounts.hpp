@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "client_names.hpp"
+#include "machine.hpp"
 #include "panelgate/arbiter/actions.hpp"
-#include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/arbiter/queue/job.hpp"
 #include "panelgate/base/bytes.hpp"
@@ -145,7 +145,7 @@ class RequestCounters {
     /// Returns the sum over all functions; zeros for an unlisted station.
     OutcomeCounts outcomes(std::uint8_t station) const;
     /// Returns the reports, joined with the arbiter's counters.
-    std::vector<StationReport> report(const arbiter::Arbiter& arbiter) const;
+    std::vector<StationReport> report(const Machine& arbiter) const;
     /// A station's health, and its condition on a line where stations are asked.
     struct State {
         Health health = Health::unknown;

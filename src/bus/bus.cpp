@@ -313,7 +313,7 @@ LineStatus Bus::status() const {
 }
 
 std::vector<ClientShare> Bus::clients() const {
-    const arbiter::Arbiter& arbiter = state_->arbiter;
+    const Machine& arbiter = state_->arbiter;
     return client_shares({arbiter.shares(), state_->names, state_->clients, state_->departed,
                           arbiter.counters().busy},
                          state_->clock.now());

@@ -10,14 +10,14 @@
 #include <vector>
 
 #include "line_records.hpp"
-#include "panelgate/arbiter/arbiter.hpp"
+#include "machine.hpp"
 #include "panelgate/base/pool.hpp"
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/line/line.hpp"
 
 namespace panelgate::bus {
 
-/// Also the host of the arbiter's drive.
+/// Also the host of the machine's drive.
 struct Bus::State final : public LineRecords, public line::Line::Events {
     struct Pending {
         AnswerHandler handler;
@@ -35,7 +35,8 @@ struct Bus::State final : public LineRecords, public line::Line::Events {
           std::unique_ptr<line::Line> l)
         : LineRecords(e, c, std::move(s), std::move(l)),
           executor(e),
-          arbiter(settings.arbiter),
+          machine(make_machine(settings.arbiter)),
+          arbiter(*machine),
           rights(settings.stations, settings.access),
           departed(settings.clients),
           answers(executor),
@@ -111,12 +112,13 @@ struct Bus::State final : public LineRecords, public line::Line::Events {
     }
 
     boost::asio::any_io_executor executor;
-    arbiter::Arbiter arbiter;
+    std::unique_ptr<Machine> machine;
+    Machine& arbiter;
     Rights rights;
     ClientAccounts clients;
     DepartedClients departed;
     Answers answers;
-    line::Drive<arbiter::Arbiter, State> drive;
+    line::Drive<Machine, State> drive;
     PoolMap<arbiter::Ticket, Pending> pending;
     /// A new line that replaces this one as soon as no reply is outstanding.
     struct Change {

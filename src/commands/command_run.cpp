@@ -1,5 +1,6 @@
 #include "command_run.hpp"
 
+#include <malloc.h>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -249,6 +250,7 @@ ExitCode serve(config::Config config, const Service& service,
     reloader.serve(gateway);
     reloader.on_step([&](bool begins) { begins ? manager.reloading() : manager.ready(); });
     started(gateway);
+    ::malloc_trim(0);  // reading takes far more memory than is kept
     manager.ready([&gateway] { return gateway.status(); });
     const auto watch = watch_of(service, io.get_executor(), clock, reloader);
     Ending ending{.begin = {},

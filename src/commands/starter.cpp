@@ -215,7 +215,7 @@ std::string absolute(const std::string& path) {
 bool run_scan(const ScanOptions& options, const scan::Settings& settings, ScanOutcome& outcome) {
     line::Settings device;
     device.device = options.device;
-    device.modbus_tcp = is_modbus_tcp(options.device);
+    device.modbus_tcp = device.as_rtu = is_modbus_tcp(options.device);
     boost::asio::io_context io(1);
     ScanRun run(io, settings, *outcome.profiles, device);
     run.run();

@@ -138,6 +138,11 @@ const Keys<Line>& line_keys() {
                 "Pause behind each connecting of a tcp:// line, for a device server that ignores "
                 "what comes at once.")
             .shown_if([](const Line& line) { return line.kind == Line::Kind::tcp; })
+            .integer(
+                "in_flight", [](auto& line) -> auto& { return line.arbiter.in_flight; }, 1, 16,
+                "Requests that may be on their way to a modbus-tcp:// device at the same time.")
+            .initially("1")
+            .shown_if([](const Line& line) { return line.device.modbus_tcp; })
             .word("mode", &Line::listens, kModes,
                   "listen: another master asks on this line, nothing is ever sent, and points show "
                   "what passes by.",
@@ -322,6 +327,7 @@ void check_modbus_tcp(Reader& in, Line& line) {
             in.problem(key, std::string(key) + " belongs to a serial line: " +
                                 yaml::quote(line.device.device) + " has none; leave it out");
     line.arbiter.echo = EchoMode::off;
+    if (!in.has("in_flight")) line.arbiter.in_flight = 1;
     if (line.listens)
         in.problem("mode",
                    "mode listen needs a line that others can be heard on; a device of "
@@ -330,6 +336,11 @@ void check_modbus_tcp(Reader& in, Line& line) {
 
 void check_line(Reader& in, Line& line) {
     if (line.device.modbus_tcp) check_modbus_tcp(in, line);
+    if (line.arbiter.in_flight > 1 && !line.device.modbus_tcp)
+        in.problem("in_flight",
+                   "in_flight belongs to a device of modbus-tcp://, whose replies have a "
+                   "transaction id; leave it out");
+    if (!line.device.modbus_tcp) line.arbiter.in_flight = 0;
     line.device.listen_only = line.listens;
     if (line.listens && line.kind == Line::Kind::simulated)
         in.problem("mode",

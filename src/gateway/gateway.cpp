@@ -52,9 +52,10 @@ std::string new_epoch() {
 }
 
 /// Returns the line of the new configuration that continues `line`; null for a removed line.
-const config::Line* find_same(const config::Config& config, const config::Line& line) {
+const config::Line* find_same(const config::Config& config, const config::Line& line,
+                              bool simulate) {
     const auto found = std::ranges::find_if(config.lines, [&](const config::Line& one) {
-        return one.name == line.name && one.listens == line.listens;
+        return one.name == line.name && way_of(one, simulate) == way_of(line, simulate);
     });
     return found == config.lines.end() ? nullptr : &*found;
 }
@@ -92,7 +93,7 @@ Gateway::Gateway(web::Loops loops, std::shared_ptr<const config::Config> config,
       northbound_(loops_, clock_, journal_, audit_.topic_refusals()) {
     Lines lines = lines_of(*config);
     for (std::size_t i = 0; i < lines.size(); ++i)
-        known_.lines.emplace(std::pair(config->lines[i].name, lines[i]->listens()), lines[i]);
+        known_.lines.emplace(std::pair(config->lines[i].name, lines[i]->way()), lines[i]);
     doors_.open(config);
     show(make_snapshot(std::move(config), std::move(lines), images_));
     relays_ = std::make_unique<points::Relays>(clock_, routes_of(*snapshot_));
@@ -170,7 +171,7 @@ void Gateway::on_alarm(const alarms::Change& change) {
 Gateway::Lines Gateway::lines_of(const config::Config& config) {
     Lines lines;
     for (const config::Line& line : config.lines) {
-        const auto found = known_.lines.find({line.name, line.listens});
+        const auto found = known_.lines.find({line.name, way_of(line, simulate_)});
         lines.push_back(
             found != known_.lines.end()
                 ? found->second
@@ -182,8 +183,8 @@ Gateway::Lines Gateway::lines_of(const config::Config& config) {
 void Gateway::apply_lines(const config::Config& config, const Lines& lines) {
     for (std::size_t i = 0; i < lines.size(); ++i) {
         const config::Line& now = config.lines[i];
-        const config::Line* before = find_same(*snapshot_->config, now);
-        if (known_.lines.emplace(std::pair(now.name, now.listens), lines[i]).second) {
+        const config::Line* before = find_same(*snapshot_->config, now, simulate_);
+        if (known_.lines.emplace(std::pair(now.name, lines[i]->way()), lines[i]).second) {
             lines[i]->start();
         } else if (before == nullptr) {
             lines[i]->apply(now, now);
@@ -198,7 +199,7 @@ void Gateway::apply_lines(const config::Config& config, const Lines& lines) {
 void Gateway::rest_wires(const config::Config& config, const Lines& lines) {
     for (std::size_t i = 0; i < lines.size(); ++i) {
         const std::string wire = explain::wire_of(config.lines[i]);
-        const config::Line* before = find_same(*snapshot_->config, config.lines[i]);
+        const config::Line* before = find_same(*snapshot_->config, config.lines[i], simulate_);
         if (before != nullptr && explain::wire_of(*before) == wire) continue;
         for (const auto& [name, other] : known_.lines) {
             if (other != lines[i] && other->wires().contains(wire))

@@ -233,17 +233,33 @@ void Journal::on_points(const Station& station, const std::vector<std::size_t>& 
     if (!store_ || !station.points) return;
     const WallTime wall = rt::wall_now();
     const std::int64_t number = store::Block::number_of(wall);
+    auto& places = places_[&station];
     for (const std::size_t want : wants) {
         const points::Point* const point = station.points->point_of(want);
         if (point == nullptr) continue;
         const auto value = station.points->read(*point, clock_.now()).good_number();
         if (!value) continue;
-        const std::string name = station.name + '/' + point->name;
-        Running& running = blocks_[name];
+        if (places.size() <= want) places.resize(want + 1);
+        if (places[want] == nullptr) places[want] = block_of(station, *point);
+        if (places[want] == nullptr) continue;
+        auto& [name, running] = *places[want];
         if (running.number != number) write(name, running);
         running.number = number;
         running.block.add(wall, *value);
     }
+}
+
+/// Returns null where so many points are kept already.
+Journal::Blocks::value_type* Journal::block_of(const Station& station, const points::Point& point) {
+    const std::string name = station.name + '/' + point.name;
+    const auto known = blocks_.find(name);
+    if (known != blocks_.end()) return &*known;
+    if (blocks_.size() < settings_.points) return &*blocks_.try_emplace(name).first;
+    if (!std::exchange(told_full_, true))
+        rt::log(rt::LogLevel::warn, "history is full",
+                {{"points", std::to_string(settings_.points)},
+                 {"why", "no values of days are kept of further points"}});
+    return nullptr;
 }
 
 /// Hands a block over, and empties the block.
@@ -264,6 +280,7 @@ void Journal::look() {
         }
         write(at->first, at->second);
         at = blocks_.erase(at);
+        places_.clear();
         ++some;
     }
     alarm_->arm(clock_.now() + kJournalLook, [this] { look(); });

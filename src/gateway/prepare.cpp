@@ -128,7 +128,9 @@ std::vector<StartMessage> prepare(config::Config& config) {
 }
 
 web::SharedText shown_text(const config::Config& config) {
-    return std::make_shared<const std::string>(web::json_text(explain::inventory_json(config)));
+    std::string text = web::json_text(explain::inventory_json(config));
+    text.shrink_to_fit();  // kept as long as the configuration
+    return std::make_shared<const std::string>(std::move(text));
 }
 
 }  // namespace panelgate::gateway

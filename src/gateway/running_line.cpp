@@ -88,16 +88,21 @@ constexpr std::size_t kWires = 64;
 
 }  // namespace
 
+Way way_of(const config::Line& line, bool simulate) {
+    if (line.listens) return Way::listens;
+    return line.device.modbus_tcp && !simulate ? Way::ethernet : Way::wire;
+}
+
 RunningLine::RunningLine(boost::asio::any_io_executor executor, rt::Clock& clock,
                          const config::Line& line, bool simulate, LineWatch watch)
     : executor_(std::move(executor)),
       clock_(clock),
       simulate_(simulate),
-      listens_(line.listens),
+      way_(way_of(line, simulate)),
       watch_(std::move(watch)) {
     auto wire = make_wire(line);
     bus::Settings settings = settings_of(line);
-    if (listens_) {
+    if (way_ == Way::listens) {
         bus_ = std::make_unique<bus::ListeningBus>(executor_, clock_, std::move(settings),
                                                    std::move(wire));
     } else {
@@ -109,7 +114,8 @@ RunningLine::RunningLine(boost::asio::any_io_executor executor, rt::Clock& clock
 bus::Settings RunningLine::settings_of(const config::Line& line) {
     bus::Settings settings = explain::bus_settings(line);
     if (simulated_) settings.device = kSimulatedDevice;
-    settings.arbiter.may_stall = is_remote(line, simulate_) && !line.device.modbus_tcp;
+    settings.arbiter.may_stall = is_remote(line, simulate_) && way_ != Way::ethernet;
+    if (way_ != Way::ethernet) settings.arbiter.in_flight = 0;
     settings.observe = [this, name = line.name](const bus::BusEvent& event) {
         on_event(name, event);
     };
@@ -203,7 +209,7 @@ void RunningLine::forget_points() {
 /// allows.
 void RunningLine::apply_points(const config::Line& line) {
     std::vector<points::PolledStation> wanted = explain::polled_stations(line);
-    if (listens_) {
+    if (way_ == Way::listens) {
         const auto before = std::exchange(heard_, {});
         for (points::PolledStation& one : wanted) {
             const auto made =
@@ -225,7 +231,7 @@ void RunningLine::apply_points(const config::Line& line) {
 }
 
 std::optional<points::StationPoints> RunningLine::points_of(const config::Station& station) const {
-    if (listens_) {
+    if (way_ == Way::listens) {
         const auto found = heard_.find(station.id);
         if (found == heard_.end()) return std::nullopt;
         return points::StationPoints(station.points, station.polls,

@@ -204,7 +204,7 @@ class TcpLine final : public DescriptorLine {
             TcpEndpoint endpoint)
         : DescriptorLine(executor, clock, std::move(settings)),
           endpoint_(std::move(endpoint)),
-          mbap_(this->settings().modbus_tcp ? std::optional<Mbap>(std::in_place) : std::nullopt),
+          mbap_(this->settings().as_rtu ? std::optional<Mbap>(std::in_place) : std::nullopt),
           lookup_(executor, endpoint_),
           socket_(executor),
           patience_(clock.make_alarm()) {}
@@ -242,7 +242,7 @@ class TcpLine final : public DescriptorLine {
     ssize_t get_replies(std::span<std::uint8_t> room);
 
     TcpEndpoint endpoint_;
-    std::optional<Mbap> mbap_;  ///< of a device that speaks Modbus/TCP
+    std::optional<Mbap> mbap_;  ///< of a Modbus/TCP device whose user speaks RTU
     NameLookup lookup_;
     tcp::socket socket_;  ///< while it connects
     std::unique_ptr<rt::Alarm> patience_;
@@ -343,7 +343,7 @@ ssize_t TcpLine::get_replies(std::span<std::uint8_t> room) {
 ssize_t TcpLine::get(std::span<std::uint8_t> room) {
     if (mbap_) return get_replies(room);
     const ssize_t size = DescriptorLine::get(room);
-    if (size <= 0 || std::exchange(has_begun_, true)) return size;
+    if (size <= 0 || settings().modbus_tcp || std::exchange(has_begun_, true)) return size;
     const bool telnet = begins_like_telnet(room.first(static_cast<std::size_t>(size)));
     set_telnet(telnet);
     if (telnet && !std::exchange(told_telnet_, true))
@@ -363,10 +363,11 @@ void TcpLine::was_lost(bool unanswered) {
     if (hang_ups_ < kMany || std::exchange(told_hang_ups_, true)) return;
     rt::log(rt::LogLevel::warn, "device server hangs up on requests",
             {{"device", settings().device},
-             {"advice", mbap_ ? "it may speak RTU over TCP (write tcp://), or another client has "
-                                "its only connection"
-                              : "set its mode to raw (transparent): one that speaks Modbus/TCP "
-                                "refuses RTU frames; or another client has its port"}});
+             {"advice", settings().modbus_tcp
+                            ? "it may speak RTU over TCP (write tcp://), or another client has "
+                              "its only connection"
+                            : "set its mode to raw (transparent): one that speaks Modbus/TCP "
+                              "refuses RTU frames; or another client has its port"}});
 }
 
 void TcpLine::write(ByteView bytes) {

@@ -127,6 +127,7 @@ void HeardValues::set(std::size_t want, const modbus::Span& span, const Items& i
 
 std::vector<Want> wants_of(const std::vector<Point>& points, const std::vector<Poll>& polls) {
     std::vector<Want> wants;
+    wants.reserve(points.size() + polls.size());
     for (const Point& point : points)
         wants.push_back({{point.table, point.address, point.count()}, point.every});
     for (const Poll& poll : polls)

@@ -72,8 +72,24 @@ class Device:
             peer.close()
 
 
-def ethernet(port, name="eth", stations="{id: 1, name: hall}, {id: 2, name: meter}"):
-    return (f"  - {{name: {name}, device: 'modbus-tcp://127.0.0.1:{port}', retries: 0, "
+class Together(Device):
+    """Answers each `count` requests of a connection at once, the last one first."""
+
+    def __init__(self, count):
+        super().__init__(self._keep)
+        self.count = count
+        self.kept = []
+
+    def _keep(self, _, reply):
+        self.kept.append(reply)
+        if len(self.kept) < self.count:
+            return []
+        replies, self.kept = self.kept[::-1], []
+        return replies
+
+
+def ethernet(port, name="eth", stations="{id: 1, name: hall}, {id: 2, name: meter}", in_flight=1):
+    return (f"  - {{name: {name}, device: 'modbus-tcp://127.0.0.1:{port}', retries: 0, in_flight: {in_flight}, "
             f"timing: {{response_timeout: 100ms}}, stations: [{stations}]}}\n")
 
 
@@ -109,13 +125,18 @@ class Ethernet(unittest.TestCase):
             self.assertEqual(client.ask(1, read_registers(10, 1)), bytes([0x83, 0x0B]))
             self.assertEqual(client.ask(1, read_registers(20, 1)), bytes([3, 2]) + struct.pack(">H", 1020))
 
-    def plant(self, *devices):
-        lines = [ethernet(device.port, f"eth{i}", f"{{id: 1, name: a{i}}}, {{id: 2, name: b{i}}}")
+    def plant(self, *devices, in_flight=1):
+        lines = [ethernet(device.port, f"eth{i}", f"{{id: 1, name: a{i}}}, {{id: 2, name: b{i}}}", in_flight)
                  for i, device in enumerate(devices)]
         units = ", ".join(f"{10 * i + n}: eth{i}/{n}" for i in range(len(devices)) for n in (1, 2))
         return config.gateway(*lines, modbus=f"listen: '127.0.0.1:0', units: {{{units}}}")
 
     def test_faults_of_all_kinds_give_no_wrong_value_and_one_answer_each(self):
+        for in_flight, clients in ((1, 1), (8, 8)):
+            with self.subTest(in_flight=in_flight):
+                self.faults(in_flight, clients)
+
+    def faults(self, in_flight, clients):
         chance = random.Random(7)
 
         def fault(device, reply):
@@ -135,28 +156,39 @@ class Ethernet(unittest.TestCase):
                 return [device.late, reply]
             return [reply[:3], reply[3:]] if kind == 6 else [reply]
         with Device(fault) as device, Device() as sound, \
-                harness.configured(self.plant(device, sound)) as program:
-            answers = {3: 0, 0x83: 0}
+                harness.configured(self.plant(device, sound, in_flight=in_flight)) as program:
+            answers = []
 
             def ask(base, times):
                 with program.client() as client:
                     for i in range(times):
                         unit, address = 1 + i % 2, i * 7 % 5000
                         pdu = client.ask(base + unit, read_registers(address, 3))
-                        answers[pdu[0]] += 1
+                        answers.append(pdu[0])
                         if pdu[0] == 3:
                             self.assertEqual(pdu[2:], struct.pack(">3H", *(value_of(unit, address + k)
                                                                            for k in range(3))))
                         else:
                             self.assertIn(pdu[1], (0x0A, 0x0B))
                             self.assertLess(base, 10, "the sound device")
-            asking = [threading.Thread(target=ask, args=(base, times)) for base, times in ((0, 60), (10, 300))]
+            asking = [threading.Thread(target=ask, args=(base, times)) for base, times in ((0, 60), (10, 300))
+                      for _ in range(clients)]
             for one in asking:
                 one.start()
             for one in asking:
                 one.join()
-            self.assertEqual(sum(answers.values()), 360)
-            self.assertGreater(answers[3], 300)
+            self.assertEqual(len(answers), 360 * clients)
+            self.assertGreater(answers.count(3), 300 * clients)
+
+    def test_many_requests_are_on_their_way_at_once(self):
+        # The device answers none of the first four before it has them all: each in a connection's order.
+        with Together(4) as device, harness.configured(self.plant(device, in_flight=4)) as program:
+            clients = [program.client() for _ in range(4)]
+            for i, client in enumerate(clients):
+                client.send(1, read_registers(10 * i, 1))
+            for i, client in enumerate(clients):
+                self.assertEqual(client.receive()[2], bytes([3, 2]) + struct.pack(">H", 1000 + 10 * i))
+                client.close()
 
     def test_what_has_no_wire_is_refused(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -8,17 +8,12 @@
 
 #include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/attempt.hpp"
-#include "panelgate/arbiter/counters.hpp"
+#include "panelgate/arbiter/desk.hpp"
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/judge.hpp"
-#include "panelgate/arbiter/outbox.hpp"
 #include "panelgate/arbiter/queue/job.hpp"
-#include "panelgate/arbiter/queue/job_queue.hpp"
-#include "panelgate/arbiter/queue/read_cache.hpp"
 #include "panelgate/arbiter/quiet.hpp"
-#include "panelgate/arbiter/schedule.hpp"
 #include "panelgate/arbiter/settings.hpp"
-#include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/arbiter/stations.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
@@ -41,7 +36,7 @@ TimePoint latest_start(const SerialFormat& serial, const Job& job);
 ///
 /// A line starts down: on_line_up comes first. Acting on an action may call the arbiter again: the
 /// same loop delivers what that adds. The states and the promises (P1…P9) are those of the README.
-class Arbiter {
+class Arbiter : public Desk {
   public:
     explicit Arbiter(Settings settings);
 
@@ -91,7 +86,6 @@ class Arbiter {
                now >= active_->deadline();
     }
 
-    std::optional<Action> poll_action() { return outbox_.poll(); }
     /// When to call on_deadline next; empty if only an event can change anything.
     std::optional<TimePoint> next_deadline() const;
 
@@ -101,33 +95,19 @@ class Arbiter {
         return active_ && !active_->is_broadcast() ? active_->busy_until() : std::nullopt;
     }
 
-    std::size_t queue_depth() const { return schedule_.backlog().queue().size(); }
     /// True if no job waits and no client's request is on the wire.
     bool idle() const {
         return schedule_.backlog().empty() && (!active_ || active_->group().jobs.empty());
     }
-    const LineCounters& counters() const { return outbox_.line(); }
-    /// By station; unlisted stations share entry 0.
-    const std::map<std::uint8_t, StationCounters>& station_counters() const {
-        return outbox_.stations();
-    }
-    /// Unknown if the station was never asked.
-    StationHealth health(std::uint8_t id) const { return stations_.health(id); }
-    Condition condition(std::uint8_t id) const { return stations_.condition(id); }
-    /// Time that the next request to this station waits for its reply to begin.
-    Duration response_timeout(std::uint8_t id) const { return stations_.response_timeout(id); }
-    const BusShares& shares() const { return outbox_.shares(); }
     EchoState echo() const { return echo_memory_.state(); }
     /// Aborts if an invariant is violated. For tests.
     void check_invariants() const;
 
   private:
     // Requests (arbiter.cpp)
-    std::optional<ReadCache::Hit> from_memory(TimePoint now, const Job& job) const;
     void forget_line();
     void step(TimePoint now);
     bool start_next(TimePoint now);
-    void ask(TimePoint now, Group& group);
     Attempt::Timing timing_of(TimePoint now, const Group& group, std::size_t size) const;
     void start(TimePoint now, Group group);
     void check_active(TimePoint now);
@@ -156,32 +136,18 @@ class Arbiter {
     void fail(TimePoint now, Verdict verdict);
     void end_broadcast(TimePoint now);
     void reopen_if_mute(TimePoint now, const Attempt& attempt, Verdict verdict);
-    void give_back(Group& group);
-    void give_up(TimePoint now, const Group& group, Fault fault);
-    void explain_condition(TimePoint now, std::uint8_t station, Condition before);
     Attempt take_active(TimePoint now);
 
-    Settings settings_;
     modbus::CrcOrders orders_;
     std::optional<modbus::AsciiTranscript> ascii_;  ///< converts what is heard to RTU
-    Stations stations_;
-    Schedule schedule_;
     Quiet quiet_;
-    ReadCache memory_;
     EchoMemory echo_memory_;
-    Outbox outbox_;
     std::optional<Attempt> active_;
     Bytes idle_;                ///< heard without a request, until a silence ends it (MST-04)
     Bytes last_frame_;          ///< sent last: its echo may come when nobody waits for it
     std::uint8_t replied_ = 0;  ///< the station that answered the last frame; 0: none, or not yet
     std::uint8_t replied_before_ = 0;  ///< ... the frame before the last one
-    Ticket last_ticket_ = 0;
-    Transaction transactions_ = 0;
-    TimePoint now_{};   ///< of the last call
-    TimePoint rest_{};  ///< of the wire; kept when the line is opened anew
-    bool up_ = false;
-    bool suspended_ = false;  ///< the line is being replaced, or about to be
-    bool resetting_ = false;  ///< the line is to be opened anew: nothing is sent
+    TimePoint rest_{};                 ///< of the wire; kept when the line is opened anew
     /// T8: how long the connection has been mute.
     struct {
         int attempts = 0;         ///< silent ones in a row, without a byte from any station

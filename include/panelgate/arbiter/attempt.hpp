@@ -26,6 +26,10 @@ enum class Verdict : std::uint8_t {
     wrong,    ///< a good frame of the station that does not answer the request (T13)
 };
 
+TransactionEnd end_of(Verdict verdict);
+/// What its jobs are told if nothing better comes.
+Fault fault_of(Verdict verdict);
+
 /// When the bytes of one attempt are worth a look (P5): where bytes come one by one at the line's
 /// rate, none decides before a header, an echo or the whole reply can be there. Pure.
 class InputPace {

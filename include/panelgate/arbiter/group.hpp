@@ -41,6 +41,10 @@ struct Group {
     Jobs expire(TimePoint now) {
         return take_if(jobs, [&](const Job& job) { return job.deadline <= now; });
     }
+    /// True if another attempt could still answer one of the jobs in time.
+    bool in_time(TimePoint now) const {
+        return std::ranges::any_of(jobs, [&](const Job& job) { return now < job.start_by; });
+    }
     /// True if no client waits for it any more.
     bool abandoned() const { return std::ranges::all_of(jobs, &Job::gone); }
 };

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/queue/job_queue.hpp"
@@ -18,6 +19,9 @@
 #include "panelgate/base/pool.hpp"
 
 namespace panelgate::arbiter {
+
+/// Why this group is sent now.
+Reason reason_of(TimePoint now, const Group& group, const JobQueue& queue);
 
 /// Joins reads to one transaction (P6), and remembers the joined reads that panels refused. Pure.
 class Sharing {
@@ -92,8 +96,11 @@ class Schedule {
 
     void apply(const Settings& settings);
 
+    /// True if a request to this station may be sent now; `read`: it is one.
+    using MayStart = InlineFunction<bool(std::uint8_t station, bool read), 48>;
+    /// `may_start`: empty: any may.
     std::optional<Group> next(TimePoint now, Stations& stations, Quiet& quiet,
-                              const EchoMemory& echo);
+                              const EchoMemory& echo, const MayStart& may_start = {});
     /// When next() may decide otherwise; empty: only after an event.
     std::optional<TimePoint> next_start(TimePoint now, const Stations& stations,
                                         const Quiet& quiet) const;
@@ -121,6 +128,11 @@ class Schedule {
         Stations& stations;
         Quiet& quiet;
         const EchoMemory& echo;
+        const MayStart& may_start;
+
+        bool takes(std::uint8_t station, bool read) const {
+            return !may_start || may_start(station, read);
+        }
     };
     static bool gap_is_over(const Line& line, std::uint8_t station);
     std::optional<Group> next_retry(const Line& line);

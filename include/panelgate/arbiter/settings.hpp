@@ -82,6 +82,8 @@ struct Settings {
     bool share_reads = true;
     /// By default a line is taken to have no echo.
     EchoMode echo = EchoMode::off;
+    /// Requests on their way to a device that speaks Modbus/TCP; 0: a serial line.
+    unsigned in_flight = 0;
     /// Report why each request is sent now and why one is refused.
     bool explain = false;
     /// The pause of a station inside its replies is learned where longer than `reply_hole` (T4).

@@ -129,7 +129,7 @@ class Gateway {
     /// a snapshot, and so its lines, alive for longer than this.
     struct KnownLines {
         ~KnownLines();
-        std::map<std::pair<std::string, bool>, std::shared_ptr<RunningLine>> lines;
+        std::map<std::pair<std::string, Way>, std::shared_ptr<RunningLine>> lines;
     } known_;
     Images images_{loops_.plant, clock_, audit_.stray_writes()};
     std::unique_ptr<Discoveries> discoveries_;       ///< null until `http:` is configured

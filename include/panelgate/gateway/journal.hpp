@@ -23,6 +23,7 @@
 namespace panelgate::gateway {
 
 struct Snapshot;
+struct Station;
 
 /// Where the store's file is: the configured one, else in the folder that systemd or the image
 /// gives ($STATE_DIRECTORY); "" (in memory) if that folder cannot be written.
@@ -40,7 +41,10 @@ class Journal {
     /// Opens the store as configured; one that stays the same goes on.
     void apply(const store::Settings& settings);
     /// The stations and points that are named from now on.
-    void show(std::shared_ptr<const Snapshot> snapshot) { snapshot_ = std::move(snapshot); }
+    void show(std::shared_ptr<const Snapshot> snapshot) {
+        snapshot_ = std::move(snapshot);
+        places_.clear();
+    }
     /// Writes what waits, and closes the store.
     void close();
 
@@ -74,6 +78,9 @@ class Journal {
         store::Block block{};
     };
 
+    using Blocks = std::map<std::string, Running>;
+
+    Blocks::value_type* block_of(const Station& station, const points::Point& point);
     void tell(bool failing, const std::string& why) const;
     void look();
     void write(const std::string& point, Running& running);
@@ -88,8 +95,11 @@ class Journal {
     std::unique_ptr<store::Store> store_;
     std::optional<rt::Worker> closing_;  ///< ends stores
     std::shared_ptr<const Snapshot> snapshot_;
-    std::map<std::string, bool> lines_;      ///< up, by name
-    std::map<std::string, Running> blocks_;  ///< that still grow, by "STATION/POINT"
+    std::map<std::string, bool> lines_;  ///< up, by name
+    Blocks blocks_;                      ///< that still grow, by "STATION/POINT"
+    /// The blocks of a station's points, in their order; null: not found yet.
+    std::map<const Station*, std::vector<Blocks::value_type*>> places_;
+    bool told_full_ = false;
 };
 
 }  // namespace panelgate::gateway

@@ -55,6 +55,15 @@ struct LineWatch {
         admit{};
 };
 
+/// What drives a line.
+enum class Way : std::uint8_t {
+    wire,      ///< an arbiter
+    ethernet,  ///< requests by transaction id
+    listens    ///< nothing: another master drives it
+};
+/// `simulate`: its panels are simulated, whatever its device is.
+Way way_of(const config::Line& line, bool simulate);
+
 /// A running line: bus, simulated panels, and poller or listener of the line. The bus stays the
 /// same object through all reloads, so that clients may keep a reference; the bus of a removed line
 /// is closed and stays. One thread.
@@ -83,7 +92,7 @@ class RunningLine {
     bus::LineBus& bus() { return *bus_; }
     const bus::LineBus& bus() const { return *bus_; }
     const std::shared_ptr<sim::SimulatedBus>& simulated() const { return simulated_; }
-    bool listens() const { return listens_; }
+    Way way() const { return way_; }
     /// Its device, and former ones on which replies may still be outstanding; links resolved.
     const std::set<std::string>& wires() const { return wires_; }
     /// The values of a station's points; nothing without any. The configuration outlives them, this
@@ -101,7 +110,7 @@ class RunningLine {
     boost::asio::any_io_executor executor_;
     rt::Clock& clock_;
     bool simulate_;
-    bool listens_;
+    Way way_;
     LineWatch watch_;
     /// For a line that is only listened to, by station.
     std::map<std::uint8_t, std::shared_ptr<points::HeardValues>> heard_;

@@ -42,6 +42,8 @@ struct Settings {
     bool simulated = false;   ///< our own pty, which has no parity: no warning about that
     std::string owner{};      ///< "line 'floor1'": whose device it is, for messages
     bool modbus_tcp = false;  ///< the device speaks Modbus/TCP: its stations are unit ids
+    /// The line's user writes and hears RTU frames all the same, one request at a time.
+    bool as_rtu = false;
     friend bool operator==(const Settings&, const Settings&) = default;
 };
 

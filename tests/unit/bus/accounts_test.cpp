@@ -193,7 +193,7 @@ class RequestCountersTest : public ::testing::Test {
         settings.stations[0].id = 17;
     }
     StationReport of(const std::string& station) const {
-        for (StationReport& report : counters.report(arbiter::Arbiter(settings)))
+        for (StationReport& report : counters.report(*make_machine(settings)))
             if (report.station == station) return std::move(report);
         ADD_FAILURE() << "no station " << station;
         return {};
@@ -248,7 +248,7 @@ TEST_F(RequestCountersTest, P10NoClientCanAddASeries) {
         for (unsigned function = 0; function <= 255; ++function)
             ask(static_cast<std::uint8_t>(station), static_cast<std::uint8_t>(function));
     }
-    EXPECT_EQ(counters.report(arbiter::Arbiter(settings)).size(), 2u);
+    EXPECT_EQ(counters.report(*make_machine(settings)).size(), 2u);
     const StationReport other = of("other");
     EXPECT_LT(other.requests.size(), 25u) << "those of the standard, and one for all the others";
     EXPECT_EQ(observed(other.request_duration), 255u * 256u);

@@ -39,10 +39,12 @@ std::string text_of(const fs::path& path) {
 config::MemoryFiles all_files() {
     const tls::Issued ca = tls::issue_ca("CA", {0, 1});
     const tls::Issued gateway = tls::issue_server(ca, {"gateway"}, {0, 1});
-    std::map<std::string, std::string> texts{
-        {"/run/secrets/ops", "secret-0123456789"}, {"/run/secrets/other", "other-0123456789"},
-        {"/run/secrets/two", "second-0123456789"}, {"/points/a.csv", "name,at\nq,400005\n"},
-        {"/points/b.csv", "name,at\nq,400005\nr,400006\n"},  {"/profiles/own.yaml", text_of(kGeneric)}};
+    std::map<std::string, std::string> texts{{"/run/secrets/ops", "secret-0123456789"},
+                                             {"/run/secrets/other", "other-0123456789"},
+                                             {"/run/secrets/two", "second-0123456789"},
+                                             {"/points/a.csv", "name,at\nq,400005\n"},
+                                             {"/points/b.csv", "name,at\nq,400005\nr,400006\n"},
+                                             {"/profiles/own.yaml", text_of(kGeneric)}};
     for (const std::string name : {"/tls/a", "/tls/b"}) {
         texts[name + ".crt"] = gateway.certificate;
         texts[name + ".key"] = gateway.key;
@@ -113,6 +115,7 @@ constexpr const char* kFurther = R"(lines:
     serial: {baud: 9600, data_bits: 8, parity: none, stop_bits: 1}
   - {name: c, device: /dev/ttyS8, serial: {mode: rtu}}
   - {name: d, device: "tcp://10.0.0.1:4001", connect_pause: 1s}
+  - {name: e, device: "modbus-tcp://10.0.0.1:502", in_flight: 4}
 modbus_tcp:
   - {listen: "127.0.0.1:502", lines: [a], framing: ascii, ascii_lower_case: take, broadcast: silent}
   - {listen: "127.0.0.1:503", retransmissions: join, units: {101: a/1, 102: a/1}}
