@@ -100,6 +100,8 @@ MEANINGS = {
     "simulator faults set": "a client changed the faults of a simulated panel",
     "slow adapter": "the adapter's latency timer makes each reply late",
     "history is full": "so many points have a history of days that none is kept of further points",
+    "second device": "the first device of a line cannot be opened, and the second one is used",
+    "first device again": "the first device of a line is there again, and is used",
     "store fails": "the file of events and history takes nothing: what comes is lost until `store writes`",
     "store file": "the file of events and history was damaged and is kept, and a new one begins",
     "store writes": "the file of events and history takes events and values again",

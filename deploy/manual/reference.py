@@ -39,7 +39,7 @@ x-fast: &fast {data_bits: 8, stop_bits: 1}    # serial: {<<: *fast, baud: 38400}
     ##timing: {response_timeout: 300ms}
 """
 # What needs a file, or a neighbour that the example has not, or has otherwise.
-NEEDY = {"profiles_dir", "lines.stations.points_file", "access", "modbus_tcp.tls", "http.tls", "lines.stations.template", "lines.stations.points.bit", "http.tokens",
+NEEDY = {"profiles_dir", "lines.stations.points_file", "lines.tls", "access", "modbus_tcp.tls", "http.tls", "lines.stations.template", "lines.stations.points.bit", "http.tokens",
          *(f"alarms.{key}" for key in ("point", "station", "line", "stale", "offline", "down", "above", "below", "equals", "back")),
          "alarm_webhook.ca", "mqtt.password_file", "mqtt.tls", "mqtt.ca", "mqtt.certificate", "mqtt.key"}
 # What needs a device, a broker or a right that not every machine has, and a simulation.

@@ -36,6 +36,10 @@ std::vector<Used> used_by(const config::Config& config) {
         if (!tls) return;
         for (const std::string& path : {tls->certificate, tls->key, tls->ca, tls->crl}) add(path);
     };
+    for (const config::Line& line : config.lines) {
+        add_tls(line.device.tls);
+        for (const config::Station& station : line.stations) add(station.points_file);
+    }
     for (const tcp_server::Settings& listener : config.modbus_tcp) add_tls(listener.tls);
     if (config.http) {
         add_tls(config.http->tls);

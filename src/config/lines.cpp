@@ -55,38 +55,74 @@ void check_other_lines(Reader& in, const std::string& device) {
     const std::string first = in.loading.firsts.again("device " + device, in.mark("device"));
     for (const Line& other : in.loading.config.lines) {
         if (device == "sim") return;
-        warn_of_same_adapter(in, device, "line '" + other.name + '\'', other.device.device);
-        if (other.device.device == device)
-            return in.problem("device",
-                              "line '" + other.name + "' has this device already" + first);
+        for (const std::string& theirs : {other.device.device, other.second}) {
+            warn_of_same_adapter(in, device, "line '" + other.name + '\'', theirs);
+            if (theirs == device)
+                return in.problem("device",
+                                  "line '" + other.name + "' has this device already" + first);
+        }
     }
 }
 
-/// Reads what the line is.
-bool read_device(Reader& in, Line& line) {
-    line.device.device = in.text("device").value_or("");
-    const std::string& device = line.device.device;
-    if (device.empty() || check_comment(in, device)) return false;
+void check_device(Reader& in, const std::string& device) {
     check_other_lines(in, device);
-    if (device == "sim") {
-        line.kind = Line::Kind::simulated;
-    } else if (device.starts_with("tcp://")) {
-        line.kind = Line::Kind::tcp;
-        line.arbiter.may_stall = true;
-        check_tcp_device(in, device);
-    } else if (device.starts_with(kModbusTcp)) {
-        line.kind = Line::Kind::tcp;
-        line.device.modbus_tcp = true;
-        line.device.serial.baud = SerialFormat::kNoWire;
-        check_tcp_device(in, device);
-    } else if (device[0] != '/') {
-        in.problem("device",
-                   "device must be an absolute path such as /dev/ttyUSB0, tcp://HOST:PORT, "
-                   "modbus-tcp://HOST:PORT or sim, not " +
-                       yaml::quote(device) + device_hint(device));
-    } else {
-        check_path(in, device);
+    if (device.starts_with("tcp://") || device.starts_with(kModbusTcp))
+        return check_tcp_device(in, device);
+    if (device == "sim") return;
+    if (device[0] == '/') return check_path(in, device);
+    in.problem("device",
+               "device must be an absolute path such as /dev/ttyUSB0, tcp://HOST:PORT, "
+               "modbus-tcp://HOST:PORT or sim, not " +
+                   yaml::quote(device) + device_hint(device));
+}
+
+/// Settles what the line is.
+void use_device(Line& line, const std::string& device) {
+    line.device.device = device;
+    line.device.modbus_tcp = device.starts_with(kModbusTcp);
+    const bool is_remote = device.starts_with("tcp://") || line.device.modbus_tcp;
+    line.kind = device == "sim" ? Line::Kind::simulated
+                : is_remote     ? Line::Kind::tcp
+                                : Line::Kind::serial;
+    line.arbiter.may_stall = is_remote && !line.device.modbus_tcp;
+    if (line.device.modbus_tcp) line.device.serial.baud = SerialFormat::kNoWire;
+}
+
+/// Both devices must lead to the same panels in the same way.
+void read_second(Reader& in, Line& line, const std::string& device) {
+    const auto is_ethernet = [](const std::string& one) { return one.starts_with(kModbusTcp); };
+    if (device == line.device.device)
+        in.problem("device", "both devices are " + yaml::quote(device) + "; name another one");
+    else if (device == "sim" || line.kind == Line::Kind::simulated)
+        in.problem("device", "sim has no second device");
+    else if (is_ethernet(device) != line.device.modbus_tcp)
+        in.problem(
+            "device",
+            "both devices speak Modbus/TCP (modbus-tcp://), or none: a line's timing is that "
+            "of one kind");
+    else
+        check_device(in, device);
+    line.second = device;
+}
+
+/// A device, or two in a list.
+bool read_device(Reader& in, Line& line) {
+    std::vector<std::string> devices;
+    const Node* const node = in.child("device");
+    if (node != nullptr && node->kind == Node::Kind::sequence) {
+        for (const Node* item : in.scalars("device", "[/dev/ttyUSB0, tcp://10.0.0.5:4001]"))
+            devices.push_back(item->scalar);
+        if (devices.size() != 2)
+            in.problem("device",
+                       "a list has two devices: the first, and the second that is used "
+                       "while the first cannot be opened");
+    } else if (const auto device = in.text("device")) {
+        devices.push_back(*device);
     }
+    if (devices.empty() || devices[0].empty() || check_comment(in, devices[0])) return false;
+    check_device(in, devices[0]);
+    use_device(line, devices[0]);
+    if (devices.size() == 2) read_second(in, line, devices[1]);
     return true;
 }
 
@@ -109,7 +145,22 @@ bool read_stations(Reader& in, Line& line) {
     return true;
 }
 
+KeyShape device_shape() {
+    KeyShape shape = text_shape("device", {"^(/|(modbus-)?tcp://.+:[0-9]+$|sim$)", false},
+                                "Serial device, tcp://HOST:PORT (RTU over TCP), "
+                                "modbus-tcp://HOST:PORT (a device on Ethernet), or sim (simulated "
+                                "panels); a list of two: the second is used while the first cannot "
+                                "be opened.");
+    shape.may_be_pair = true;
+    return shape;
+}
+
 }  // namespace
+
+Line by_second(Line line) {
+    use_device(line, line.second);
+    return line;
+}
 
 const Keys<Line>& line_keys() {
     using arbiter::Quarantine;
@@ -124,11 +175,11 @@ const Keys<Line>& line_keys() {
             .required()
             .example("floor1")
             .change_needs(kOpensPort)
-            .value(text_shape("device", {"^(/|(modbus-)?tcp://.+:[0-9]+$|sim$)", false},
-                              "Serial device, tcp://HOST:PORT (RTU over TCP), "
-                              "modbus-tcp://HOST:PORT (a device on Ethernet), or sim (simulated "
-                              "panels)."),
-                   read_device, [](const Line& line) { return line.device.device; })
+            .value(device_shape(), read_device,
+                   [](const Line& line) {
+                       if (line.second.empty()) return line.device.device;
+                       return '[' + line.device.device + ", " + line.second + ']';
+                   })
             .required()
             .example("/dev/serial/by-id/usb-adapter")
             .change_needs(kOpensPort)
@@ -143,6 +194,16 @@ const Keys<Line>& line_keys() {
                 "Requests that may be on their way to a modbus-tcp:// device at the same time.")
             .initially("1")
             .shown_if([](const Line& line) { return line.device.modbus_tcp; })
+            .below(
+                shape_of("tls", Kind::map,
+                         "TLS to a modbus-tcp:// device (Modbus/TCP Security, port 802)."),
+                []() -> const Table& { return device_tls_keys(); }, load_device_tls,
+                [](const SettingWriter& out, const Line& line, const SettingWriter*) {
+                    show_device_tls(out, line);
+                })
+            .weaker(By::removed)
+            .change_needs(kOpensPort)
+            .not_empty("give ca, certificate and key, or leave it out")
             .word("mode", &Line::listens, kModes,
                   "listen: another master asks on this line, nothing is ever sent, and points show "
                   "what passes by.",

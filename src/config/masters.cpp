@@ -26,7 +26,7 @@ void check_device(Reader& in, const line::Settings& port) {
     const std::string first = in.loading.firsts.again("device " + port.device, in.mark("device"));
     for (const Line& line : in.loading.config.lines) {
         warn_of_same_adapter(in, port.device, "line '" + line.name + '\'', line.device.device);
-        if (line.device.device != port.device) continue;
+        if (line.device.device != port.device && line.second != port.device) continue;
         in.problem("device", "line '" + line.name +
                                  "' has this device already; a master needs a port of its own" +
                                  first);

@@ -162,6 +162,10 @@ std::optional<Standing> find_role(Reader& in, std::string_view key, const std::s
 bool load_tls(Reader& in, std::optional<tls::Settings>& settings);
 void show_tls(const SettingWriter& out, const std::optional<tls::Settings>& settings);
 KeyShape tls_shape(std::string_view text);
+/// Of a device on Ethernet.
+const Keys<tls::Settings>& device_tls_keys();
+bool load_device_tls(Reader& in, Line& line);
+void show_device_tls(const SettingWriter& out, const Line& line);
 /// Of Modbus/TCP Security, where a listener with `tls` names no port.
 inline constexpr std::uint16_t kSecurePort = 802;
 

@@ -114,6 +114,7 @@ struct Heading {
 
 Heading heading_of(const config::Line& line) {
     std::string text = "line " + line.name + ": " + line.device.device;
+    if (!line.second.empty()) text += " or else " + line.second;
     if (line.kind != config::Line::Kind::tcp) {
         text += ", " + to_string(line.device.serial);
     } else if (line.device.serial.mode == SerialMode::ascii) {

@@ -258,6 +258,11 @@ class Schema {
                                                        : any_of(shape);
         if (shape.may_be_text && shape.kind != Kind::list)
             made = {{"anyOf", json::array{std::move(made), text_of(shape), reference("variable")}}};
+        if (shape.may_be_pair)
+            made = {{"anyOf", json::array{std::move(made), json::object{{"type", "array"},
+                                                                        {"items", text_of(shape)},
+                                                                        {"minItems", 2},
+                                                                        {"maxItems", 2}}}}};
         const std::string text = description_of(shape);
         if (!text.empty()) made["description"] = text;
         if (!shape.initial.empty()) made["default"] = as_json(shape, shape.initial);

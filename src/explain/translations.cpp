@@ -145,7 +145,7 @@ std::string wire_of(const config::Line& line) {
 }
 
 bool is_same_wire(const config::Line& before, const config::Line& now, bool simulate) {
-    return before.kind == now.kind && before.device == now.device &&
+    return before.kind == now.kind && before.device == now.device && before.second == now.second &&
            before.listens == now.listens && arbiter::is_same_wire(before.arbiter, now.arbiter) &&
            (!is_simulated(now, simulate) || plays_alike(before, now));
 }

@@ -144,6 +144,12 @@ std::vector<std::string> certificate_doubts(const config::Config& config, std::i
         for (const std::string& doubt : tls::doubts(tls, names, now))
             all.push_back(listener + ": " + doubt);
     };
+    for (const config::Line& line : config.lines) {
+        const auto device = line::parse_tcp_device(line.device.device);
+        if (!line.device.tls || !device) continue;
+        for (const std::string& doubt : tls::client_doubts(*line.device.tls, device->host, now))
+            all.push_back("line " + line.name + ": " + doubt);
+    }
     for (const tcp_server::Settings& listener : config.modbus_tcp)
         if (listener.tls)
             add("modbus_tcp " + listener.name(), *listener.tls, names_of(listener.address, {}));

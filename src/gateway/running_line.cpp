@@ -109,6 +109,32 @@ RunningLine::RunningLine(boost::asio::any_io_executor executor, rt::Clock& clock
         bus_ = std::make_unique<bus::Bus>(executor_, clock_, std::move(settings), std::move(wire));
     }
     apply_points(line);
+    apply_ways(line);
+}
+
+/// A line with two devices begins with the first one.
+void RunningLine::apply_ways(const config::Line& line) {
+    ways_.reset();
+    configured_.reset();
+    if (line.second.empty() || explain::is_simulated(line, simulate_)) return;
+    configured_ = line;
+    for (config::Station& station : configured_->stations) {
+        station.points.clear();
+        station.polls.clear();
+    }
+    ways_ =
+        std::make_unique<SecondWay>(executor_, clock_, [this](bool second) { use_way(second); });
+    if (running_) ways_->start(line.device, is_remote(line, simulate_));
+}
+
+void RunningLine::use_way(bool second) {
+    const config::Line way = second ? by_second(*configured_) : *configured_;
+    const std::vector<rt::LogField> fields{{"line", way.name}, {"device", way.device.device}};
+    if (second)
+        rt::log(rt::LogLevel::warn, "second device", fields);
+    else
+        rt::log(rt::LogLevel::info, "first device again", fields);
+    bus_->apply(settings_of(way), make_wire(way), nullptr);
 }
 
 bus::Settings RunningLine::settings_of(const config::Line& line) {
@@ -153,6 +179,7 @@ std::unique_ptr<line::Line> RunningLine::make_wire(const config::Line& line) {
 
 void RunningLine::start() {
     running_ = true;
+    if (ways_) ways_->start(configured_->device, is_remote(*configured_, simulate_));
     if (simulated_) simulated_->start();
     bus_->start();
     if (poller_) poller_->start();
@@ -160,6 +187,7 @@ void RunningLine::start() {
 
 void RunningLine::stop() {
     running_ = false;
+    if (ways_) ways_->stop();
     if (poller_) poller_->stop();
     bus_->stop();
     if (simulated_) simulated_->stop();
@@ -179,6 +207,7 @@ bus::MinuteUse RunningLine::last_minute() const {
 }
 
 void RunningLine::dispose() {
+    ways_.reset();
     poller_.reset();
     bus_.reset();
     simulated_.reset();
@@ -187,16 +216,20 @@ void RunningLine::dispose() {
 /// The polls change after the bus, so that nothing is sent with the old settings.
 void RunningLine::apply(const config::Line& before, const config::Line& now) {
     if (running_ && explain::is_same_wire(before, now, simulate_)) {
-        bus_->apply(settings_of(now), nullptr, nullptr);
+        const bool second = ways_ && ways_->second();
+        bus_->apply(settings_of(second ? by_second(now) : now), nullptr, nullptr);
     } else {
         std::shared_ptr<sim::SimulatedBus> far_end = simulated_;
         auto wire = make_wire(now);
         if (simulated_) simulated_->start();
         bus_->apply(settings_of(now), std::move(wire), std::move(far_end));
         if (explain::wire_of(before) != explain::wire_of(now)) forget_points();
+        apply_ways(now);
     }
     apply_points(now);
-    if (!std::exchange(running_, true) && poller_) poller_->start();
+    const bool was_running = std::exchange(running_, true);
+    if (ways_ && !was_running) ways_->start(now.device, is_remote(now, simulate_));
+    if (!was_running && poller_) poller_->start();
 }
 
 /// Drops all values: they were those of other panels.
@@ -244,6 +277,9 @@ std::optional<points::StationPoints> RunningLine::points_of(const config::Statio
 
 void RunningLine::on_event(const std::string& line, const bus::BusEvent& event) {
     if (const auto* heard = std::get_if<tap::Transaction>(&event)) hear(line, *heard);
+    const auto* state = std::get_if<bus::LineEvent>(&event);
+    const bool is_state = state != nullptr && state->station == 0;
+    if (is_state && ways_) ways_->on_line(state->up);
     const auto* write = std::get_if<bus::WriteEvent>(&event);
     if (write != nullptr && write_listener_) write_listener_(*write);
     watch_.event(line, event);

@@ -35,6 +35,8 @@
 #include "panelgate/line/settings.hpp"
 #include "panelgate/rt/acceptor.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/tls/client_end.hpp"
+#include "panelgate/tls/context.hpp"
 
 namespace panelgate::line {
 
@@ -222,12 +224,17 @@ class TcpLine final : public DescriptorLine {
     void resolve();
     ssize_t get(std::span<std::uint8_t> room) override;
     ssize_t put(ByteView bytes) override {
-        return ::send(fd(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
+        return tls_ ? tls_->write(bytes) : ::send(fd(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    }
+    ssize_t get_bytes(std::span<std::uint8_t> room) {
+        return tls_ ? tls_->read(room) : DescriptorLine::get(room);
     }
     void was_lost(bool unanswered) override;
     void cancel_open() override;
     void give_up();
     void connect(const NameLookup::Addresses& addresses);
+    void secure();
+    void shake();
     void connected();
     void failed(const std::string& why) {
         cancel_open();
@@ -245,6 +252,7 @@ class TcpLine final : public DescriptorLine {
     std::optional<Mbap> mbap_;  ///< of a Modbus/TCP device whose user speaks RTU
     NameLookup lookup_;
     tcp::socket socket_;  ///< while it connects
+    std::unique_ptr<tls::ClientEnd> tls_;
     std::unique_ptr<rt::Alarm> patience_;
     std::uint64_t attempt_ = 0;
     TimePoint last_write_{};
@@ -280,8 +288,33 @@ void TcpLine::connect(const NameLookup::Addresses& addresses) {
                         [this, current = current()](const error_code& error, const tcp::endpoint&) {
                             if (!current()) return;
                             if (error) return failed(error.message());
-                            connected();
+                            settings().tls ? secure() : connected();
                         });
+}
+
+void TcpLine::secure() {
+    error_code ignored;
+    socket_.non_blocking(true, ignored);
+    try {
+        tls_ = std::make_unique<tls::ClientEnd>(
+            std::make_shared<const tls::ClientContext>(*settings().tls, endpoint_.host),
+            endpoint_.host, socket_.native_handle());
+    } catch (const tls::Unusable& why) {
+        return failed(why.what());
+    }
+    shake();
+}
+
+void TcpLine::shake() {
+    using Step = tls::ClientEnd::Step;
+    const Step step = tls_->shake();
+    if (step == Step::done) return connected();
+    if (step == Step::failed) return failed(tls_->why());
+    socket_.async_wait(step == Step::wants_input ? tcp::socket::wait_read : tcp::socket::wait_write,
+                       [this, current = current()](const error_code& error) {
+                           if (!current()) return;
+                           error ? failed(error.message()) : shake();
+                       });
 }
 
 void TcpLine::connected() {
@@ -303,6 +336,7 @@ void TcpLine::connected() {
 
 void TcpLine::cancel_open() {
     ++attempt_;
+    tls_.reset();
     lookup_.cancel();
     patience_->cancel();
     error_code ignored;
@@ -331,7 +365,7 @@ bool begins_like_telnet(ByteView bytes) {
 }  // namespace
 
 ssize_t TcpLine::get_replies(std::span<std::uint8_t> room) {
-    const ssize_t size = DescriptorLine::get(room.first(std::min(room.size(), Mbap::kRead)));
+    const ssize_t size = get_bytes(room.first(std::min(room.size(), Mbap::kRead)));
     if (size <= 0) return size;
     const auto frames = mbap_->replies(room.first(static_cast<std::size_t>(size)));
     errno = frames ? EAGAIN : EPROTO;
@@ -342,7 +376,7 @@ ssize_t TcpLine::get_replies(std::span<std::uint8_t> room) {
 
 ssize_t TcpLine::get(std::span<std::uint8_t> room) {
     if (mbap_) return get_replies(room);
-    const ssize_t size = DescriptorLine::get(room);
+    const ssize_t size = get_bytes(room);
     if (size <= 0 || settings().modbus_tcp || std::exchange(has_begun_, true)) return size;
     const bool telnet = begins_like_telnet(room.first(static_cast<std::size_t>(size)));
     set_telnet(telnet);
@@ -400,6 +434,7 @@ bool TcpLine::undelivered() {
 void TcpLine::close_device(bool discard) {
     const linger at_once{1, 0};
     if (discard) ::setsockopt(fd(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+    tls_.reset();
     DescriptorLine::close_device(discard);
 }
 

@@ -1,6 +1,9 @@
 """Devices on Ethernet as lines: modbus-tcp://HOST:PORT. A foreign server, and one with faults."""
+import contextlib
+import os
 import random
 import socket
+import ssl
 import struct
 import subprocess
 import sys
@@ -10,6 +13,7 @@ import unittest
 
 import config
 import harness
+import tls_plant
 from harness import read_registers, write_register
 from test_points import until
 
@@ -32,11 +36,12 @@ class Device:
     """A Modbus/TCP server: a register holds value_of(). `fault(request)` gives what is sent instead of the
     reply, as a list of bytes; None: the reply; and whether the connection goes on. A context manager."""
 
-    def __init__(self, fault=lambda device, reply: [reply]):
+    def __init__(self, fault=lambda device, reply: [reply], port=0):
         self.fault = fault
         self.late = None
         self.asked = 0
-        self._server = socket.create_server(("127.0.0.1", 0))
+        self._server = socket.create_server(("127.0.0.1", port))
+        self._peers = []
         self.port = self._server.getsockname()[1]
 
     def __enter__(self):
@@ -46,17 +51,34 @@ class Device:
     def __exit__(self, *_):
         self._server.close()
 
+    def secure(self, peer):
+        """What a connection becomes."""
+        return peer
+
+    def shut(self):
+        """Takes no connections any more, and ends those that there are."""
+        for one in [self._server, *self._peers]:
+            with contextlib.suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)
+            one.close()
+
     def _serve(self):
         while True:
             try:
                 peer, _ = self._server.accept()
             except OSError:
                 return
+            self._peers.append(peer)
+            try:
+                peer = self.secure(peer)
+            except OSError:
+                continue  # refused
             threading.Thread(target=self._answer, args=(peer,), daemon=True).start()
 
     def _answer(self, peer):
         try:
-            while len(head := peer.recv(12, socket.MSG_WAITALL)) == 12:
+            stream = peer.makefile("rb")
+            while len(head := stream.read(12)) == 12:
                 number, _, _, unit, function, address, count = struct.unpack(">HHHBBHH", head)
                 values = [value_of(unit, address + i) for i in range(count)]
                 pdu = struct.pack(f">BB{count}H", function, 2 * count, *values)
@@ -70,6 +92,20 @@ class Device:
             pass
         finally:
             peer.close()
+
+
+class Secure(Device):
+    """Modbus/TCP Security: TLS, and a certificate of the client's."""
+
+    def __init__(self, plant):
+        super().__init__()
+        self.context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        self.context.load_cert_chain(plant.path("localhost.crt"), plant.path("localhost.key"))
+        self.context.load_verify_locations(plant.path("ca.crt"))
+        self.context.verify_mode = ssl.CERT_REQUIRED
+
+    def secure(self, peer):
+        return self.context.wrap_socket(peer, server_side=True)
 
 
 class Together(Device):
@@ -189,6 +225,29 @@ class Ethernet(unittest.TestCase):
             for i, client in enumerate(clients):
                 self.assertEqual(client.receive()[2], bytes([3, 2]) + struct.pack(">H", 1000 + 10 * i))
                 client.close()
+
+    def test_tls_to_a_device(self):
+        with tls_plant.plant() as made, tls_plant.plant() as other, Secure(made) as device:
+            def secured(ca, name="scada"):
+                keys = f"tls: {{ca: {ca}, certificate: {made.path(name + '.crt')}, key: {made.path(name + '.key')}}}, "
+                return config.gateway(ethernet(device.port, in_flight=4).replace("retries: 0", keys + "retries: 0"))
+            with harness.configured(secured(made.path("ca.crt"))) as program, program.client() as client:
+                for i in range(50):
+                    until(lambda: client.ask(1, read_registers(i, 100))[0] == 3)
+                self.assertEqual(client.ask(1, read_registers(7, 1)), bytes([3, 2]) + struct.pack(">H", 1007))
+            with harness.configured(secured(other.path("ca.crt"))) as program:
+                program.log.wait_for("line down line=eth why=.*(signed|trust|certificate)")
+            said = harness.run("check", "-c", self.written(secured(made.path("ca.crt")).replace("ca.crt", "none.crt")))
+            self.assertIn("none.crt; give the path of a PEM file", said.stderr)
+            plain = secured(made.path("ca.crt")).replace("modbus-tcp://", "tcp://").replace("in_flight: 4, ", "")
+            self.assertIn("tls belongs to a device of modbus-tcp://",
+                          harness.run("check", "-c", self.written(plain)).stderr)
+
+    def written(self, text):
+        with tempfile.NamedTemporaryFile("w", suffix=".yaml", delete=False) as file:
+            file.write(text)
+        self.addCleanup(os.unlink, file.name)
+        return file.name
 
     def test_what_has_no_wire_is_refused(self):
         with tempfile.TemporaryDirectory() as folder:

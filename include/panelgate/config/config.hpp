@@ -69,6 +69,7 @@ struct Line {
     std::string name;
     Kind kind = Kind::serial;
     line::Settings device;
+    std::string second{};       ///< device that is used while the first cannot be opened; "": none
     arbiter::Settings arbiter;  ///< with the resolved timing of every station
     bool listens = false;       ///< another master polls it: the gateway never sends
     bool refuse_unlisted = false;
@@ -79,6 +80,9 @@ struct Line {
     LineAccess access;
     friend bool operator==(const Line&, const Line&) = default;
 };
+
+/// The line with its second device in place of the first.
+Line by_second(Line line);
 
 /// A valid configuration (docs/reference/configuration.md): defaults filled in, references
 /// resolved.

@@ -69,6 +69,7 @@ struct KeyShape {
     std::string change = {};       ///< what a change of it needs beside a reload; or ""
     int order = 0;                 ///< among the keys of its map
     Weaker weaker = {};
+    bool may_be_pair = false;  ///< of Kind::text: a list of two says more
     bool may_be_text = false;  ///< of Kind::map, and of a list's maps: a text says the same
 };
 

@@ -17,6 +17,7 @@
 #include "panelgate/config/config.hpp"
 #include "panelgate/explain/translations.hpp"
 #include "panelgate/gateway/plant.hpp"
+#include "panelgate/gateway/second_way.hpp"
 #include "panelgate/points/poller.hpp"
 #include "panelgate/points/relays.hpp"
 #include "panelgate/points/settings.hpp"
@@ -104,6 +105,8 @@ class RunningLine {
     std::unique_ptr<line::Line> make_wire(const config::Line& line);
     void apply_points(const config::Line& line);
     void forget_points();
+    void apply_ways(const config::Line& line);
+    void use_way(bool second);
     void on_event(const std::string& line, const bus::BusEvent& event);
     void hear(const std::string& line, const tap::Transaction& heard);
 
@@ -120,6 +123,9 @@ class RunningLine {
     std::unique_ptr<points::Poller> poller_;  ///< null if nothing was ever polled
     std::set<std::string> wires_;
     bus::LastMinute minute_;
+    /// Of a line with two devices: the line without its points, and what decides.
+    std::optional<config::Line> configured_;
+    std::unique_ptr<SecondWay> ways_;
     bool running_ = false;
 };
 

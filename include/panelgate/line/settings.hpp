@@ -7,6 +7,7 @@
 
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/tls/settings.hpp"
 
 namespace panelgate::line {
 
@@ -44,6 +45,7 @@ struct Settings {
     bool modbus_tcp = false;  ///< the device speaks Modbus/TCP: its stations are unit ids
     /// The line's user writes and hears RTU frames all the same, one request at a time.
     bool as_rtu = false;
+    std::optional<tls::Settings> tls{};  ///< of the connection to such a device
     friend bool operator==(const Settings&, const Settings&) = default;
 };
 

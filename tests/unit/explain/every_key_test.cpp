@@ -115,7 +115,8 @@ constexpr const char* kFurther = R"(lines:
     serial: {baud: 9600, data_bits: 8, parity: none, stop_bits: 1}
   - {name: c, device: /dev/ttyS8, serial: {mode: rtu}}
   - {name: d, device: "tcp://10.0.0.1:4001", connect_pause: 1s}
-  - {name: e, device: "modbus-tcp://10.0.0.1:502", in_flight: 4}
+  - {name: e, device: "modbus-tcp://10.0.0.1:802", in_flight: 4,
+     tls: {ca: /tls/a-ca.crt, certificate: /tls/a.crt, key: /tls/a.key}}
 modbus_tcp:
   - {listen: "127.0.0.1:502", lines: [a], framing: ascii, ascii_lower_case: take, broadcast: silent}
   - {listen: "127.0.0.1:503", retransmissions: join, units: {101: a/1, 102: a/1}}
