@@ -35,7 +35,6 @@
 #include "panelgate/line/settings.hpp"
 #include "panelgate/rt/acceptor.hpp"
 #include "panelgate/rt/log.hpp"
-#include "panelgate/tls/client_end.hpp"
 #include "panelgate/tls/context.hpp"
 
 namespace panelgate::line {

@@ -1,13 +1,17 @@
 #pragma once
 
+#include <sys/types.h>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <string>
 
+#include "panelgate/base/bytes.hpp"
 #include "panelgate/tls/settings.hpp"
 
 struct ssl_ctx_st;
+struct ssl_st;
 struct x509_st;
 
 namespace panelgate::tls {
@@ -58,6 +62,33 @@ class ClientContext {
   private:
     std::string refusal_;  ///< the context's verification writes it
     std::shared_ptr<ssl_ctx_st> context_;
+};
+
+/// The client's end of TLS over a connected, non-blocking socket that stays its owner's. Nothing
+/// waits: the owner watches the socket.
+class ClientEnd {
+  public:
+    /// `server`: the name or address that the context was made for.
+    ClientEnd(std::shared_ptr<const ClientContext> context, const std::string& server, int socket);
+    ~ClientEnd();
+    ClientEnd(const ClientEnd&) = delete;
+    ClientEnd& operator=(const ClientEnd&) = delete;
+
+    enum class Step : std::uint8_t { done, wants_input, wants_output, failed };
+    /// Goes on with the handshake.
+    Step shake();
+    /// Why the handshake has failed, in one sentence.
+    const std::string& why() const { return why_; }
+    /// Like ::read and ::write, with errno EAGAIN and EPROTO.
+    ssize_t read(std::span<std::uint8_t> room);
+    ssize_t write(ByteView bytes);
+
+  private:
+    ssize_t result_of(int result) const;
+
+    std::shared_ptr<const ClientContext> context_;
+    std::unique_ptr<ssl_st, void (*)(ssl_st*)> tls_;
+    std::string why_;
 };
 
 }  // namespace panelgate::tls
