@@ -21,6 +21,7 @@
 #include "panelgate/explain/rights_text.hpp"
 #include "panelgate/gateway/certificates.hpp"
 #include "panelgate/gateway/prepare.hpp"
+#include "panelgate/imports/import.hpp"
 #include "panelgate/mbusd/conf.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/web/http/json_text.hpp"
@@ -193,16 +194,12 @@ ExitCode check(const std::string& file, const CheckOptions& options) {
     return loaded.code != kFine ? loaded.code : compared.loaded.code;
 }
 
-ExitCode import_conf(const std::string& file, const OutputFile& output) {
-    if (const ExitCode refused = may_write(output); refused != kFine) return refused;
-    const std::string path = explain::path_of(file);
-    const auto text = config::RealFiles::read_any(path);
-    if (!text) {
-        std::cerr << "panelgate: cannot read " << path << ": " << std::strerror(errno) << '\n';
-        return kNoInput;
-    }
-    yaml::Problems problems(path);
-    const auto imported = mbusd::import_conf(*text, problems);
+namespace {
+
+/// What another program's file has become.
+template <class Imported>
+ExitCode hand_over(const std::optional<Imported>& imported, const yaml::Problems& problems,
+                   const OutputFile& output) {
     if (!imported) {
         std::cerr << problems.text();
         return kBadConfig;
@@ -213,6 +210,23 @@ ExitCode import_conf(const std::string& file, const OutputFile& output) {
         return cannot_write(output);
     for (const std::string& note : imported->notes) std::cerr << note << '\n';
     return kFine;
+}
+
+}  // namespace
+
+ExitCode import_conf(const std::string& file, const OutputFile& output) {
+    if (const ExitCode refused = may_write(output); refused != kFine) return refused;
+    const std::string path = explain::path_of(file);
+    const auto text = config::RealFiles::read_any(path);
+    if (!text) {
+        std::cerr << "panelgate: cannot read " << path << ": " << std::strerror(errno) << '\n';
+        return kNoInput;
+    }
+    yaml::Problems problems(path);
+    bool is_known = false;
+    const auto tags = imports::import_tags(*text, problems, is_known);
+    if (is_known) return hand_over(tags, problems, output);
+    return hand_over(mbusd::import_conf(*text, problems), problems, output);
 }
 
 }  // namespace panelgate::commands

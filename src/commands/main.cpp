@@ -362,11 +362,11 @@ class CommandLine {
     void add_import() {
         CLI::App* command = cli_.add_subcommand(
             "import",
-            "make a configuration of another gateway's: of mbusd's mbusd.conf or command line");
+            "make a configuration of another program's: mbusd, Kepware, Telegraf, Home Assistant");
         command
             ->add_option("FILE", imported_,
-                         "its mbusd.conf, or the unit or script that starts it with options; - for "
-                         "standard input")
+                         "mbusd.conf, or the unit or script that starts mbusd with options; a CSV, "
+                         "a telegraf.conf, a configuration.yaml; - for standard input")
             ->required();
         add_output(command);
         command->footer(

@@ -102,7 +102,7 @@ bool is_foreign(std::string_view text, yaml::Problems& problems) {
         if (at == text.npos) continue;
         const auto line = 1 + std::ranges::count(text.substr(0, at), '\n');
         problems.add({static_cast<int>(line), 1}, "this is a file of " + std::string(program) +
-                                                      ", and import reads those of mbusd; " +
+                                                      ", which import does not read so; " +
                                                       std::string(page) +
                                                       " says which key is which here");
         return true;

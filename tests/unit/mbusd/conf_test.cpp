@@ -154,11 +154,11 @@ TEST(MbusdConf, TakesTheCommandLineOfAUnitOrAShell) {
 TEST(MbusdConf, NamesTheProgramWhoseFileThisIs) {
     const std::pair<const char*, const char*> rows[] = {
         {"connection: &panel\n  accepter: tcp,4001\n",
-         "mbusd.conf:2:1: this is a file of ser2net, and import reads those of mbusd; "
+         "mbusd.conf:2:1: this is a file of ser2net, which import does not read so; "
          "docs/start/from-ser2net says which key is which here\n"},
         {"4001:raw:0:/dev/ttyUSB0:9600 8DATABITS NONE 1STOPBIT\n", "a file of ser2net"},
         {"modbus:\n  - name: hub\n    type: serial\n    bytesize: 8\n",
-         "4:1: this is a file of Home Assistant, and import reads those of mbusd; "
+         "4:1: this is a file of Home Assistant, which import does not read so; "
          "docs/start/from-other-programs"},
         {"[[inputs.modbus]]\n  name = \"Device\"\n", "1:1: this is a file of Telegraf"},
         {"modules:\n  - name: fake\n    metrics:\n      - metricType: gauge\n",
