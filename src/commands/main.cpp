@@ -361,8 +361,7 @@ class CommandLine {
 
     void add_import() {
         CLI::App* command = cli_.add_subcommand(
-            "import",
-            "make a configuration of another program's: mbusd, Kepware, Telegraf, Home Assistant");
+            "import", "make a configuration of mbusd's, Kepware's, Telegraf's or Home Assistant's");
         command
             ->add_option("FILE", imported_,
                          "mbusd.conf, or the unit or script that starts mbusd with options; a CSV, "
