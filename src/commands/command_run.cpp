@@ -203,9 +203,15 @@ std::unique_ptr<gateway::FileWatch> watch_of(const Service& service,
                                              const asio::any_io_executor& executor,
                                              rt::Clock& clock, gateway::Reloader& reloader) {
     if (!service.watch) return nullptr;
-    return std::make_unique<gateway::FileWatch>(executor, clock, service.file, [&reloader] {
-        reload_file(reloader, "the file has changed");
-    });
+    const auto files = [&reloader, file = service.file] {
+        std::vector<std::string> all{file};
+        for (const config::Line& line : reloader.running()->lines)
+            for (const config::Station& station : line.stations)
+                if (!station.points_file.empty()) all.push_back(station.points_file);
+        return all;
+    };
+    return std::make_unique<gateway::FileWatch>(
+        executor, clock, files, [&reloader] { reload_file(reloader, "the file has changed"); });
 }
 
 /// Ends the process soon, though a thread should wait for a disk or a share that does not answer.

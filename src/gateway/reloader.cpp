@@ -19,19 +19,11 @@
 
 namespace panelgate::gateway {
 
-FileWatch::FileWatch(boost::asio::any_io_executor executor, rt::Clock& clock, std::string path,
-                     std::function<void()> changed)
-    : path_(std::move(path)),
-      changed_(std::move(changed)),
-      clock_(clock),
-      alarm_(clock.make_alarm()),
-      known_(stamp_of(path_)),
-      seen_(known_),
-      worker_(std::move(executor)) {
-    later();
-}
+namespace {
 
-FileWatch::Stamp FileWatch::stamp_of(const std::string& path) {
+using Stamp = std::optional<std::tuple<std::uint64_t, std::uint64_t, std::int64_t, std::int64_t>>;
+
+Stamp stamp_of(const std::string& path) {
     struct stat facts{};
     if (::stat(path.c_str(), &facts) != 0) return std::nullopt;
     const std::int64_t changed = facts.st_mtim.tv_sec * 1'000'000'000 + facts.st_mtim.tv_nsec;
@@ -39,23 +31,49 @@ FileWatch::Stamp FileWatch::stamp_of(const std::string& path) {
                       std::int64_t{facts.st_size}, changed);
 }
 
+}  // namespace
+
+FileWatch::FileWatch(boost::asio::any_io_executor executor, rt::Clock& clock,
+                     std::function<std::vector<std::string>()> files, std::function<void()> changed)
+    : files_(std::move(files)),
+      changed_(std::move(changed)),
+      clock_(clock),
+      alarm_(clock.make_alarm()),
+      known_(stamps_of(files_())),
+      seen_(known_),
+      worker_(std::move(executor)) {
+    later();
+}
+
+FileWatch::Stamps FileWatch::stamps_of(const std::vector<std::string>& paths) {
+    Stamps stamps;
+    for (const std::string& path : paths) stamps.emplace(path, stamp_of(path));
+    return stamps;
+}
+
 void FileWatch::later() {
     alarm_->arm(clock_.now() + kEvery, [this] { look(); });
 }
 
 void FileWatch::look() {
-    auto stamp = std::make_shared<Stamp>();
-    worker_.run([stamp, path = path_] { *stamp = stamp_of(path); },
-                [this, stamp, alive = std::weak_ptr(alive_)] {
-                    if (!alive.expired()) judge(*stamp);
+    auto stamps = std::make_shared<Stamps>();
+    worker_.run([stamps, paths = files_()] { *stamps = stamps_of(paths); },
+                [this, stamps, alive = std::weak_ptr(alive_)] {
+                    if (!alive.expired()) judge(*stamps);
                 });
 }
 
-void FileWatch::judge(const Stamp& seen) {
+void FileWatch::judge(const Stamps& seen) {
     const bool rests = seen == std::exchange(seen_, seen);
-    if (rests && seen && seen != known_) {
+    const bool all_there =
+        std::ranges::all_of(seen, [](const auto& one) { return one.second.has_value(); });
+    if (rests && all_there) {
+        const bool changed = std::ranges::any_of(seen, [this](const auto& one) {
+            const auto before = known_.find(one.first);
+            return before != known_.end() && before->second != one.second;
+        });
         known_ = seen;
-        changed_();
+        if (changed) changed_();
     }
     later();
 }

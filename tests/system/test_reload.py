@@ -240,6 +240,23 @@ class Reload(unittest.TestCase):
             running.program.log.wait_for(r'reload outcome=applied cause="the file has changed"')
             self.assertEqual(running.program.get("/api/v1/stations/oven")[0], 200)
 
+    def test_a_points_file_that_is_replaced(self):
+        with tempfile.TemporaryDirectory() as folder:
+            points = pathlib.Path(folder) / "press.csv"
+            points.write_text("name,at\nfirst,400001\n")
+            listed = f"{{id: 6, name: press, points_file: {points}}}"
+            with Running(plant(other(listed)), "--watch") as running:
+                self.assertEqual(running.program.get("/api/v1/stations/press/points/first")[0], 200)
+                new = points.with_suffix(".new")
+                new.write_text("name,at\nfirst,400001\nsecond,400002\n")
+                new.replace(points)
+                running.program.log.wait_for(r'reload outcome=applied cause="the file has changed"')
+                self.assertEqual(running.program.get("/api/v1/stations/press/points/second")[0], 200)
+                new.write_text("name,at\nfirst,nowhere\n")
+                new.replace(points)
+                running.program.log.wait_for("reload outcome=invalid")
+                self.assertEqual(running.program.get("/api/v1/stations/press/points/second")[0], 200, "as before")
+
     def test_listeners_come_and_go_and_clients_of_others_stay(self):
         with Running(plant(other())) as running:
             first = harness.Client(running.program.modbus_port())

@@ -3,6 +3,7 @@
 #include <boost/asio/any_io_executor.hpp>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -18,32 +19,34 @@
 
 namespace panelgate::gateway {
 
-/// Reports that a file was replaced or changed, through all links: editors replace the file,
-/// Kubernetes redirects a link of a folder above. Polls it in a worker, because not every file
-/// system notifies; reports when two polls agree, so that the writer has finished. A file that has
-/// vanished is reported only when it is back. One thread; the clock outlives it.
+/// Reports that one of some files was replaced or changed, through all links: editors replace the
+/// file, Kubernetes redirects a link of a folder above. Polls it in a worker, because not every
+/// file system notifies; reports when two polls agree, so that the writer has finished. A file that
+/// has vanished is reported only when it is back. One thread; the clock outlives it.
 class FileWatch {
   public:
     static constexpr Duration kEvery = 1s;
 
-    FileWatch(boost::asio::any_io_executor executor, rt::Clock& clock, std::string path,
-              std::function<void()> changed);
+    /// `files` gives their paths at each look; one that is new there has not changed.
+    FileWatch(boost::asio::any_io_executor executor, rt::Clock& clock,
+              std::function<std::vector<std::string>()> files, std::function<void()> changed);
 
   private:
     /// Device, inode, size and time of the last change in ns.
     using Stamp =
         std::optional<std::tuple<std::uint64_t, std::uint64_t, std::int64_t, std::int64_t>>;
-    static Stamp stamp_of(const std::string& path);
+    using Stamps = std::map<std::string, Stamp>;
+    static Stamps stamps_of(const std::vector<std::string>& paths);
     void later();
     void look();
-    void judge(const Stamp& seen);
+    void judge(const Stamps& seen);
 
-    std::string path_;
+    std::function<std::vector<std::string>()> files_;
     std::function<void()> changed_;
     rt::Clock& clock_;
     std::unique_ptr<rt::Alarm> alarm_;
-    Stamp known_;  ///< last reported, or found at the start
-    Stamp seen_;   ///< of the last poll
+    Stamps known_;  ///< last reported, or found at the start
+    Stamps seen_;   ///< of the last poll
     rt::Worker worker_;
     std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
 };
