@@ -17,22 +17,6 @@ using yaml::Node;
 
 constexpr std::string_view kDeviceTls = "{ca: /etc/panelgate/tls/ca.crt}";
 
-/// A row for the path of a PEM file, whose content is read, too.
-auto pem_file(std::string_view key, std::string tls::Settings::* path,
-              std::string tls::Material::* content) {
-    return [=](Reader& in, tls::Settings& settings) {
-        const auto text = in.text(key);
-        if (!text) return false;
-        settings.*path = in.loading.path_of(*text);
-        const auto file = in.loading.content_of(settings.*path);
-        if (!file)
-            in.problem(key, "cannot read " + settings.*path +
-                                "; give the path of a PEM file that this program may read");
-        settings.material.*content = file.value_or("");
-        return file.has_value();
-    };
-}
-
 }  // namespace
 
 const Keys<tls::Settings>& device_tls_keys() {

@@ -333,16 +333,9 @@ const Keys<web::Settings>& http_keys() {
 
 // Certificates
 
-namespace {
-
-using tls::ClientCertificate;
-
-constexpr std::string_view kTlsExample =
-    "{certificate: /etc/panelgate/tls/gateway.crt, key: /etc/panelgate/tls/gateway.key}";
-
-/// A row for a PEM file, with its content.
-auto pem_file(std::string_view key, std::string tls::Settings::* path,
-              std::string tls::Material::* content) {
+std::function<bool(Reader&, tls::Settings&)> pem_file(std::string_view key,
+                                                      std::string tls::Settings::* path,
+                                                      std::string tls::Material::* content) {
     return [=](Reader& in, tls::Settings& settings) {
         const auto text = in.text(key);
         if (!text) return false;
@@ -356,6 +349,13 @@ auto pem_file(std::string_view key, std::string tls::Settings::* path,
         return read.has_value();
     };
 }
+
+namespace {
+
+using tls::ClientCertificate;
+
+constexpr std::string_view kTlsExample =
+    "{certificate: /etc/panelgate/tls/gateway.crt, key: /etc/panelgate/tls/gateway.key}";
 
 /// Keys that need others.
 bool check_clients(Reader& in, const tls::Settings& settings) {

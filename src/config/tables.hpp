@@ -162,6 +162,10 @@ std::optional<Standing> find_role(Reader& in, std::string_view key, const std::s
 bool load_tls(Reader& in, std::optional<tls::Settings>& settings);
 void show_tls(const SettingWriter& out, const std::optional<tls::Settings>& settings);
 KeyShape tls_shape(std::string_view text);
+/// Reads the path of a PEM file, and its content.
+std::function<bool(Reader&, tls::Settings&)> pem_file(std::string_view key,
+                                                      std::string tls::Settings::* path,
+                                                      std::string tls::Material::* content);
 /// Of a device on Ethernet.
 const Keys<tls::Settings>& device_tls_keys();
 bool load_device_tls(Reader& in, Line& line);

@@ -88,7 +88,7 @@ void Ethernet::on_line_up(TimePoint now) {
     step(now);
 }
 
-/// Requests that wait stay where this object itself asked for a new connection.
+/// Queued requests stay queued if this object has asked for the new connection.
 void Ethernet::on_line_down(TimePoint now) {
     const bool keeps = resetting_;
     forget_line(keeps);

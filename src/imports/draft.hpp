@@ -43,9 +43,10 @@ class Draft {
     Draft(std::string program, std::string file)
         : program_(std::move(program)), file_(std::move(file)) {}
 
-    /// The number of a line with this device; a new one if there is none. `serial`: its map, or "".
+    /// Returns the index of the line with this device, adding a line for a new device. `serial`:
+    /// the line's map, or "".
     std::size_t line(const std::string& name, const std::string& device, const std::string& serial);
-    /// Adds a point, whose name becomes one of this program and unique at its station.
+    /// Adds a point to a station. The tag's name becomes a valid name, unique at the station.
     void add(std::size_t line, std::int64_t station, const Tag& tag);
     /// Something in this line of the file is not taken over.
     void note(int line, const std::string& what);

@@ -34,14 +34,17 @@ class Door:
         self.device.shut()
 
 
+def two_ways(first, second):
+    return config.gateway(f"  - {{name: eth, device: ['modbus-tcp://127.0.0.1:{first.port}', "
+                          f"'modbus-tcp://127.0.0.1:{second.port}'], stations: [{{id: 1, name: press}}]}}\n")
+
+
 class SecondWay(unittest.TestCase):
     def test_the_second_is_used_while_the_first_cannot_be_opened(self):
         first, second = Door(), Door()
         second.open()
         self.addCleanup(second.shut)
-        text = config.gateway(
-            f"  - {{name: eth, device: ['modbus-tcp://127.0.0.1:{first.port}', "
-            f"'modbus-tcp://127.0.0.1:{second.port}'], stations: [{{id: 1, name: press}}]}}\n")
+        text = two_ways(first, second)
         with harness.configured(text) as program, program.client() as client:
             def is_answered():
                 return client.ask(1, read_registers(5, 1))[0] == 3
@@ -64,9 +67,7 @@ class SecondWay(unittest.TestCase):
         first, second = Door(), Door()
         second.open()
         self.addCleanup(second.shut)
-        text = config.gateway(
-            f"  - {{name: eth, device: ['modbus-tcp://127.0.0.1:{first.port}', "
-            f"'modbus-tcp://127.0.0.1:{second.port}'], stations: [{{id: 1, name: press}}]}}\n")
+        text = two_ways(first, second)
         ended, answers = threading.Event(), []
         with harness.configured(text) as program, program.client() as client:
             until(lambda: client.ask(1, read_registers(5, 1))[0] == 3)

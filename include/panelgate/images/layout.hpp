@@ -50,7 +50,7 @@ class Layout {
     std::uint32_t size(modbus::Table table) const {
         return modbus::is_bit_table(table) ? bits_ : registers_;
     }
-    /// Returns the places, by their index, that have one of the items.
+    /// Returns the indexes of the places to which the items belong.
     std::vector<std::size_t> touched(const modbus::Span& items) const;
     /// Returns the items of a read; nothing where `stale` allows none. `shown`: of each touched
     /// place, in their order. Free items are 0.
