@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "panelgate/images/layout.hpp"
 #include "tables.hpp"
@@ -79,9 +80,10 @@ void check_size(Reader& in, const images::Settings& image) {
                                      what + ", not " + std::to_string(layout.size(table)));
 }
 
-/// The unit must be free at every listener and serial master: all of them serve each image.
+/// The unit must be free at each listener and serial master that serves the image.
 void check_unit(Reader& in, const images::Settings& image, const std::string& door,
                 const tcp_server::Settings& reach) {
+    if (!reach.serves_all(lines_of(image, in.loading.config))) return;
     const std::string unit = "unit " + std::to_string(image.unit);
     const auto clash = [&](const std::string& what) {
         in.problem("unit", unit + " of " + door + " is " + what +
@@ -119,6 +121,18 @@ std::optional<images::Settings> load_image(Reader& root, const Node& node) {
     return image;
 }
 
+std::vector<std::string> lines_of(const images::Settings& image, const Config& config) {
+    std::vector<std::string> lines;
+    for (const Line& line : config.lines) {
+        const bool is_shown = std::ranges::any_of(image.entries, [&](const images::Entry& entry) {
+            return std::ranges::find(line.stations, entry.station, &Station::name) !=
+                   line.stations.end();
+        });
+        if (is_shown) lines.push_back(line.name);
+    }
+    return lines;
+}
+
 images::Layout layout_of(const images::Settings& image, const Config& config) {
     return {image, [&](std::string_view station, std::string_view point) {
                 return point_named(config, station, point);
@@ -143,7 +157,8 @@ const Keys<images::Settings>& image_keys() {
             .required()
             .example("plant")
             .integer("unit", &images::Settings::unit, 1, modbus::kMaxListedStation,
-                     "Unit id of the image at all listeners and serial masters.")
+                     "Unit id of the image at the listeners and serial masters that serve all its "
+                     "lines.")
             .required()
             .example("100")
             .below(points, []() -> const Table& { return entry_keys(); }, read_entries, {})

@@ -45,6 +45,12 @@ bool has_decimal_comma(std::string_view cell) {
            cell.find(',', comma + 1) == cell.npos && cell.size() > 2;
 }
 
+/// CSV output protects a text that a spreadsheet would compute, as '=1+1: without that mark.
+std::string unprotected(const std::string& cell) {
+    const bool is_protected = cell.starts_with('\'') && cell.find_first_of("=+-@", 1) == 1;
+    return is_protected ? cell.substr(1) : cell;
+}
+
 /// One table while it is read.
 class PointsFile {
   public:
@@ -107,7 +113,7 @@ class PointsFile {
             if (columns_[i] == "station" && row.cells[i] != loading_.station->name) return;
             if (row.cells[i].empty() || is_shown_only(columns_[i]) || columns_[i] == "station")
                 continue;
-            auto value = value_of(columns_[i], row.cells[i], mark_of(row, i));
+            auto value = value_of(columns_[i], unprotected(row.cells[i]), mark_of(row, i));
             if (!value) return;
             node.entries.push_back({columns_[i], mark_of(row, i), std::move(*value)});
         }

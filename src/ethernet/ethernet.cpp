@@ -183,12 +183,12 @@ void Ethernet::on_rx(TimePoint now, ByteView bytes) {
 
 void Ethernet::take(TimePoint now, const modbus::Adu& reply) {
     const auto flight = std::ranges::find(flights_, reply.transaction, &Flight::id);
-    if (flight == flights_.end()) return take_other(now, reply);
+    const bool is_own = flight != flights_.end() && flight->attempt.group().station == reply.unit;
+    if (!is_own) return take_other(now, reply);
     Attempt& attempt = flight->attempt;
     const modbus::Request& request = attempt.group().request;
     if (says_nobody_answered(reply.pdu)) return fail(now, flight, Verdict::silent);
-    const bool answers = reply.unit == attempt.group().station &&
-                         modbus::answers(request.pdu(), reply.pdu, request.byte_count());
+    const bool answers = modbus::answers(request.pdu(), reply.pdu, request.byte_count());
     attempt.on_rx(now, modbus::encode_adu(reply.unit, reply.pdu));
     if (answers) return settle(now, flight, reply.pdu);
     attempt.on_wrong(true, modbus::exception_of(reply.pdu).has_value());

@@ -12,11 +12,11 @@ tcp_server::LineInfo line_info(const config::Line& line, Unlisted unlisted) {
     return info;
 }
 
-tcp_server::LineInfo image_info(const images::Settings& image) {
+tcp_server::LineInfo image_info(const images::Settings& image, const config::Config& config) {
     tcp_server::LineInfo info;
     info.name = "image " + image.name;  // no line can be called so
     info.stations = {image.unit};
-    info.is_image = true;
+    info.shows = config::lines_of(image, config);
     return info;
 }
 
@@ -24,7 +24,7 @@ tcp_server::UnitMap unit_map(const tcp_server::Settings& listener, const config:
                              Unlisted unlisted) {
     std::vector<tcp_server::LineInfo> lines;
     for (const config::Line& line : config.lines) lines.push_back(line_info(line, unlisted));
-    for (const images::Settings& image : config.images) lines.push_back(image_info(image));
+    for (const images::Settings& image : config.images) lines.push_back(image_info(image, config));
     return {listener, lines};
 }
 

@@ -1,10 +1,17 @@
 #include "panelgate/gateway/images.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace panelgate::gateway {
 
 namespace {
+
+Duration deadline_of(const Plant& plant, const std::string& line) {
+    const auto found = std::ranges::find(
+        plant.lines(), line, [](const Line& one) -> const auto& { return one.configured->name; });
+    return found->configured->arbiter.queue.deadline;
+}
 
 std::shared_ptr<const images::Content> content_of(const images::Settings& settings,
                                                   const std::shared_ptr<const Snapshot>& snapshot) {
@@ -18,8 +25,8 @@ std::shared_ptr<const images::Content> content_of(const images::Settings& settin
                        }};
     for (const images::Place& place : content->layout.places()) {
         const Station& station = *snapshot->plant.find(place.entry->station);
-        content->sources.push_back(
-            {station.bus, station.id, station.configured->profile, &*station.points});
+        content->sources.push_back({station.bus, station.id, station.configured->profile,
+                                    &*station.points, deadline_of(snapshot->plant, station.line)});
     }
     return content;
 }
@@ -36,7 +43,7 @@ images::ImageBus& Images::bus(const std::string& name) {
 }
 
 void Images::add_to(Plant& plant, const config::Config& config) {
-    for (const images::Settings& image : config.images) plant.add(image, bus(image.name));
+    for (const images::Settings& image : config.images) plant.add(image, config, bus(image.name));
 }
 
 void Images::show(const std::shared_ptr<const Snapshot>& snapshot) {

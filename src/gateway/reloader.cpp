@@ -70,7 +70,7 @@ void FileWatch::judge(const Stamps& seen) {
     if (rests && all_there) {
         const bool changed = std::ranges::any_of(seen, [this](const auto& one) {
             const auto before = known_.find(one.first);
-            return before != known_.end() && before->second != one.second;
+            return before == known_.end() || before->second != one.second;
         });
         known_ = seen;
         if (changed) changed_();

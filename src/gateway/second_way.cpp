@@ -56,7 +56,7 @@ void SecondWay::look_later() {
 }
 
 /// A serial device is there with its file: opening it might switch its transceiver. A device server
-/// is there if it takes a connection, which is closed before the line's own is made.
+/// is there if it keeps a connection, which is closed before the line's own is made.
 void SecondWay::look() {
     if (is_remote_) {
         probe_ = line::make_tcp_line(executor_, clock_, first_);
@@ -69,7 +69,7 @@ void SecondWay::look() {
 
 void SecondWay::on_up() {
     boost::asio::post(executor_, [this, life = std::weak_ptr(alive_)] {
-        if (!life.expired() && probe_) found();
+        if (!life.expired() && probe_) alarm_->arm(clock_.now() + kSteady, [this] { found(); });
     });
 }
 

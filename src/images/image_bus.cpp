@@ -49,10 +49,11 @@ std::vector<std::uint16_t> panel_items(const Place& place, std::span<const std::
 struct ImageBus::Writing {
     struct Step {
         bus::BusClient* bus;
-        bus::Request request;
+        bus::Request request;  ///< `within`: from the beginning of the first step
     };
     std::vector<Step> steps;
     std::size_t next = 0;
+    TimePoint began;
     Bytes pdu;  ///< as asked
     bus::ClientId client = 0;
     bool cancelled = false;
@@ -120,6 +121,7 @@ ImageBus::Pdu ImageBus::begin_write(const bus::Request& request, bus::AnswerHand
         count_refused(request.station, request.request.pdu(), request.who);
         return refused;
     }
+    writing->began = clock_.now();
     writing->pdu = request.request.pdu();
     writing->client = request.client;
     writing->handler = std::move(handler);
@@ -170,7 +172,8 @@ ImageBus::Pdu ImageBus::plan_point(std::size_t at, std::span<const std::uint16_t
     bus::Request step{.station = source.station,
                       .request = std::move(*made),
                       .client = request.client,
-                      .who = request.who};
+                      .who = request.who,
+                      .within = std::min(request.within, source.deadline)};
     if (const auto refusal = source.bus->refusal_of(step)) {
         source.bus->count_refused(step.station, step.request.pdu(), step.who);
         return modbus::encode_exception(function, refusal->code);
@@ -181,6 +184,7 @@ ImageBus::Pdu ImageBus::plan_point(std::size_t at, std::span<const std::uint16_t
 
 void ImageBus::go_on(const std::shared_ptr<Writing>& writing) {
     Writing::Step& step = writing->steps[writing->next++];
+    step.request.within -= clock_.now() - writing->began;
     step.bus->transact(std::move(step.request), [this, writing](bus::Answer answer) {
         on_answer(writing, std::move(answer));
     });
@@ -193,8 +197,10 @@ void ImageBus::on_answer(const std::shared_ptr<Writing>& writing, bus::Answer an
     const auto exception = answer.pdu ? modbus::exception_of(*answer.pdu) : std::nullopt;
     const bool is_good = answer.pdu && !exception;
     if (is_good && writing->next < writing->steps.size()) {
-        if (!writing->cancelled) return go_on(writing);
-        answer.pdu = Fault::cancelled;
+        const bool is_late =
+            clock_.now() - writing->began >= writing->steps[writing->next].request.within;
+        if (!writing->cancelled && !is_late) return go_on(writing);
+        answer.pdu = writing->cancelled ? Fault::cancelled : Fault::timeout;
     } else if (is_good) {
         answer.pdu = modbus::normal_write_reply(writing->pdu);
     } else if (exception) {

@@ -236,8 +236,9 @@ class TcpLine final : public DescriptorLine {
     void shake();
     void connected();
     void failed(const std::string& why) {
-        cancel_open();
-        open_failed("cannot reach " + settings().device + ": " + why);
+        const std::string text = "cannot reach " + settings().device + ": " + why;
+        cancel_open();  // ends the TLS session, whose text `why` may be
+        open_failed(text);
     }
     /// For completions: true if their attempt is still the current one.
     auto current() const {

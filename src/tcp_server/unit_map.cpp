@@ -14,10 +14,11 @@ UnitMap::UnitMap(const Settings& settings, const std::vector<LineInfo>& lines) {
     for (const std::string& name : settings.lines) own_.push_back(index_of(name));
     const bool all = own_.empty();
     for (std::size_t i = 0; i < lines.size(); ++i) {
-        if (lines[i].is_image)
+        if (!lines[i].shows) {
+            if (all) own_.push_back(i);
+        } else if (settings.serves_all(*lines[i].shows)) {
             add_stations(i, lines[i].stations);
-        else if (all)
-            own_.push_back(i);
+        }
     }
     for (const std::size_t line : own_) add_stations(line, lines[line].stations);
     if (own_.size() != 1 || !lines[own_.front()].pass_unlisted) return;

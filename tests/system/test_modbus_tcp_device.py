@@ -94,6 +94,15 @@ class Device:
             peer.close()
 
 
+class Hasty(Device):
+    """Takes each connection and ends it at once."""
+
+    def secure(self, peer):
+        self.asked += 1
+        peer.close()
+        raise OSError("its only connection is taken")
+
+
 class Secure(Device):
     """Modbus/TCP Security: TLS, and a certificate of the client's."""
 
@@ -242,6 +251,16 @@ class Ethernet(unittest.TestCase):
             plain = secured(made.path("ca.crt")).replace("modbus-tcp://", "tcp://").replace("in_flight: 4, ", "")
             self.assertIn("tls belongs to a device of modbus-tcp://",
                           harness.run("check", "-c", self.written(plain)).stderr)
+
+    def test_why_a_handshake_failed_is_told(self):
+        """The text comes from a TLS session that has ended by then."""
+        with tls_plant.plant() as made, Hasty() as device:
+            keys = f"tls: {{ca: {made.path('ca.crt')}}}, "
+            text = config.gateway(ethernet(device.port).replace("retries: 0", keys + "retries: 0"))
+            with harness.configured(text) as program:
+                program.log.wait_for("line down line=eth")
+                why = program.get("/api/v1/lines/eth")[1]["state"]
+        self.assertRegex(why, r"^down: cannot reach modbus-tcp://127.0.0.1:\d+: [ -~]+$")
 
     def written(self, text):
         with tempfile.NamedTemporaryFile("w", suffix=".yaml", delete=False) as file:

@@ -257,6 +257,16 @@ class Reload(unittest.TestCase):
                 running.program.log.wait_for("reload outcome=invalid")
                 self.assertEqual(running.program.get("/api/v1/stations/press/points/second")[0], 200, "as before")
 
+    def test_a_points_file_that_changes_just_after_the_reload_that_names_it(self):
+        with tempfile.TemporaryDirectory() as folder:
+            points = pathlib.Path(folder) / "press.csv"
+            points.write_text("name,at\nfirst,400001\n")
+            with Running(plant(other()), "--watch") as running:
+                listed = f"{{id: 6, name: press, points_file: {points}}}"
+                self.assertEqual(running.reload(plant(other(listed)))[1]["outcome"], "applied")
+                points.write_text("name,at\nfirst,400001\nsecond,400002\n")
+                until(lambda: running.program.get("/api/v1/stations/press/points/second")[0] == 200)
+
     def test_listeners_come_and_go_and_clients_of_others_stay(self):
         with Running(plant(other())) as running:
             first = harness.Client(running.program.modbus_port())

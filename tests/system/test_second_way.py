@@ -8,7 +8,7 @@ import unittest
 import config
 import harness
 from harness import read_registers
-from test_modbus_tcp_device import Device
+from test_modbus_tcp_device import Device, Hasty
 from test_points import until
 
 
@@ -84,6 +84,18 @@ class SecondWay(unittest.TestCase):
             ended.set()
             asking.join()
         self.assertEqual(set(answers), {3})
+
+    def test_a_first_device_that_keeps_no_connection_is_not_there(self):
+        """A device server may take a second connection only to end it."""
+        second = Door()
+        second.open()
+        self.addCleanup(second.shut)
+        with Hasty() as first, harness.configured(two_ways(first, second)) as program, program.client() as client:
+            until(lambda: client.ask(1, read_registers(5, 1))[0] == 3)
+            before, answers = first.asked, []
+            while first.asked < before + 3:
+                answers.append(client.ask(1, read_registers(5, 1))[0])
+            self.assertEqual(set(answers), {3})
 
     def test_a_serial_device_that_comes_back(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -119,6 +119,8 @@ const points::Point* point_named(const Config& config, std::string_view station,
                                  std::string_view point);
 /// The map of one of the configuration's images; the configuration outlives it.
 images::Layout layout_of(const images::Settings& image, const Config& config);
+/// The names of the lines whose points the image shows.
+std::vector<std::string> lines_of(const images::Settings& image, const Config& config);
 
 /// Access to files, for profiles_dir and token files. read() returns a file's content; nothing if
 /// it cannot be read.

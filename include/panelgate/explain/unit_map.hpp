@@ -15,7 +15,7 @@ enum class Unlisted : std::uint8_t { as_the_line, refused };
 tcp_server::LineInfo line_info(const config::Line& line, Unlisted unlisted);
 
 /// An image as routing sees it, without its bus.
-tcp_server::LineInfo image_info(const images::Settings& image);
+tcp_server::LineInfo image_info(const images::Settings& image, const config::Config& config);
 
 /// Where the units of a listener, or of a serial master, lead in a configuration that need not run.
 /// `listener`: its own.

@@ -54,8 +54,8 @@ class Plant {
     void add(const config::Line& line, bus::BusClient& bus,
              const std::shared_ptr<sim::SimulatedBus>& simulated);
     /// Adds an image, which listeners serve by `bus`.
-    void add(const images::Settings& image, bus::BusClient& bus) {
-        images_.push_back(explain::image_info(image));
+    void add(const images::Settings& image, const config::Config& config, bus::BusClient& bus) {
+        images_.push_back(explain::image_info(image, config));
         images_.back().bus = &bus;
     }
     /// Sets the unit ids of this listener for the stations that no earlier listener has reached.

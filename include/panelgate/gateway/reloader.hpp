@@ -27,7 +27,8 @@ class FileWatch {
   public:
     static constexpr Duration kEvery = 1s;
 
-    /// `files` gives their paths at each look; one that is new there has not changed.
+    /// `files` gives the paths at each look. A new path counts as a change: its file may have
+    /// changed since the reload that named it.
     FileWatch(boost::asio::any_io_executor executor, rt::Clock& clock,
               std::function<std::vector<std::string>()> files, std::function<void()> changed);
 

@@ -20,6 +20,8 @@ class SecondWay : private line::Line::Events {
     static constexpr Duration kPatience = 500ms;  ///< of a device that is down
     static constexpr Duration kLook = 2s;         ///< first pause between looks for the first one
     static constexpr Duration kLongest = 1min;    ///< longest pause
+    /// A device server whose only connection is taken accepts a second one and closes it at once.
+    static constexpr Duration kSteady = 500ms;  ///< the first device keeps a connection so long
 
     /// `use` changes the device; the line's own driver does so when no reply is outstanding.
     SecondWay(boost::asio::any_io_executor executor, rt::Clock& clock,

@@ -23,6 +23,7 @@ struct Source {
     std::uint8_t station = 0;
     profile::ProfileRef profile;
     const points::StationPoints* points = nullptr;  ///< never null
+    Duration deadline{};                            ///< of a request in the line's queue
 };
 
 /// An image with what it shows.

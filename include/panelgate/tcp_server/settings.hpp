@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -42,6 +43,12 @@ struct Settings {
     std::uint16_t port = 502;        ///< 0: any free port
     bool ipv6_only = false;          ///< with "::": another listener has this port on IPv4
     std::vector<std::string> lines;  ///< line names; never empty after loading
+    /// True if the listener serves all these lines.
+    bool serves_all(const std::vector<std::string>& names) const {
+        return std::ranges::all_of(names, [this](const std::string& name) {
+            return lines.empty() || std::ranges::count(lines, name) > 0;
+        });
+    }
     std::map<std::uint8_t, UnitTarget> units;  ///< aliases, looked up before `lines`
     modbus::Framing framing = modbus::Framing::tcp;
     modbus::HexDigits ascii_digits = modbus::HexDigits::upper_only;

@@ -20,9 +20,9 @@ struct LineInfo {
     bus::BusClient* bus = nullptr;       ///< null: asked of a configuration that does not run
     std::vector<std::uint8_t> stations;  ///< configured station addresses
     bool pass_unlisted = true;
-    /// An image, whose one station is its unit: each listener serves it, and it is no line that a
-    /// listener names or broadcasts to.
-    bool is_image = false;
+    /// Of an image, whose one station is its unit: the lines of its points. A listener that serves
+    /// all these lines serves the image, and names or broadcasts to none. std::nullopt: a line.
+    std::optional<std::vector<std::string>> shows{};
     friend bool operator==(const LineInfo&, const LineInfo&) = default;
 };
 

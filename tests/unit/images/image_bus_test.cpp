@@ -47,7 +47,8 @@ class ImageBusTest : public testing::Test {
         content->layout = {content->settings, [this](std::string_view, std::string_view name) {
                                return name == "x" ? &points[0] : &points[1];
                            }};
-        content->sources = {{&lines, 7, &profile, &station}, {&lines, 8, &profile, &station}};
+        content->sources = {{&lines, 7, &profile, &station, 2s},
+                            {&lines, 8, &profile, &station, 2s}};
         image.show(content);
     }
 
@@ -120,6 +121,23 @@ TEST_F(ImageBusTest, TheFirstFailureEndsAWrite) {
     EXPECT_EQ(lines.requests.size(), 1U);
     lines.script = [](const bus::Request&) { return FakeBus::fault(Fault::timeout, true); };
     EXPECT_EQ(ask({6, 0, 0, 0, 1}).pdu.error(), Fault::timeout);
+}
+
+TEST_F(ImageBusTest, TheDeadlineIsThatOfTheWholeWrite) {
+    Duration needs = 500ms;
+    lines.script = [&](const bus::Request& request) {
+        clock.advance(needs);
+        return FakeBus::reply(modbus::normal_write_reply(request.request.pdu()));
+    };
+    EXPECT_TRUE(ask({16, 0, 0, 0, 2, 4, 0, 1, 0, 2}).pdu.has_value());
+    ASSERT_EQ(lines.requests.size(), 2U);
+    EXPECT_EQ(lines.requests[0].within, 2s);
+    EXPECT_EQ(lines.requests[1].within, 1500ms) << "of which the first point took some";
+    needs = 2s;
+    const Answer late = ask({16, 0, 0, 0, 2, 4, 0, 1, 0, 2});
+    EXPECT_EQ(late.pdu.error(), Fault::timeout);
+    EXPECT_TRUE(late.transmitted);
+    EXPECT_EQ(lines.requests.size(), 3U);
 }
 
 TEST_F(ImageBusTest, AClientThatHasGoneWritesNoFurtherPoint) {

@@ -91,6 +91,21 @@ TEST_F(UnitMapTest, BroadcastsUnitZeroToEveryLineUnlessItIsMapped) {
     EXPECT_EQ(route(0), "a/1");
 }
 
+TEST_F(UnitMapTest, AnImageIsServedByListenersThatServeAllItsLines) {
+    LineInfo image{"image x", &bus_b, {100}};
+    image.shows = {"b"};
+    lines.push_back(image);
+    EXPECT_EQ(route(100), "b/100");
+    settings.lines = {"b", "a"};
+    EXPECT_EQ(route(100), "b/100");
+    EXPECT_EQ(broadcast(0), " b a") << "an image is no line";
+    settings.lines = {"a"};
+    lines[0].pass_unlisted = false;
+    EXPECT_EQ(route(100), "");
+    lines[2].shows->clear();
+    EXPECT_EQ(route(100), "b/100") << "an image without points shows nothing of others";
+}
+
 TEST_F(UnitMapTest, RefusesALineThatIsNotThere) {
     settings.lines = {"c"};
     EXPECT_THROW(route(1), std::invalid_argument);
