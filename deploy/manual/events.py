@@ -28,6 +28,7 @@ MEANINGS = {
     "audit fails": "the audit's file takes nothing, and what happens to writes meanwhile",
     "audit file": "a file was found that the audit cannot go on with, and is kept; it was removed, moved away or changed by others; or the run before did not end in order",
     "audit records lost": "the run, or the audit, ended while its file took nothing: so many records were never written",
+    "standby": "the box's role on a line that another box shares, and why it is so",
     "alarm": "an alarm was raised, has ended or was acknowledged",
     "alarm acknowledged": "a client of REST has acknowledged an alarm",
     "audit recovered": "the audit's file takes records again; what waited is written",

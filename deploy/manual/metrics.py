@@ -21,7 +21,7 @@ alarms: [{name: panel-lost, station: panel, offline: true}]
 """
 # What neither has: its labels, and what it takes.
 FINDING = "line, station, cause; of the gateway itself: cause, name"
-OTHERS = {"panelgate_findings": FINDING, "panelgate_framing_errors_total": "line",
+OTHERS = {"panelgate_findings": FINDING, "panelgate_active": "line", "panelgate_framing_errors_total": "line",
           "panelgate_parity_errors_total": "line", "panelgate_overruns_total": "line",
           "panelgate_breaks_total": "line",
           "panelgate_token_last_use_timestamp_seconds": "token", "panelgate_tls_handshakes_total": "listener, outcome",
@@ -34,8 +34,8 @@ GROUPS = [("Requests", ("requests", "translated", "request_duration", "queue"),
            "`timeout` are there from its first use, other outcomes once they happened."),
           ("Stations", ("station", "turnaround", "bus_transaction", "exceptions", "retries", "late", "foreign",
                         "damaged", "echo", "discarded"), ""),
-          ("Lines", ("line", "bus_busy", "broadcasts", "findings"),
-           "`panelgate_findings` is there while there is a finding."),
+          ("Lines", ("line", "bus_busy", "broadcasts", "findings", "active"),
+           "`panelgate_findings` is there while there is a finding, `panelgate_active` with `standby`."),
           ("Serial drivers", ("framing", "parity", "overruns", "breaks"),
            "Only of lines whose driver counts: a serial port of the machine, and some USB adapters."),
           ("Points", ("point",), "With `points`."), ("Relays", ("relay",), "With `relays`."),

@@ -41,9 +41,9 @@ x-fast: &fast {data_bits: 8, stop_bits: 1}    # serial: {<<: *fast, baud: 38400}
 # What needs a file, or a neighbour that the example has not, or has otherwise.
 NEEDY = {"profiles_dir", "lines.stations.points_file", "lines.tls", "access", "modbus_tcp.tls", "http.tls", "lines.stations.template", "lines.stations.points.bit", "http.tokens",
          *(f"alarms.{key}" for key in ("point", "station", "line", "stale", "offline", "down", "above", "below", "equals", "back")),
-         "alarm_webhook.ca", "mqtt.password_file", "mqtt.tls", "mqtt.ca", "mqtt.certificate", "mqtt.key"}
+         "alarm_webhook.ca", "standby.token_file", "standby.ca", "mqtt.password_file", "mqtt.tls", "mqtt.ca", "mqtt.certificate", "mqtt.key"}
 # What needs a device, a broker or a right that not every machine has, and a simulation.
-OFF = {"serial_masters", "mqtt", "realtime", "audit", "alarms", "lines.simulate", "lines.stations.simulate"}
+OFF = {"serial_masters", "standby", "mqtt", "realtime", "audit", "alarms", "lines.simulate", "lines.stations.simulate"}
 TITLES = {"": "Top level", "lines": "A line", "lines.stations": "A station",
           "lines.stations.points": "A point", "lines.stations.poll": "A block that is polled",
           "modbus_tcp": "A listener for Modbus/TCP", "serial_masters": "A serial master",

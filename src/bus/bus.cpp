@@ -194,6 +194,14 @@ void Bus::State::tell_health(std::uint8_t station) {
     if (up && is_known) health_events.tell(station, health.state());
 }
 
+/// A read that is our own last one was sent by another master where the line has no echo: two boxes
+/// with the same configuration send the same reads.
+bool Bus::State::is_foreign_request(const arbiter::Note& note) const {
+    if (note.kind == FrameKind::foreign_request) return !note.bytes.empty();
+    return note.kind == FrameKind::echo && arbiter.echo() == EchoState::absent &&
+           note.bytes.size() > 1 && modbus::reads_table(note.bytes[1]);
+}
+
 void Bus::State::on_deadline(TimePoint now) {
     confirm_end(now);
     check_delivery(now);

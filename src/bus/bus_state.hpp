@@ -63,12 +63,14 @@ struct Bus::State final : public LineRecords, public line::Line::Events {
     void record_departure(ClientId client);
     void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
     void act(arbiter::Transmit& transmit) {
+        if (settings.may_send && !settings.may_send()) return;
         line->write(transmit.adu);
         arbiter.set_latency(line->latency());
     }
     void act(arbiter::Finish& finish);
     void act(arbiter::Note& note) {
         look_for_new_address(note);
+        if (is_foreign_request(note)) observe(settings, ForeignRequest{note.bytes[0]});
         ClientName client = names.name(note.why.client);
         book.note(std::move(note), std::move(client));
     }
@@ -83,6 +85,7 @@ struct Bus::State final : public LineRecords, public line::Line::Events {
     void act(arbiter::StationEvent& event);
     void tell_health(std::uint8_t station);
     void look_for_new_address(const arbiter::Note& note);
+    bool is_foreign_request(const arbiter::Note& note) const;
     void act(const arbiter::Written& written) {
         observe(settings,
                 WriteEvent{written.station, written.items, written.ended, written.client});

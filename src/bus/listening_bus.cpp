@@ -313,14 +313,15 @@ void ListeningBus::State::act(const tap::Transaction& made) {
 }
 
 Refusal ListeningBus::State::refusal(std::uint8_t station) const {
-    return {Rule::listening, station == 0 ? std::string() : name_of(settings.stations, station),
+    return {settings.standby ? Rule::standby : Rule::listening,
+            station == 0 ? std::string() : name_of(settings.stations, station),
             modbus::ExceptionCode::gateway_path_unavailable, settings.name};
 }
 
 void ListeningBus::State::refuse(Request request, AnswerHandler handler) {
     const std::uint8_t function = request.request.function();
     auto write = write_record_of(request);
-    if (write) write->rule = label(Rule::listening);
+    if (write) write->rule = label(refusal(request.station).rule);
     account.add(request.station, function, write, Outcome::refused, Duration::zero());
     Answer answer;
     answer.refusal = refusal(request.station);

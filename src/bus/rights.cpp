@@ -17,6 +17,8 @@ std::string_view label(Rule rule) {
             return "range";
         case Rule::listening:
             return "listen";
+        case Rule::standby:
+            return "standby";
         case Rule::write_protected:
             return "read-only";
         case Rule::unrecorded:
@@ -56,6 +58,7 @@ modbus::ExceptionCode code_of(Rule rule) {
         case Rule::quantity:
             return modbus::ExceptionCode::illegal_data_value;
         case Rule::listening:
+        case Rule::standby:
             return modbus::ExceptionCode::gateway_path_unavailable;
         case Rule::range:
         case Rule::write_protected:  // the manuals disagree about the code

@@ -212,6 +212,14 @@ ExitCode hand_over(const std::optional<Imported>& imported, const yaml::Problems
     return kFine;
 }
 
+/// The faults of a configuration that was made of another program's tags.
+std::vector<yaml::Problem> faults_of(const std::string& yaml) {
+    yaml::Problems problems("");
+    config::load(yaml, config::RealFiles(), problems,
+                 [](const std::string&) -> std::optional<std::string> { return std::nullopt; });
+    return problems.list();
+}
+
 }  // namespace
 
 ExitCode import_conf(const std::string& file, const OutputFile& output) {
@@ -224,7 +232,7 @@ ExitCode import_conf(const std::string& file, const OutputFile& output) {
     }
     yaml::Problems problems(path);
     bool is_known = false;
-    const auto tags = imports::import_tags(*text, problems, is_known);
+    const auto tags = imports::import_tags(*text, problems, is_known, faults_of);
     if (is_known) return hand_over(tags, problems, output);
     return hand_over(mbusd::import_conf(*text, problems), problems, output);
 }

@@ -156,7 +156,7 @@ ExitCode reload(const ReloadOptions& options) {
     return kNotReady;
 }
 
-ExitCode health(const GatewayOptions& options) {
+ExitCode health(const GatewayOptions& options, bool active) {
     const auto found = http_door(options);
     if (const auto* none = std::get_if<NoHttpDoor>(&found)) {
         std::cerr << "panelgate: " << (none->code == kUsage ? "" : "not ready: ") << none->why
@@ -164,7 +164,7 @@ ExitCode health(const GatewayOptions& options) {
         return none->code == kUsage ? kUsage : kNotReady;
     }
     const auto& door = std::get<HttpDoor>(found);
-    const std::string why = ask_whether_ready(door, kHealthTimeout);
+    const std::string why = ask_whether_ready(door, kHealthTimeout, active);
     if (why.empty()) return kFine;
     std::cerr << "panelgate: not ready: " << door.url() << "/readyz: " << why << '\n';
     return kNotReady;

@@ -62,7 +62,7 @@ struct TokenOptions {
 ExitCode token_new(const TokenOptions& options);
 struct GatewayOptions;
 /// Checks whether the gateway is ready.
-ExitCode health(const GatewayOptions& options);
+ExitCode health(const GatewayOptions& options, bool active);
 /// What `--ca` is, of all commands that ask a running gateway.
 inline constexpr const char* kCa =
     "a file of the CA that has signed its certificate, where the configuration file is not at hand "

@@ -203,10 +203,11 @@ bool is_ready(const HttpReply& reply) {
 
 }  // namespace
 
-std::string ask_whether_ready(const HttpDoor& door, Duration patience) {
-    const std::string request = "GET /readyz HTTP/1.1\r\nHost: " +
-                                endpoint_text(door.endpoint.address, door.endpoint.port) +
-                                "\r\nConnection: close\r\n\r\n";
+std::string ask_whether_ready(const HttpDoor& door, Duration patience, bool active) {
+    const std::string request =
+        std::string("GET /readyz") + (active ? "?active=true" : "") +
+        " HTTP/1.1\r\nHost: " + endpoint_text(door.endpoint.address, door.endpoint.port) +
+        "\r\nConnection: close\r\n\r\n";
     HttpDoor asked = door;
     if (asked.trust && asked.is_local) asked.trust->anybody = true;
     const HttpReply reply = ask(asked, request, patience, kMost, is_ready);

@@ -48,6 +48,7 @@ HttpReply ask(const HttpDoor& door, const std::string& request, Duration patienc
 /// certificate: where a new one is kept back, it is ready with the former one, and the question
 /// holds no secret. Empty if the answer is 200; else the answer
 /// or the error in one printable line.
-std::string ask_whether_ready(const HttpDoor& door, Duration patience);
+/// `active`: a box that waits for another box to go is not ready.
+std::string ask_whether_ready(const HttpDoor& door, Duration patience, bool active);
 
 }  // namespace panelgate::commands

@@ -416,9 +416,11 @@ class CommandLine {
                             "HOST:PORT of its REST API; without: what the configuration file says, "
                             "or 127.0.0.1:8080");
         command->add_option("--ca", ca_, kCa);
+        command->add_flag("--active", active_,
+                          "also ask whether it drives its lines, as not the standby");
         command->footer(
             "Exit codes: 0 it is ready; 1 it is not, or says nothing for 2 s; 64 usage.");
-        command->callback([this] { code_ = health({file_, http_, "", ca_}); });
+        command->callback([this] { code_ = health({file_, http_, "", ca_}, active_); });
     }
 
     void add_reload() {
@@ -460,6 +462,7 @@ class CommandLine {
     std::vector<std::string> links_;
     ScanOptions scan_;
     OutputFile output_;
+    bool active_ = false;
     std::string imported_;
     std::string profile_;
     std::string notation_;

@@ -283,6 +283,20 @@ const Keys<Config>& root_keys() {
                   images::Settings::kMost, load_image, &images::Settings::name,
                   "Points of many stations that clients read as one unit.")
             .weaker(By::added)
+            .below(
+                shape_of("standby", Kind::map,
+                         "Another box shares the serial lines: one of the two drives them."),
+                []() -> const Table& { return standby_keys(); },
+                optional_section("standby", "{rank: 0, peer: \"https://box-b:8443\"}",
+                                 &Config::standby, standby_keys, check_standby),
+                [](const SettingWriter& out, const Config& config, const SettingWriter*) {
+                    if (!config.standby) return;
+                    const SettingWriter section = out.item("standby");
+                    standby_keys().show(section, *config.standby);
+                    section.put_secret("token", config.standby->token, false);
+                })
+            .weaker(By::removed)
+            .not_empty("give rank, or leave it out")
             .map("store", &Config::store, store_keys, "{days: 30}",
                  "Events and history of days, in one file.");
     return kKeys;

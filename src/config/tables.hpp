@@ -71,6 +71,8 @@ const Keys<store::Settings>& store_keys();
 const Keys<alarms::Settings>& alarm_keys();
 const Keys<alarms::WebhookSettings>& webhook_keys();
 const Keys<images::Settings>& image_keys();
+const Keys<standby::Settings>& standby_keys();
+void check_standby(Reader& in, standby::Settings& settings);
 const Keys<points::ReportRule>& report_keys();
 void check_report(Reader& in, points::Point& point);
 void check_webhook(Reader& in, alarms::WebhookSettings& hook);

@@ -91,6 +91,9 @@ Gateway::Gateway(web::Loops loops, std::shared_ptr<const config::Config> config,
       events_(std::make_shared<web::EventHub>(new_epoch()), loops_.faces),
       servers_(loops_, clock_, audit_.stray_writes()),
       northbound_(loops_, clock_, journal_, audit_.topic_refusals()) {
+    configured_ = config;
+    standby_.apply(*config);
+    config = standby_.arrange(config);
     Lines lines = lines_of(*config);
     for (std::size_t i = 0; i < lines.size(); ++i)
         known_.lines.emplace(std::pair(config->lines[i].name, lines[i]->way()), lines[i]);
@@ -127,6 +130,7 @@ LineWatch Gateway::watch() {
     watch.write = [this](const std::string& line, const bus::WriteEnd& end) {
         audit_.write(line, end);
     };
+    watch.may_send = [this](const std::string& line) { return standby_.may_send(line); };
     watch.refuses_writes = [this] { return audit_.refuses_writes(); };
     watch.admit = [this](const WhoRef& who, const std::string& line, std::uint8_t station) {
         return doors_.admit(who, line, station, rt::wall_now());
@@ -137,6 +141,7 @@ LineWatch Gateway::watch() {
 void Gateway::on_event(const std::string& line, const bus::BusEvent& event) {
     publish(events_, snapshot_->plant, line, event);
     journal_.on_event(line, event);
+    standby_.on_event(line, event);
     northbound_.on_bus_event(line, event);
     const auto* write = std::get_if<bus::WriteEvent>(&event);
     if (write != nullptr && relay_listener_) relay_listener_(line, *write);
@@ -239,6 +244,40 @@ void Gateway::show(const std::shared_ptr<Snapshot>& snapshot) {
 }
 
 void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedText shown) {
+    const auto before = std::exchange(configured_, config);
+    const auto shown_before = std::exchange(shown_, std::move(shown));
+    standby_.apply(*config);
+    try {
+        serve(standby_.arrange(config));
+    } catch (...) {
+        configured_ = before;
+        shown_ = shown_before;
+        standby_.apply(*before);
+        throw;
+    }
+}
+
+RunningLine* Gateway::find_running(const std::string& line) {
+    if (!snapshot_) return nullptr;
+    const auto& lines = snapshot_->config->lines;
+    const auto found = std::ranges::find(lines, line, &config::Line::name);
+    if (found == lines.end()) return nullptr;
+    return snapshot_->lines[static_cast<std::size_t>(found - lines.begin())].get();
+}
+
+void Gateway::tell_role(const std::string& line, const standby::Seat& seat) {
+    const std::string role(label(seat.role()));
+    const std::string why(seat.why());
+    rt::log(rt::LogLevel::info, "standby", {{"line", line}, {"role", role}, {"why", why}});
+    store::Entry entry{.kind = store::Kind::standby};
+    entry.line = line;
+    entry.text = role + ": " + why;
+    journal_.add(std::move(entry));
+}
+
+/// Serves this arrangement of the configuration.
+void Gateway::serve(std::shared_ptr<const config::Config> config) {
+    const Standby::Arranging arranging(standby_);
     Lines lines = lines_of(*config);
     Plant draft;
     for (std::size_t i = 0; i < lines.size(); ++i)
@@ -259,7 +298,7 @@ void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedTex
     });
     if (kept_nothing && line_histories_) line_histories_->start();
     relays_->apply(routes_of(*snapshot_));
-    servers_.apply(*snapshot_->config, snapshot_->plant, directory_in(snapshot_), shown,
+    servers_.apply(*snapshot_->config, snapshot_->plant, directory_in(snapshot_), shown_,
                    longest_answer());
     judge_waiting();
     doors_.settle();
@@ -354,6 +393,7 @@ web::Providers Gateway::providers() {
     providers.relays = [this] { return relays_->status(); };
     providers.findings = [this] { return findings(); };
     providers.usage = [this] { return usage(); };
+    providers.standby = [this] { return standby_.view(); };
     providers.wall = rt::wall_now;
     providers.collect = northbound_.collector();
     providers.discovery = discoveries_.get();
@@ -431,6 +471,7 @@ void Gateway::stop() {
     looking_->cancel();
     if (certificates_) certificates_->stop();
     servers_.close();
+    standby_.stop();
     northbound_.stop();
     if (line_histories_) line_histories_->stop();
     relays_->stop();

@@ -73,6 +73,8 @@ metrics::Snapshot Gateway::figures() {
     for (const auto& line : snapshot_->lines) figures.lines.push_back(line->bus().report());
     for (const web::Finding& one : findings())
         figures.findings.push_back({one.line, one.cause, one.name});
+    for (const web::StandbyView::Line& line : standby_.view().lines)
+        figures.active[line.name] = line.role == standby::label(standby::Role::active);
     figures.relays = relay_samples(relays_->status());
     servers_.copy_figures(figures);
     figures.mqtt = northbound_.counters();

@@ -151,6 +151,9 @@ bus::Settings RunningLine::settings_of(const config::Line& line) {
         };
     }
     settings.refuses_writes = watch_.refuses_writes;
+    settings.standby = line.standby;
+    if (watch_.may_send && way_ == Way::wire)
+        settings.may_send = [this, name = line.name] { return watch_.may_send(name); };
     if (watch_.admit) {
         settings.admit = [this, name = line.name](const WhoRef& who, std::uint8_t station) {
             return watch_.admit(who, name, station);

@@ -113,6 +113,7 @@ struct Publisher {
     }
     void operator()(const bus::WriteEvent&) const {}   // published as changes of points
     void operator()(const tap::Transaction&) const {}  // likewise
+    void operator()(const bus::ForeignRequest&) const {}
 };
 
 }  // namespace

@@ -222,7 +222,12 @@ void add_line_state(Families& out, const Snapshot& snapshot) {
             wait.histogram(with(of_line(line), "class", name), line.wire.queue_wait[i]);
         }
     }
+    Family active = make_gauge("panelgate_active",
+                               "1 while this box drives the line, 0 while it is the standby.");
+    for (const auto& [line, is_active] : snapshot.active)
+        active.gauge({{"line", line}}, is_active ? 1 : 0);
     out.push_back(up.take());
+    if (!snapshot.active.empty()) out.push_back(active.take());
     out.push_back(depth.take());
     out.push_back(wait.take());
 }

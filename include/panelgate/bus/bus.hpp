@@ -31,6 +31,10 @@ struct LineEvent {
     std::string why;           ///< cause, when the line is down; or the finding
     std::uint8_t station = 0;  ///< that the finding is about; 0: none alone
 };
+/// Another master's request was heard on a driven line.
+struct ForeignRequest {
+    std::uint8_t station = 0;
+};
 /// A request was answered.
 struct TransactionEvent {
     std::uint8_t station = 0;
@@ -56,8 +60,8 @@ struct WriteEnd {
 };
 
 /// What a bus reports to its observer.
-using BusEvent =
-    std::variant<LineEvent, arbiter::StationEvent, TransactionEvent, WriteEvent, tap::Transaction>;
+using BusEvent = std::variant<LineEvent, arbiter::StationEvent, TransactionEvent, WriteEvent,
+                              tap::Transaction, ForeignRequest>;
 
 struct Settings {
     std::string name;    ///< of the line
@@ -70,6 +74,10 @@ struct Settings {
     doctor::Settings doctor;
     ClientSettings clients{};
     std::function<void(const WriteEnd&)> record_write{};  ///< may be empty; must not call the bus
+    /// Asked before each frame; false: the frame is not sent. May be empty; must not call the bus.
+    std::function<bool()> may_send{};
+    /// Requests of clients are refused as by a box that waits for another box to go.
+    bool standby = false;
     /// True while no write may be sent, as it could not be recorded. May be empty.
     std::function<bool()> refuses_writes{};
     std::shared_ptr<const access::LineRules> access{};  ///< null: everybody may do everything

@@ -28,12 +28,13 @@ enum class Rule : std::uint8_t {
     quantity,         ///< more items than the panel accepts, or a request that contradicts itself
     range,            ///< some items are outside the panel's memory
     listening,        ///< the line is in listen mode
+    standby,          ///< another box drives the line
     write_protected,  ///< the items are read-only in the panel
     unrecorded,       ///< no write is sent while it cannot be recorded (audit.on_failure)
     denied,           ///< a rule of `access`, its default, or a role's lack
 };
-/// Returns "access", "function", "quantity", "range", "listen", "read-only", "audit" or "denied":
-/// stable identifiers.
+/// Returns "access", "function", "quantity", "range", "listen", "standby", "read-only", "audit" or
+/// "denied": stable identifiers.
 std::string_view label(Rule rule);
 inline bool is_access(Rule rule) {
     return rule == Rule::read_only || rule == Rule::broadcast_over_read_only ||

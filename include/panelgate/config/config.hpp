@@ -23,6 +23,7 @@
 #include "panelgate/rt/settings.hpp"
 #include "panelgate/serial_server/settings.hpp"
 #include "panelgate/sim/settings.hpp"
+#include "panelgate/standby/settings.hpp"
 #include "panelgate/store/settings.hpp"
 #include "panelgate/tcp_server/settings.hpp"
 #include "panelgate/web/http/settings.hpp"
@@ -72,6 +73,7 @@ struct Line {
     std::string second{};       ///< device that is used while the first cannot be opened; "": none
     arbiter::Settings arbiter;  ///< with the resolved timing of every station
     bool listens = false;       ///< another master polls it: the gateway never sends
+    bool standby = false;       ///< ... and that is the other box; never of a file
     bool refuse_unlisted = false;
     Duration think_time = 1ms;    ///< of stations without their own
     bool automatic_gap = true;    ///< `frame_gap` is not set, or auto
@@ -102,6 +104,7 @@ struct Config {
     std::vector<alarms::Settings> alarms{};
     std::optional<alarms::WebhookSettings> webhook{};  ///< of alarms
     store::Settings store{};                           ///< events and history
+    std::optional<standby::Settings> standby{};        ///< empty: there is no other box
     std::vector<images::Settings> images{};
     /// Where each line's name stands, by that name.
     std::map<std::string, yaml::Mark> line_marks;

@@ -25,6 +25,7 @@
 #include "panelgate/gateway/running_line.hpp"
 #include "panelgate/gateway/servers.hpp"
 #include "panelgate/gateway/snapshot.hpp"
+#include "panelgate/gateway/standby.hpp"
 #include "panelgate/metrics/exposition.hpp"
 #include "panelgate/points/relays.hpp"
 #include "panelgate/rt/asio_clock.hpp"
@@ -58,7 +59,7 @@ class Gateway {
     void apply(std::shared_ptr<const config::Config> config, web::SharedText shown);
     /// Records a reload, whatever became of it, and keeps the audit as it now is configured.
     void record(const web::ReloadVerdict& verdict);
-    const std::shared_ptr<const config::Config>& config() const { return snapshot_->config; }
+    const std::shared_ptr<const config::Config>& config() const { return configured_; }
     /// The certificates in use, which may be newer than the configuration's.
     std::vector<ServedCertificate> certificates() const;
     /// Stops accepting; accepted requests are answered within their deadline.
@@ -88,6 +89,9 @@ class Gateway {
     void on_alarm(const alarms::Change& change);
     void on_finding(const web::Finding& finding, bool is_new);
     Lines lines_of(const config::Config& config);
+    void serve(std::shared_ptr<const config::Config> config);
+    RunningLine* find_running(const std::string& line);
+    void tell_role(const std::string& line, const standby::Seat& seat);
     void apply_lines(const config::Config& config, const Lines& lines);
     void rest_wires(const config::Config& config, const Lines& lines);
     void retire_lines(const Lines& lines);
@@ -121,6 +125,15 @@ class Gateway {
     Reloader* reloads_;
     web::TextSource* text_;
     web::EventOutlet events_;  ///< buses publish by it until they are destroyed
+    /// As the file says; the snapshot's is arranged to what this box drives now.
+    std::shared_ptr<const config::Config> configured_;
+    web::SharedText shown_;  ///< of it, for REST
+    Standby standby_{
+        loops_.plant,
+        clock_,
+        {[this](const std::string& line) { return find_running(line); },
+         [this] { serve(standby_.arrange(configured_)); },
+         [this](const std::string& line, const standby::Seat& seat) { tell_role(line, seat); }}};
     /// The current snapshot, never null.
     std::shared_ptr<Snapshot> snapshot_;
     std::function<void(const std::string&, const bus::WriteEvent&)> relay_listener_;

@@ -48,6 +48,8 @@ struct LineWatch {
         points;
     /// A write has ended; for an audit. May be empty.
     std::function<void(const std::string& line, const bus::WriteEnd& end)> write{};
+    /// True if a frame may be sent over the line. May be empty.
+    std::function<bool(const std::string& line)> may_send{};
     /// True while no write may be sent. May be empty.
     std::function<bool()> refuses_writes{};
     /// What doors say now. May be empty.
@@ -80,6 +82,8 @@ class RunningLine {
     void start();
     /// Closes the line, and gives back its descriptors, its simulated panels and its trace.
     void stop();
+    /// Opens the line again after stop(), with the same configuration.
+    void restart() { start(); }
     /// Destroys bus, poller and panels of the line. No other function may be called afterwards.
     void dispose();
     /// Applies a new configuration; `before` is the running one. Opens the line again after stop().

@@ -34,6 +34,7 @@ struct FindingSample {
 struct Snapshot {
     std::vector<bus::LineReport> lines;
     std::vector<FindingSample> findings{};
+    std::map<std::string, bool> active{};  ///< by line that another box shares: this box drives it
     std::vector<tcp_server::Counters> listeners;
     std::vector<serial_server::Counters> serial_masters;
     std::deque<points::PointSample> points;  ///< deque: many points, never moved

@@ -222,7 +222,46 @@ Handling get_version(HttpRequest, const Api* api) {
 
 Handling get_healthz(HttpRequest, const Api*) { co_return text_response(200, "ok\n"); }
 
-Handling get_readyz(HttpRequest, const Api* api) {
+namespace {
+
+StandbyView standby_of(const Api* api) {
+    return api->providers.standby ? api->providers.standby() : StandbyView{};
+}
+
+/// Of a whole box: the line that has changed last tells why, and since when.
+boost::json::object describe(const StandbyView& view, WallTime now) {
+    boost::json::object object{{"role", view.is_active() ? "active" : "standby"}};
+    object["since"] = nullptr;
+    object["why"] = view.is_on ? "" : "there is no other box";
+    object["peer"] =
+        view.peer.empty() ? boost::json::value(nullptr) : boost::json::value(view.peer);
+    boost::json::array lines;
+    const StandbyView::Line* latest = nullptr;
+    for (const StandbyView::Line& line : view.lines) {
+        if (latest == nullptr || line.since < latest->since) latest = &line;
+        const WallTime since = now - std::chrono::duration_cast<WallTime::duration>(line.since);
+        lines.push_back(boost::json::object{{"line", line.name},
+                                            {"role", line.role},
+                                            {"since", rfc3339(since)},
+                                            {"why", line.why},
+                                            {"deaf", line.deaf}});
+        if (latest == &line) object["since"] = rfc3339(since);
+    }
+    if (latest != nullptr) object["why"] = latest->why;
+    object["lines"] = std::move(lines);
+    return object;
+}
+
+}  // namespace
+
+Handling get_standby(HttpRequest, const Api* api) {
+    co_return json_response(200, describe(standby_of(api), api->providers.wall()));
+}
+
+Handling get_readyz(HttpRequest request, const Api* api) {
+    const auto only_active = query_flag(request, "active").value();
+    if (only_active && !standby_of(api).is_active())
+        co_return text_response(503, "standby: another box drives the lines\n");
     if (api->providers.ready()) co_return text_response(200, "ready\n");
     const std::string missing = api->providers.missing();
     co_return text_response(503, missing.empty() ? "not ready\n" : "not ready: " + missing + '\n');

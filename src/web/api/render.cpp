@@ -81,6 +81,9 @@ std::string detail_of(const bus::Refusal& refusal) {
             return "line '" + refusal.why +
                    "' has another master: it is only listened to (mode: listen); its points show "
                    "what passed by";
+        case bus::Rule::standby:
+            return "this box is the standby of line '" + refusal.why +
+                   "', which another box drives; its points show what passed by";
         case bus::Rule::unrecorded:
             return "a write to " + station +
                    " could not be recorded: the audit's file takes nothing now";
@@ -105,7 +108,7 @@ Problem refused(unsigned status, bus::Rule rule, std::string detail) {
 
 unsigned status_of(bus::Rule rule) {
     if (rule == bus::Rule::listening) return 409;
-    if (rule == bus::Rule::unrecorded) return 503;
+    if (rule == bus::Rule::unrecorded || rule == bus::Rule::standby) return 503;
     return bus::is_access(rule) ? 403 : 422;
 }
 

@@ -69,6 +69,7 @@ Handling get_days(HttpRequest request, const Api* api);
 /// True if a request for a point's history asks the store: it names from, to or step.
 bool asks_for_days(const HttpRequest& request);
 Handling get_journal(HttpRequest request, const Api* api);
+Handling get_standby(HttpRequest request, const Api* api);
 Handling get_images(HttpRequest request, const Api* api);
 Handling get_image(HttpRequest request, const Api* api);
 Handling get_alarms(HttpRequest request, const Api* api);

@@ -150,6 +150,7 @@ images: [{name: plant, unit: 99, points: [a-1/q]}]
 alarms: [{name: wiring, finding: any}, {name: lost, line: a, down: true}]
 store: {days: 90}
 alarm_webhook: {url: "https://10.0.0.1/x", ca: /run/secrets/ops}
+standby: {rank: 1, peer: "https://10.0.0.1:8443", token_file: /run/secrets/ops, ca: /tls/a-ca.crt}
 )";
 
 /// Keys that the values of their neighbours there rule out.
@@ -168,7 +169,7 @@ constexpr const char* kWords =
     "a-1/400209 panasonic-gt b 127.0.0.1:99 10.0.0.0/8 /dev/ttyS9 press/UW140 oven/GDT300 "
     "a/2 floor1/20 /run/secrets/other /profiles /tls/b.crt /tls/b.key /tls/b-ca.crt /tls/b.crl "
     "optional TLSv1.3 read two mqtt coils 127.0.0.1:503 allow 20MiB continue 2028-01-31 "
-    "press/setpoint oven http://10.0.0.1:9093/api ";
+    "press/setpoint oven https://10.0.0.1:99 http://10.0.0.1:9093/api ";
 
 struct Leaf {
     std::string key;  ///< "lines/stations/id": without list indices

@@ -65,6 +65,7 @@ struct Providers {
     std::function<WallTime()> wall;                ///< the current wall-clock time, any thread
     std::function<std::vector<points::RelayStatus>()> relays;
     std::function<std::vector<Finding>()> findings{};  ///< of the gateway; empty: it looks for none
+    std::function<StandbyView()> standby{};            ///< empty: there is no other box
     std::function<std::vector<LineUsage>()> usage{};   ///< of each line; empty: none is counted
     /// Of the faces' loop, before a scrape: takes counters of other faces along to the plant's
     /// loop, where the function returned is called. Both may be empty.

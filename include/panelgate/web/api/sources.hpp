@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
 #include <cstddef>
@@ -58,6 +59,26 @@ class DiscoverySource {
     virtual void stop(std::string_view line) = 0;
     /// The report of the line's last discovery.
     virtual DiscoveryReport report(std::string_view line) const = 0;
+};
+
+/// What this box is beside another one that shares its lines.
+struct StandbyView {
+    struct Line {
+        std::string name;
+        std::string role;  ///< listening, claiming or active
+        std::string why;
+        Duration since{};  ///< so long ago
+        bool deaf = false;
+    };
+    bool is_on = false;  ///< false: there is no other box
+    std::vector<Line> lines{};
+    std::string peer{};  ///< the other box's role; "": not known
+
+    /// True if this box drives its lines: one of those that it shares, at least.
+    bool is_active() const {
+        return !is_on || lines.empty() ||
+               std::ranges::any_of(lines, [](const Line& one) { return one.role == "active"; });
+    }
 };
 
 /// An alarm as REST tells it.
