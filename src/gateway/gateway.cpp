@@ -277,7 +277,6 @@ void Gateway::tell_role(const std::string& line, const standby::Seat& seat) {
 
 /// Serves this arrangement of the configuration.
 void Gateway::serve(std::shared_ptr<const config::Config> config) {
-    const Standby::Arranging arranging(standby_);
     Lines lines = lines_of(*config);
     Plant draft;
     for (std::size_t i = 0; i < lines.size(); ++i)
@@ -304,6 +303,7 @@ void Gateway::serve(std::shared_ptr<const config::Config> config) {
     doors_.settle();
     watch_certificates();
     watch_expiry();
+    standby_.arranged();
 }
 
 /// Of all lines: what is new at a door is about requests to any.

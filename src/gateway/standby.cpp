@@ -20,6 +20,7 @@ using standby::Role;
 namespace {
 
 constexpr Duration kStandbyLook = 100ms;
+constexpr Duration kOpening = 1s;          // in which a line that was arranged anew opens
 constexpr Duration kQuestion = 1s;         // between two questions to the peer
 constexpr std::size_t kPeerReply = 65536;  // bytes of the peer's answer that are read
 
@@ -128,10 +129,6 @@ void Standby::on_event(const std::string& line, const bus::BusEvent& event) {
     if (found == places_.end()) return;
     Place& place = found->second;
     const TimePoint now = clock_.now();
-    const auto* state = std::get_if<bus::LineEvent>(&event);
-    const bool is_device = state != nullptr && state->station == 0 && arranging_ == 0 &&
-                           place.seat.role() != Role::claiming;
-    if (is_device) carry_out(line, place, place.seat.on_line(now, state->up));
     if (std::holds_alternative<tap::Transaction>(event))
         carry_out(line, place, place.seat.on_heard(now));
     if (std::holds_alternative<bus::ForeignRequest>(event))
@@ -139,17 +136,25 @@ void Standby::on_event(const std::string& line, const bus::BusEvent& event) {
 }
 
 void Standby::arranged() {
-    if (--arranging_ > 0) return;
     for (auto& [name, place] : places_) {
-        const RunningLine* const line = hooks_.line(name);
-        if (line == nullptr || place.seat.role() == Role::claiming) continue;
-        carry_out(name, place, place.seat.on_line(clock_.now(), line->bus().status().up));
+        place.opens_by = clock_.now() + kOpening;
+        look_for_device(name, place);
     }
+}
+
+/// A line that was arranged anew may still be opening, which says nothing about its device.
+void Standby::look_for_device(const std::string& name, Place& place) {
+    const RunningLine* const line = hooks_.line(name);
+    if (line == nullptr || place.seat.role() == Role::claiming) return;
+    const bool up = line->bus().status().up;
+    if (up || clock_.now() >= place.opens_by)
+        carry_out(name, place, place.seat.on_line(clock_.now(), up));
 }
 
 void Standby::look() {
     alarm_->arm(clock_.now() + kStandbyLook, [this] { look(); });
     for (auto& [name, place] : places_) {
+        look_for_device(name, place);
         if (place.seat.role() == Role::listening) listen_to(name, place);
         if (place.seat.role() == Role::active) look_for_echo(name, place);
         carry_out(name, place, place.seat.look(clock_.now()));

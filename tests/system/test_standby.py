@@ -96,6 +96,18 @@ class Standby(unittest.TestCase):
             self.assertLessEqual(len(bus.frames(0)) - sent, 1)
             self.assertEqual(self.role(second), "active", "nobody takes the line back")
 
+    def test_roles_change_again_and_again(self):
+        with self.boxes() as (_, *boxes):
+            active, other = boxes
+            for _ in range(4):
+                active.process.send_signal(signal.SIGSTOP)
+                until(lambda: self.role(other) == "active")
+                active.process.send_signal(signal.SIGCONT)
+                until(lambda: self.role(active) == "standby")
+                with other.client() as client:
+                    until(lambda: client.ask(1, read_registers(4)) == bytes([3, 2, 0, 4]))
+                active, other = other, active
+
     def test_after_a_cut_the_box_of_rank_one_leaves(self):
         with self.boxes() as (bus, first, second):
             bus.cut = True

@@ -48,18 +48,8 @@ class Standby {
     bool may_send(const std::string& line);
     void on_event(const std::string& line, const bus::BusEvent& event);
 
-    /// While lines are arranged anew, they are closed and opened: that says nothing about devices.
-    /// At the end each line is asked whether it is up.
-    class Arranging {
-      public:
-        explicit Arranging(Standby& standby) : standby_(standby) { ++standby_.arranging_; }
-        ~Arranging() { standby_.arranged(); }
-        Arranging(const Arranging&) = delete;
-        Arranging& operator=(const Arranging&) = delete;
-
-      private:
-        Standby& standby_;
-    };
+    /// The lines run as arrange() has said.
+    void arranged();
     /// For REST.
     web::StandbyView view() const;
 
@@ -68,14 +58,15 @@ class Standby {
         standby::Seat seat;
         config::Line line;           ///< as configured, without its points
         std::uint64_t received = 0;  ///< bytes at the last look
+        TimePoint opens_by{};        ///< until then a line that is not up may be opening
         std::unique_ptr<bus::Bus> probe{};
         bool asked = false;  ///< the probe's read is on its way
         std::size_t next_station = 0;
         EchoState echo = EchoState::unknown;  ///< of the driven line at the last look
     };
 
-    void arranged();
     void look();
+    void look_for_device(const std::string& name, Place& place);
     void listen_to(const std::string& name, Place& place);
     void look_for_echo(const std::string& name, Place& place);
     void carry_out(const std::string& name, Place& place, std::optional<standby::Deed> deed);
@@ -96,7 +87,6 @@ class Standby {
     std::string peer_role_;                ///< as the peer says, or why nothing is known
     TimePoint next_question_{};
     bool asking_ = false;
-    int arranging_ = 0;
     std::unique_ptr<rt::Worker> worker_;
     std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
 };
