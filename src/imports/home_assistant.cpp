@@ -1,11 +1,6 @@
 // `modbus:` of Home Assistant's configuration.yaml.
 
-#include <array>
-#include <cstdlib>
-#include <utility>
-
-#include "draft.hpp"
-#include "panelgate/yaml/map_reader.hpp"
+#include "source.hpp"
 
 namespace panelgate::imports {
 
@@ -13,136 +8,123 @@ namespace {
 
 using modbus::Table;
 using points::Type;
-using points::WordOrder;
 using yaml::Node;
 
-constexpr auto kHomeTypes =
-    std::to_array<std::pair<std::string_view, Type>>({{"int16", Type::i16},
-                                                      {"uint16", Type::u16},
-                                                      {"int32", Type::i32},
-                                                      {"uint32", Type::u32},
-                                                      {"int64", Type::i64},
-                                                      {"uint64", Type::u64},
-                                                      {"float16", Type::f16},
-                                                      {"float32", Type::f32},
-                                                      {"float64", Type::f64},
-                                                      {"string", Type::string}});
-constexpr auto kSwaps =
-    std::to_array<std::pair<std::string_view, WordOrder>>({{"", WordOrder::abcd},
-                                                           {"none", WordOrder::abcd},
-                                                           {"byte", WordOrder::badc},
-                                                           {"word", WordOrder::cdab},
-                                                           {"word_byte", WordOrder::dcba}});
-constexpr auto kHomeTables =
-    std::to_array<std::pair<std::string_view, Table>>({{"coil", Table::coils},
-                                                       {"coils", Table::coils},
-                                                       {"discrete_input", Table::discrete_inputs},
-                                                       {"input", Table::input_registers},
-                                                       {"holding", Table::holding_registers},
-                                                       {"holdings", Table::holding_registers}});
+constexpr std::string_view kHomeTypes =
+    "int16=i16 uint16=u16 int32=i32 uint32=u32 int64=i64 uint64=u64 float16=f16 float32=f32 "
+    "float64=f64 string=string";
+constexpr std::string_view kSwaps = "none=ABCD byte=BADC word=CDAB word_byte=DCBA";
+constexpr std::string_view kHomeTables =
+    "coil=coils discrete_input=discrete-inputs input=input-registers holding=holding-registers";
 
-std::string text(const Node& in, std::string_view key, std::string_view otherwise = "") {
-    const Node* const found = in.find(key);
-    return found == nullptr || found->scalar.empty() ? std::string(otherwise) : found->scalar;
+/// Empties the values with tags, such as !secret: what a tag stands for is not in this file.
+void remove_tagged(Node& node, const std::set<std::pair<int, int>>& tagged) {
+    for (Node& item : node.items) remove_tagged(item, tagged);
+    for (yaml::Entry& entry : node.entries) remove_tagged(entry.value, tagged);
+    if (!tagged.contains({node.mark.line, node.mark.column})) return;
+    const yaml::Mark mark = node.mark;
+    node = {};
+    node.mark = mark;
 }
 
-/// Whole numbers, also hexadecimal; 0 for other texts.
-std::int64_t integer(const std::string& text) { return std::strtoll(text.c_str(), nullptr, 0); }
-
-std::int64_t station_of(const Node& entity) {
-    return integer(text(entity, "slave", text(entity, "device_address", "1")));
+/// Parses YAML in which tags are no problems.
+Node parse_tagged(std::string_view text, yaml::Problems& problems) {
+    yaml::Problems found(problems.file());
+    Node whole = yaml::parse(text, found);
+    std::set<std::pair<int, int>> tagged;
+    for (const yaml::Problem& problem : found.list()) {
+        if (problem.message.starts_with("a tag ("))
+            tagged.emplace(problem.mark.line, problem.mark.column);
+        else
+            problems.add(problem);
+    }
+    remove_tagged(whole, tagged);
+    return whole;
 }
 
-/// Fills in type and place; returns what prevents it, or "".
-std::string read_place(const Node& entity, bool is_binary, points::Point& point) {
-    const std::string kind =
-        text(entity, "input_type", text(entity, "write_type", is_binary ? "coil" : "holding"));
-    const auto table = look_up(kHomeTables, kind);
-    if (!table) return "the input type '" + kind + "'";
-    if (entity.find("address") == nullptr) return "it has no address";
-    point.table = *table;
-    point.at = notation(*table, integer(text(entity, "address")));
-    if (modbus::is_bit_table(*table)) point.type = Type::boolean;
-    return "";
-}
-
-std::string read_number(const Node& sensor, points::Point& point) {
-    const std::string type = text(sensor, "data_type", "int16");
-    const auto known = look_up(kHomeTypes, type);
-    if (!known) return "the data type '" + type + "'";
-    const auto order = look_up(kSwaps, text(sensor, "swap"));
-    if (!order) return "swap: " + text(sensor, "swap");
+void read_number(Source& sensor, points::Point& point) {
+    const std::string type = sensor.text("data_type", "int16");
+    const std::string swap = sensor.text("swap", "none");
+    const auto known = meaning(kHomeTypes, type, kTypes);
+    const auto order = meaning(kSwaps, swap, kOrders);
+    if (!known) return sensor.fail("the data type '" + type + '\'');
+    if (!order) return sensor.fail("swap '" + swap + '\'');
     point.type = *known;
     point.word_order = *order;
-    if (*known == Type::string)
-        point.length = static_cast<unsigned>(2 * integer(text(sensor, "count", "1")));
-    point.scale = std::strtod(text(sensor, "scale", "1").c_str(), nullptr);
-    point.offset = std::strtod(text(sensor, "offset", "0").c_str(), nullptr);
-    point.unit = text(sensor, "unit_of_measurement");
-    return "";
+    point.unit = sensor.guess("unit_of_measurement", text_itself).value_or("");
+    if (*known == Type::string) {
+        point.length = 2 * static_cast<unsigned>(sensor.get("count", integer_of, 1));
+        return;
+    }
+    point.scale = sensor.get("scale", number_of, 1);
+    point.offset = sensor.get("offset", number_of, 0);
+    if (!points::is_integer(*known)) return;
+    if (const auto none = sensor.guess("nan_value", integer_of)) point.no_value.push_back(*none);
 }
 
-class Hub {
-  public:
-    Hub(const Node& hub, Draft& draft) : hub_(hub), draft_(draft), line_(make_line()) {}
-
-    void read() {
-        for (const yaml::Entry& entry : hub_.entries) {
-            if (entry.value.kind != Node::Kind::sequence) continue;
-            for (const Node& entity : entry.value.items) read(entry.key, entity);
-        }
+void read_entity(const Node& node, const std::string& list, std::int64_t line, Draft& draft) {
+    Source in(node, list, draft);
+    Tag tag{in.name(), in.line()};
+    const bool is_sensor = list == "sensors";
+    const bool is_binary = list == "binary_sensors";
+    std::string kind = in.text(is_sensor || is_binary ? "input_type" : "write_type",
+                               is_binary ? "coil" : "holding");
+    if (kind == "coils" || kind == "holdings") kind.pop_back();
+    const auto table = meaning(kHomeTables, kind, modbus::kTables);
+    if (!table) in.fail("the input type '" + kind + '\'');
+    tag.point.table = table.value_or(Table::coils);
+    in.needed("address");
+    tag.address = in.get("address", integer_of, 0);
+    if (modbus::is_bit_table(tag.point.table)) {
+        tag.point.type = Type::boolean;
+    } else if (is_binary) {
+        tag.point.type = Type::boolean;
+        tag.point.bit = 0;
+    } else if (is_sensor) {
+        read_number(in, tag.point);
     }
+    tag.point.writable = !is_sensor && !is_binary;
+    tag.point.every = in.get("scan_interval", duration_of, 15s);
+    const std::int64_t station =
+        in.get("slave", integer_of, in.get("device_address", integer_of, 1));
+    if (in.finish()) draft.add(line, station, tag);
+}
 
-  private:
-    std::size_t make_line() {
-        const std::string type = text(hub_, "type");
-        const std::string name = text(hub_, "name", "modbus");
-        const std::string port = text(hub_, "port");
-        if (type != "serial") {
-            const bool rtu = type == "rtuovertcp";
-            if (type == "udp") draft_.note(hub_.mark.line, name + ": type udp; TCP is taken");
-            return draft_.line(name,
-                               (rtu ? "tcp://" : "modbus-tcp://") + text(hub_, "host") + ':' +
-                                   (port.empty() ? "502" : port),
-                               "");
-        }
-        return draft_.line(name, port,
-                           serial_map(text(hub_, "baudrate", "9600"), text(hub_, "bytesize", "8"),
-                                      text(hub_, "parity", "N"), text(hub_, "stopbits", "1"),
-                                      text(hub_, "method") == "ascii"));
+void read_hub(const Node& node, Draft& draft) {
+    Source in(node, "modbus", draft);
+    LineBody body{in.name(), in.line()};
+    const std::string type = in.text("type");
+    if (type == "serial") {
+        body.device = in.needed("port");
+        body.serial =
+            serial_map(in, "baudrate", "bytesize", "stopbits", in.text("method") == "ascii");
+    } else if (type == "tcp" || type == "rtuovertcp") {
+        std::string host = in.needed("host");
+        if (host.find(':') != host.npos && !host.starts_with('[')) host = '[' + host + ']';
+        body.device =
+            (type == "tcp" ? "modbus-tcp://" : "tcp://") + host + ':' + in.text("port", "502");
+    } else {
+        in.fail("type '" + type + '\'');
     }
-
-    void read(const std::string& list, const Node& entity) {
-        Tag tag{text(entity, "name", list)};
-        const bool is_sensor = list == "sensors";
-        const bool is_switch = list == "switches" || list == "lights" || list == "fans";
-        const bool is_known = is_sensor || is_switch || list == "binary_sensors";
-        std::string fault = is_known ? read_place(entity, !is_sensor && !is_switch, tag.point)
-                                     : list + " are not known here";
-        if (fault.empty() && is_sensor) fault = read_number(entity, tag.point);
-        if (!fault.empty()) return draft_.note(entity.mark.line, tag.name + ": " + fault);
-        if (list == "lights" || list == "fans")
-            draft_.note(entity.mark.line, tag.name + ": all but its register");
-        tag.point.writable = is_switch;
-        const std::int64_t seconds = integer(text(entity, "scan_interval", "15"));
-        if (seconds > 0) tag.point.every = std::chrono::seconds(seconds);
-        draft_.add(line_, station_of(entity), tag);
-    }
-
-    const Node& hub_;
-    Draft& draft_;
-    std::size_t line_;
-};
+    const auto timeout = in.guess("timeout", duration_of);
+    auto gap = in.guess("message_wait_milliseconds", duration_of);
+    if (gap) gap = *gap / 1000;  // the key is in milliseconds
+    body.waits = waits_of(timeout, gap, in.guess("delay", duration_of));
+    const auto line = in.is_fine() ? draft.line(body) : std::nullopt;
+    if (!line) in.fail("its port is another line's, with other settings");
+    for (const char* const list : {"sensors", "binary_sensors", "switches", "lights", "fans"})
+        for (const Node* const entity : in.list(list))
+            if (line) read_entity(*entity, list, *line, draft);
+    in.finish();
+}
 
 }  // namespace
 
-std::optional<Imported> import_home_assistant(std::string_view file, yaml::Problems& problems) {
-    const Node whole = yaml::parse(file, problems);
-    const Node* const hubs = whole.find("modbus");
-    if (hubs == nullptr || !problems.empty()) return std::nullopt;
-    Draft draft("Home Assistant", problems.file());
-    for (const Node& hub : hubs->items) Hub(hub, draft).read();
-    return draft.made();
+void read_home_assistant(std::string_view file, yaml::Problems& problems, Draft& draft) {
+    const Node whole = parse_tagged(file, problems);
+    if (!problems.empty()) return;
+    Source all(whole, "the file", draft);
+    for (const Node* const hub : all.list("modbus")) read_hub(*hub, draft);
 }
 
 }  // namespace panelgate::imports

@@ -2,183 +2,201 @@
 
 #define TOML_HEADER_ONLY 1
 #define TOML_EXCEPTIONS 0
+#define TOML_ASSERT(expr) static_assert(true)  // faults such as [*] break an assertion first
 #include <toml++/toml.h>
 
-#include <array>
-#include <utility>
+#include <cmath>
 
-#include "draft.hpp"
-#include "panelgate/yaml/map_reader.hpp"
+#include "panelgate/base/text.hpp"
+#include "source.hpp"
 
 namespace panelgate::imports {
 
 namespace {
 
-using modbus::Table;
 using points::Type;
-using points::WordOrder;
+using yaml::Node;
 
-constexpr auto kTelegrafTypes =
-    std::to_array<std::pair<std::string_view, Type>>({{"INT8L", Type::i8l},
-                                                      {"INT8H", Type::i8h},
-                                                      {"UINT8L", Type::u8l},
-                                                      {"UINT8H", Type::u8h},
-                                                      {"INT16", Type::i16},
-                                                      {"UINT16", Type::u16},
-                                                      {"INT32", Type::i32},
-                                                      {"UINT32", Type::u32},
-                                                      {"INT64", Type::i64},
-                                                      {"UINT64", Type::u64},
-                                                      {"FLOAT16-IEEE", Type::f16},
-                                                      {"FLOAT32-IEEE", Type::f32},
-                                                      {"FLOAT64-IEEE", Type::f64},
-                                                      {"FLOAT16", Type::f16},
-                                                      {"FLOAT32", Type::f32},
-                                                      {"FLOAT64", Type::f64},
-                                                      {"STRING", Type::string},
-                                                      {"BIT", Type::boolean}});
-constexpr auto kOrders =
-    std::to_array<std::pair<std::string_view, WordOrder>>({{"AB", WordOrder::abcd},
-                                                           {"BA", WordOrder::badc},
-                                                           {"ABCD", WordOrder::abcd},
-                                                           {"DCBA", WordOrder::dcba},
-                                                           {"BADC", WordOrder::badc},
-                                                           {"CDAB", WordOrder::cdab},
-                                                           {"ABCDEFGH", WordOrder::abcd},
-                                                           {"HGFEDCBA", WordOrder::dcba},
-                                                           {"BADCFEHG", WordOrder::badc},
-                                                           {"GHEFCDAB", WordOrder::cdab}});
-constexpr auto kTelegrafTables =
-    std::to_array<std::pair<std::string_view, Table>>({{"coil", Table::coils},
-                                                       {"discrete", Table::discrete_inputs},
-                                                       {"input", Table::input_registers},
-                                                       {"holding", Table::holding_registers}});
+constexpr std::string_view kCommonTypes =
+    "INT8L=i8l INT8H=i8h UINT8L=u8l UINT8H=u8h INT16=i16 UINT16=u16 INT32=i32 UINT32=u32 "
+    "INT64=i64 UINT64=u64 STRING=string BIT=bool";
+constexpr std::string_view kRequestTypes = "FLOAT16=f16 FLOAT32=f32 FLOAT64=f64";
+/// Behind FIXED and its like stands the number of addresses; FLOAT32 is the old word for UFIXED.
+constexpr std::string_view kRegisterTypes =
+    "FLOAT16-IEEE=f16 FLOAT32-IEEE=f32 FLOAT64-IEEE=f64 FIXED/1=i16 FIXED/2=i32 FIXED/4=i64 "
+    "UFIXED/1=u16 UFIXED/2=u32 UFIXED/4=u64 FLOAT32/1=u16 FLOAT32/2=u32 FLOAT32/4=u64";
+constexpr std::string_view kByteOrders =
+    "AB=ABCD BA=BADC ABCD=ABCD DCBA=DCBA BADC=BADC CDAB=CDAB ABCDEFGH=ABCD HGFEDCBA=DCBA "
+    "BADCFEHG=BADC GHEFCDAB=CDAB";
+constexpr std::string_view kTelegrafTables =
+    "coil=coils discrete=discrete-inputs input=input-registers holding=holding-registers";
 
-std::string text(const toml::table& in, std::string_view key, std::string_view otherwise = "") {
-    return in[key].value<std::string>().value_or(std::string(otherwise));
+Node node_of(const toml::node& from) {
+    Node node;
+    node.mark.line = static_cast<int>(from.source().begin.line);
+    if (const toml::table* const table = from.as_table()) {
+        node.kind = Node::Kind::map;
+        for (const auto& [key, value] : *table)
+            node.entries.push_back({std::string(key.str()), {}, node_of(value)});
+    } else if (const toml::array* const list = from.as_array()) {
+        node.kind = Node::Kind::sequence;
+        for (const toml::node& item : *list) node.items.push_back(node_of(item));
+    } else {
+        node.kind = Node::Kind::scalar;
+        const auto truth = from.value_exact<bool>();
+        const std::string number = number_text(from.value<double>().value_or(NAN));
+        node.scalar =
+            truth ? (*truth ? "true" : "false") : from.value<std::string>().value_or(number);
+    }
+    return node;
 }
 
-int line_of(const toml::node& node) { return static_cast<int>(node.source().begin.line); }
-
-/// One plugin of the file while its fields are read.
-class Plugin {
-  public:
-    Plugin(const toml::table& of, Duration every, Draft& draft)
-        : of_(of), every_(every), draft_(draft), line_(make_line()) {
-        if (const auto own = yaml::parse_duration(text(of, "interval"))) every_ = *own;
-    }
-
-    void read() {
-        const std::int64_t station = of_["slave_id"].value_or<std::int64_t>(1);
-        for (const auto& [key, table] : {std::pair("coils", Table::coils),
-                                         std::pair("discrete_inputs", Table::discrete_inputs),
-                                         std::pair("input_registers", Table::input_registers),
-                                         std::pair("holding_registers", Table::holding_registers)})
-            each(of_, key, [&](const toml::table& field) { add(station, table, field, ""); });
-        for (const char* const key : {"request", "metric"})
-            each(of_, key, [&](const toml::table& group) { read_group(group); });
-    }
-
-  private:
-    template <class Use>
-    static void each(const toml::table& in, std::string_view key, const Use& use) {
-        if (const toml::array* const list = in[key].as_array())
-            for (const toml::node& one : *list)
-                if (const toml::table* const table = one.as_table()) use(*table);
-    }
-
-    std::size_t make_line() {
-        const std::string controller = text(of_, "controller");
-        const std::string mode = text(of_, "transmission_mode");
-        const std::string place =
-            controller.substr(std::min(controller.find("://") + 3, controller.size()));
-        const bool ascii = mode.starts_with("ASCII");
-        if (controller.starts_with("tcp://"))
-            return draft_.line(text(of_, "name", "device"),
-                               (mode.empty() || mode == "TCP" ? "modbus-tcp://" : "tcp://") + place,
-                               ascii ? "{mode: ascii}" : "");
-        const auto number = [&](std::string_view key, std::int64_t otherwise) {
-            return std::to_string(of_[key].value_or(otherwise));
-        };
-        return draft_.line(text(of_, "name", "device"), place.empty() ? "/dev/ttyUSB0" : place,
-                           serial_map(number("baud_rate", 9600), number("data_bits", 8),
-                                      text(of_, "parity", "N"), number("stop_bits", 1), ascii));
-    }
-
-    void read_group(const toml::table& group) {
-        const std::int64_t station = group["slave_id"].value_or<std::int64_t>(1);
-        each(group, "fields", [&](const toml::table& field) {
-            const auto table = look_up(kTelegrafTables,
-                                       text(field, "register", text(group, "register", "holding")));
-            if (table) add(station, *table, field, text(group, "byte_order", "ABCD"));
-        });
-    }
-
-    /// `order`: of the group; "": the field has its own.
-    void add(std::int64_t station, Table table, const toml::table& field, std::string_view order) {
-        Tag tag{text(field, "name", "field")};
-        const auto refuse = [&](const std::string& what) {
-            draft_.note(line_of(field), tag.name + ": " + what);
-        };
-        const toml::array* const list = field["address"].as_array();
-        const auto address = list != nullptr ? (*list)[0].value<std::int64_t>()
-                                             : field["address"].value<std::int64_t>();
-        if (!address) return refuse("it has no address");
-        const auto count = list != nullptr ? list->size() : 1;
-        tag.point.at = notation(table, *address);
-        tag.point.every = every_;
-        const bool is_bit = modbus::is_bit_table(table);
-        const std::string type = text(field, "data_type", text(field, "type", "UINT16"));
-        const auto known = is_bit ? Type::boolean : type_of(type, count);
-        if (!known) return refuse("the type '" + type + "'");
-        tag.point.type = *known;
-        if (*known == Type::boolean && !is_bit)
-            tag.point.bit = static_cast<unsigned>(field["bit"].value_or<std::int64_t>(0));
-        if (*known == Type::string)
-            tag.point.length = static_cast<unsigned>(
-                2 * field["length"].value_or(static_cast<std::int64_t>(count)));
-        const auto word = look_up(kOrders, order.empty() ? text(field, "byte_order", "AB") : order);
-        if (!word) return refuse("the byte order '" + text(field, "byte_order") + "'");
-        if (!is_bit) tag.point.word_order = *word;
-        tag.point.scale = field["scale"].value<double>().value_or(1.0);
-        if (field["omit"].value_or(false)) return;
-        draft_.add(line_, station, tag);
-    }
-
-    /// FIXED and UFIXED are integers of as many registers as there are addresses.
-    static std::optional<Type> type_of(const std::string& type, std::size_t registers) {
-        const bool fixed = type == "FIXED";
-        if (!fixed && type != "UFIXED") return look_up(kTelegrafTypes, type);
-        if (registers == 1) return fixed ? Type::i16 : Type::u16;
-        if (registers == 2) return fixed ? Type::i32 : Type::u32;
-        return registers == 4 ? std::optional(fixed ? Type::i64 : Type::u64) : std::nullopt;
-    }
-
-    const toml::table& of_;
-    Duration every_;
-    Draft& draft_;
-    std::size_t line_;
+/// What the fields of one list have in common.
+struct Group {
+    bool in_register_style = false;
+    std::int64_t line = 0;
+    std::int64_t station = 0;
+    std::string table{};
+    std::string order{};  ///< "" where each field has its own
+    Duration every{};
 };
+
+/// Sets the type, and what belongs to it. `count`: of the addresses.
+void read_type(Source& in, const Group& group, std::size_t count, points::Point& point) {
+    const bool is_register = group.in_register_style;
+    const std::string type = in.text(is_register ? "data_type" : "type");
+    const std::string order = group.order.empty() ? in.text("byte_order") : group.order;
+    auto known = meaning(kCommonTypes, type, kTypes);
+    if (!known) known = meaning(is_register ? kRegisterTypes : kRequestTypes, type, kTypes);
+    if (!known && is_register)
+        known = meaning(kRegisterTypes, type + '/' + std::to_string(count), kTypes);
+    const auto word = meaning(kByteOrders, order, kOrders);
+    if (!known)
+        return in.fail("the type '" + type + "' of " + std::to_string(count) + " addresses");
+    if (!word) return in.fail("the byte order '" + order + '\'');
+    point.type = *known;
+    point.word_order = *word;
+    if (*known == Type::boolean) {
+        point.bit = static_cast<unsigned>(in.get("bit", integer_of, 0));
+    } else if (*known == Type::string) {
+        const auto all = static_cast<std::int64_t>(count);
+        point.length =
+            2 * static_cast<unsigned>(is_register ? all : in.get("length", integer_of, 1));
+    } else {
+        point.scale = in.get("scale", number_of, 1);
+    }
+    if (is_register && *known != Type::string && points::registers_of(*known) != count)
+        in.fail(type + " of " + std::to_string(count) + " addresses");
+}
+
+void read_field(const Node& node, const Group& group, Draft& draft) {
+    Source in(node, group.in_register_style ? group.table : "fields", draft);
+    if (in.text("omit") == "true") return;
+    Tag tag{in.name(), in.line()};
+    const std::string place = in.text("register", group.table);
+    const auto table = meaning(kTelegrafTables, place, modbus::kTables);
+    if (!table) in.fail("the register '" + place + '\'');
+    tag.point.table = table.value_or(modbus::Table::coils);
+    const auto addresses = in.list("address");
+    for (std::size_t i = 0; i < addresses.size(); ++i) {
+        const auto address = integer_of(addresses[i]->scalar);
+        if (i == 0) tag.address = address.value_or(0);
+        if (!address || *address - tag.address != static_cast<std::int64_t>(i))
+            in.fail("its addresses are not in a row");
+    }
+    if (addresses.empty()) in.fail("it has no address");
+    tag.point.every = group.every;
+    if (modbus::is_bit_table(tag.point.table))
+        tag.point.type = Type::boolean;
+    else
+        read_type(in, group, addresses.size(), tag.point);
+    if (in.finish()) draft.add(group.line, group.station, tag);
+}
+
+void read_group(const Node& node, const std::string& style, Group group, Draft& draft) {
+    Source in(node, style, draft);
+    group.station = in.get("slave_id", integer_of, 0);
+    group.order = in.text("byte_order", "ABCD");
+    group.table = style == "request" ? in.text("register", "holding") : "holding";
+    const auto fields = in.list("fields");
+    if (!in.finish()) return;
+    for (const Node* const field : fields) read_field(*field, group, draft);
+}
+
+/// Sets the device and its serial settings.
+void read_controller(Source& in, LineBody& body) {
+    const std::string controller = in.needed("controller");
+    const std::string mode = in.text("transmission_mode");
+    const std::size_t colon = controller.find("://");
+    const std::string scheme = colon == controller.npos ? "file" : controller.substr(0, colon);
+    std::string place = colon == controller.npos ? controller : controller.substr(colon + 3);
+    if (scheme == "tcp") {
+        if (place.find(':', place.find(']') + 1) == place.npos) place += ":502";
+        body.device = (mode.empty() || mode == "TCP" ? "modbus-tcp://" : "tcp://") + place;
+        if (mode.starts_with("ASCII")) body.serial = "{mode: ascii}";
+    } else if (scheme == "file") {
+        body.device = place;
+        body.serial = serial_map(in, "baud_rate", "data_bits", "stop_bits", mode == "ASCII");
+    } else {
+        in.fail("the controller '" + controller + '\'');
+    }
+}
+
+void read_fields(Source& in, Group group, Draft& draft) {
+    group.in_register_style = true;
+    group.station = in.get("slave_id", integer_of, 0);
+    for (const auto& [key, table] :
+         {std::pair("coils", "coil"), std::pair("discrete_inputs", "discrete"),
+          std::pair("input_registers", "input"), std::pair("holding_registers", "holding")}) {
+        group.table = table;
+        for (const Node* const field : in.list(key)) read_field(*field, group, draft);
+    }
+}
+
+/// Reads [inputs.modbus.workarounds], too.
+void read_waits(Source& in, LineBody& body, Draft& draft) {
+    const auto timeout = in.guess("timeout", duration_of);
+    body.waits = waits_of(timeout, {}, {});
+    for (const Node* const workarounds : in.list("workarounds")) {
+        Source more(*workarounds, "workarounds", draft);
+        const auto gap = more.guess("pause_between_requests", duration_of);
+        body.waits = waits_of(timeout, gap, more.guess("pause_after_connect", duration_of));
+        more.finish();
+    }
+}
+
+void read_plugin(const Node& node, Duration every, Draft& draft) {
+    Source in(node, "inputs.modbus", draft);
+    LineBody body{in.name(), in.line()};
+    if (body.name == "inputs.modbus") body.name = "device";
+    read_controller(in, body);
+    read_waits(in, body, draft);
+    Group group{.every = in.get("interval", duration_of, every)};
+    const std::string style = in.text("configuration_type", "register");
+    const auto line = in.is_fine() ? draft.line(body) : std::nullopt;
+    if (!line) in.fail("its port is another line's, with other settings");
+    group.line = line.value_or(0);
+    if (line && style == "register") read_fields(in, group, draft);
+    if (line && style != "register")
+        for (const Node* const one : in.list(style)) read_group(*one, style, group, draft);
+    in.finish();
+}
 
 }  // namespace
 
-std::optional<Imported> import_telegraf(std::string_view file, yaml::Problems& problems) {
+void read_telegraf(std::string_view file, yaml::Problems& problems, Draft& draft) {
     const toml::parse_result parsed = toml::parse(file, problems.file());
     if (!parsed) {
         const auto at = parsed.error().source().begin;
         problems.add({static_cast<int>(at.line), static_cast<int>(at.column)},
                      "this is no TOML: " + std::string(parsed.error().description()));
-        return std::nullopt;
+        return;
     }
-    const toml::table& whole = parsed.table();
-    Draft draft("Telegraf", problems.file());
-    const auto every =
-        yaml::parse_duration(whole["agent"]["interval"].value<std::string>().value_or("10s"));
-    if (const toml::array* const plugins = whole["inputs"]["modbus"].as_array())
-        for (const toml::node& one : *plugins)
-            if (const toml::table* const plugin = one.as_table())
-                Plugin(*plugin, every.value_or(10s), draft).read();
-    return draft.made();
+    const auto agent = parsed.table()["agent"]["interval"].value<std::string>();
+    const auto every = duration_of(agent.value_or("10s"));
+    if (const toml::array* const plugins = parsed.table()["inputs"]["modbus"].as_array())
+        for (const toml::node& plugin : *plugins)
+            read_plugin(node_of(plugin), every.value_or(10s), draft);
 }
 
 }  // namespace panelgate::imports
