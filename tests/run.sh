@@ -56,6 +56,17 @@ build() {
         -DPANELGATE_TEST_PCH=ON -DPANELGATE_WERROR=ON "${@:4}" && cmake --build --preset "$1"
 }
 run_tests() { ctest --preset "$1" -j "$jobs" "${@:2}"; }
+# The soak judges values and sums, which hold however late a compiler beside it makes them.
+begin_soak() {
+    /usr/bin/python3 -B tests/soak/soak.py "$([ $mode = nightly ] && echo 7200 || echo 180)" >"$logs/soak-output.log" 2>&1 &
+    soak=$!
+}
+end_soak() {
+    local rc=0
+    wait "$soak" || rc=$?
+    cat "$logs/soak-output.log"
+    return $rc
+}
 check_format() {
     find src include tests -name '*.[ch]pp' -print0 | xargs -0 clang-format-19 --dry-run -Werror
 }
@@ -90,8 +101,10 @@ if [ $mode != quick ]; then
     # Optimization takes longer than it saves where no test waits for the code.
     cold=-DPANELGATE_O0="panelgate;pg_commands;pg_config;pg_doctor;pg_explain;pg_gateway;pg_mbusd;pg_metrics;pg_mqtt;pg_plan;pg_points;pg_profile;pg_rt;pg_scan;pg_sim;pg_web_api;pg_web_http;pg_yaml"
     [ $mode = nightly ] || long=OFF
+    begin_soak
     # Before the tests: a compiler beside them makes panels late, however nice it is.
     must "build asan" build asan ON $long "$cold" -DPANELGATE_TEST_UBSAN=$long
+    step "soak" end_soak
 fi
 step "tests release" run_tests release "${which[@]}"
 step "deploy/demo.sh" /usr/bin/python3 -B tests/system/demo_script.py

@@ -11,10 +11,9 @@ foreach(TOOL AR RANLIB STRIP OBJCOPY)
     string(TOLOWER ${TOOL} NAME)
     set(CMAKE_${TOOL} /usr/bin/${PANELGATE_TRIPLE}-${NAME})
 endforeach()
-# As dpkg-buildflags has them, and nothing of this machine in the program
-set(CMAKE_CXX_FLAGS_INIT "${PANELGATE_MACHINE_FLAGS} -fstack-protector-strong -D_FORTIFY_SOURCE=2 \
+# Nothing of this machine in the program
+set(CMAKE_CXX_FLAGS_INIT "${PANELGATE_MACHINE_FLAGS} \
 -ffile-prefix-map=${CMAKE_SOURCE_DIR}=. -ffile-prefix-map=${PANELGATE_SYSROOT}=")
-set(CMAKE_EXE_LINKER_FLAGS_INIT "-Wl,-z,relro -Wl,-z,now")
 if(PANELGATE_EMULATOR)
     set(CMAKE_CROSSCOMPILING_EMULATOR ${PANELGATE_EMULATOR};-L;${PANELGATE_SYSROOT})
 endif()

@@ -1,4 +1,6 @@
 """What the service's unit lets the kernel refuse is nothing that the gateway asks for."""
+import json
+import os
 import pathlib
 import re
 import shutil
@@ -12,6 +14,7 @@ import harness
 from harness import ROOT
 
 SERVICE = ROOT / "deploy/systemd/panelgate.service"
+PROFILE = ROOT / "deploy/seccomp.json"
 BUSY = config.gateway(
     config.line(stations="{id: 31, name: press, profile: autonics-gplp-s, poll: [{read: UW0, count: 5, "
                          "every: 50ms}]}"),
@@ -68,9 +71,33 @@ class SystemCalls(unittest.TestCase):
         self.assertLessEqual({"execve", "epoll_wait", "sched_setattr"}, asked)
         self.assertEqual(asked - allowed(), set())
 
+    def test_the_profile_for_containers_allows_what_the_unit_does(self):
+        wanted = {"defaultAction": "SCMP_ACT_ERRNO",
+                  "architectures": ["SCMP_ARCH_X86_64", "SCMP_ARCH_AARCH64"],
+                  "syscalls": [{"names": sorted(allowed()), "action": "SCMP_ACT_ALLOW"}]}
+        if os.environ.get("PANELGATE_WRITE_GOLDEN") == "1":
+            PROFILE.write_text(json.dumps(wanted, indent=1) + "\n")
+        self.assertEqual(json.loads(PROFILE.read_text()), wanted)
+
     def test_the_sets_of_the_unit_are_read_as_systemd_reads_them(self):
         self.assertLessEqual({"read", "execve", "sched_setattr"}, allowed())
         self.assertFalse({"setpriority", "reboot", "chroot", "mount"} & allowed())
+
+
+@unittest.skipIf(harness.SANITIZED, "the sanitizers have checks of their own")
+@unittest.skipUnless(shutil.which("readelf"), "no readelf here")
+class Hardening(unittest.TestCase):
+    def test_the_program_is_built_with_all_checks(self):
+        def told(*options):
+            return subprocess.run(["readelf", "-W", *options, harness.PANELGATE], capture_output=True, text=True,
+                                  timeout=harness.PATIENCE, check=True).stdout
+        self.assertRegex(told("-d"), r"FLAGS_1.*NOW.*PIE")
+        self.assertIn("GNU_RELRO", told("-l"))
+        self.assertNotRegex(told("-l"), r"GNU_STACK.*E")
+        symbols = told("--dyn-syms")
+        self.assertIn("__stack_chk_fail", symbols)
+        self.assertIn("_chk@", symbols, "fortify")
+        self.assertIn("__glibcxx_assert_fail", symbols)
 
 
 if __name__ == "__main__":
