@@ -118,8 +118,9 @@ Gateway::KnownLines::~KnownLines() {
     for (const auto& [name, line] : lines) line->dispose();
 }
 
-LineWatch Gateway::watch() {
+LineWatch Gateway::watch(std::size_t lines) {
     LineWatch watch;
+    watch.trace = bus::TraceSettings::of(lines);
     watch.event = [this](const std::string& line, const bus::BusEvent& event) {
         on_event(line, event);
     };
@@ -177,10 +178,10 @@ Gateway::Lines Gateway::lines_of(const config::Config& config) {
     Lines lines;
     for (const config::Line& line : config.lines) {
         const auto found = known_.lines.find({line.name, way_of(line, simulate_)});
-        lines.push_back(
-            found != known_.lines.end()
-                ? found->second
-                : std::make_shared<RunningLine>(loops_.plant, clock_, line, simulate_, watch()));
+        lines.push_back(found != known_.lines.end()
+                            ? found->second
+                            : std::make_shared<RunningLine>(loops_.plant, clock_, line, simulate_,
+                                                            watch(config.lines.size())));
     }
     return lines;
 }

@@ -152,6 +152,7 @@ bus::Settings RunningLine::settings_of(const config::Line& line) {
     }
     settings.refuses_writes = watch_.refuses_writes;
     settings.standby = line.standby;
+    settings.trace = watch_.trace;
     if (watch_.may_send && way_ == Way::wire)
         settings.may_send = [this, name = line.name] { return watch_.may_send(name); };
     if (watch_.admit) {

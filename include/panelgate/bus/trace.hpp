@@ -25,6 +25,17 @@ struct TraceSettings {
     std::size_t decisions = 500;
     std::size_t bytes = 256 * 1024;  ///< of all frames; the oldest are dropped
     std::size_t text = 64 * 1024;    ///< of all decisions
+
+    /// The sizes for one of so many lines: all lines together have no more than kFull full ones.
+    static TraceSettings of(std::size_t lines) {
+        constexpr std::size_t kFull = 32;
+        TraceSettings sizes;
+        if (lines > kFull)
+            for (std::size_t* const size :
+                 {&sizes.transactions, &sizes.frames, &sizes.decisions, &sizes.bytes, &sizes.text})
+                *size = *size * kFull / lines;
+        return sizes;
+    }
 };
 /// Sizes of the incident records: about 36 KiB each with these figures, allocated at the first
 /// incident and then reused.

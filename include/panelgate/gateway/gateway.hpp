@@ -82,7 +82,8 @@ class Gateway {
   private:
     using Lines = std::vector<std::shared_ptr<RunningLine>>;
 
-    LineWatch watch();
+    /// For one of so many lines.
+    LineWatch watch(std::size_t lines);
     void on_event(const std::string& line, const bus::BusEvent& event);
     void on_points(const std::string& line, std::uint8_t station,
                    const std::vector<std::size_t>& wants);

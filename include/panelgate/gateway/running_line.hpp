@@ -56,6 +56,7 @@ struct LineWatch {
     std::function<std::optional<bus::Admission>(const WhoRef& who, const std::string& line,
                                                 std::uint8_t station)>
         admit{};
+    bus::TraceSettings trace{};  ///< sizes of the line's trace
 };
 
 /// What drives a line.

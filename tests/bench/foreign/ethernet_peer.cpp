@@ -6,8 +6,6 @@
 //   ethernet_peer load PORT UNIT CONNECTIONS SECONDS   reads of 10 registers without pause, one at
 //   a time in each
 //                                     connection; prints answers a second, and how many were wrong
-#include <arpa/inet.h>
-#include <netinet/tcp.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -22,43 +20,13 @@
 #include <string>
 #include <vector>
 
+#include "peer.hpp"
+
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using Bytes = std::vector<std::uint8_t>;
+using namespace peer;
 constexpr std::size_t kRequest = 12;  // a read in Modbus/TCP
-
-unsigned word(const Bytes& bytes, std::size_t at) {
-    return static_cast<unsigned>(bytes[at] << 8 | bytes[at + 1]);
-}
-void put(Bytes& to, unsigned value) {
-    to.push_back(static_cast<std::uint8_t>(value >> 8));
-    to.push_back(static_cast<std::uint8_t>(value));
-}
-void no_delay(int fd) {
-    const int on = 1;
-    ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-}
-sockaddr_in local(unsigned port) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(static_cast<std::uint16_t>(port));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    return address;
-}
-bool receive(int fd, Bytes& to) {
-    std::uint8_t room[65536];
-    const ssize_t size = ::recv(fd, room, sizeof room, 0);
-    if (size <= 0) return false;
-    to.insert(to.end(), room, room + size);
-    return true;
-}
-void watch(int epoll, int fd) {
-    epoll_event event{};
-    event.events = EPOLLIN;
-    event.data.fd = fd;
-    ::epoll_ctl(epoll, EPOLL_CTL_ADD, fd, &event);
-}
 
 // The devices
 
@@ -86,13 +54,7 @@ Bytes reply_to(const Bytes& request) {
     const int epoll = ::epoll_create1(0);
     std::vector<int> listeners;
     for (int i = 0; i < devices; ++i) {
-        const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
-        sockaddr_in address = local(0);
-        socklen_t size = sizeof address;
-        if (::bind(fd, reinterpret_cast<sockaddr*>(&address), size) != 0) std::exit(1);
-        ::listen(fd, 16);
-        ::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size);
-        std::printf("%u\n", ntohs(address.sin_port));
+        const int fd = listen_anywhere();
         listeners.push_back(fd);
         watch(epoll, fd);
     }

@@ -116,6 +116,13 @@ std::string ids(const std::vector<TraceTransaction>& transactions) {
     return text;
 }
 
+TEST(TraceSettings, OfManyLinesHaveTogetherNoMoreThan32Full) {
+    EXPECT_EQ(TraceSettings::of(1).transactions, 1000U);
+    EXPECT_EQ(TraceSettings::of(32).bytes, TraceSettings().bytes);
+    EXPECT_EQ(TraceSettings::of(256).transactions, 125U);
+    EXPECT_LE(256 * TraceSettings::of(256).bytes, 32 * TraceSettings().bytes);
+}
+
 TEST(TraceStore, TellsATransactionWithItsFrames) {
     Line line;
     line.begin(kRequest);
