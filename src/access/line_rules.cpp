@@ -81,7 +81,6 @@ LineRules::LineRules(std::shared_ptr<const Settings> settings, std::string line,
         unlisted_items_.emplace_back();
         if (rule.unlisted_items) unlisted_items_.back().push_back(*rule.unlisted_items);
     }
-    meetings_.resize(kAddresses);
 }
 
 Verdict LineRules::judge(const WhoRef& who, const Question& question) const {
@@ -192,6 +191,7 @@ std::vector<std::string> LineRules::denying_names() const {
 }
 
 const LineRules::Meeting& LineRules::meet(const WhoRef& who, std::uint8_t station) const {
+    if (meetings_.empty()) meetings_.resize(kAddresses);  // 14 KiB that a line without rules saves
     Meetings& known = meetings_[station];
     if (const auto found = known.find(who.get()); found != known.end()) return found->second;
     if (met_ >= kMeetings) {
