@@ -198,7 +198,7 @@ void Bus::State::tell_health(std::uint8_t station) {
 /// with the same configuration send the same reads.
 bool Bus::State::is_foreign_request(const arbiter::Note& note) const {
     if (note.kind == FrameKind::foreign_request) return !note.bytes.empty();
-    return note.kind == FrameKind::echo && arbiter.echo() == EchoState::absent &&
+    return note.kind == FrameKind::echo && arbiter.echo() != EchoState::unknown &&
            note.bytes.size() > 1 && modbus::reads_table(note.bytes[1]);
 }
 

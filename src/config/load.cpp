@@ -321,6 +321,7 @@ void load_tree(Loading& loading, Node& tree) {
     check_servers(root, tree);
     root.elsewhere(kTopElsewhere);
     root.finish();
+    if (loading.config.mqtt) loading.config.mqtt->shared = loading.config.standby.has_value();
     if (!loading.problems.empty()) return;
     if (loading.config.lines.empty()) return refuse_no_lines(root);
     warn_of_rules(loading);

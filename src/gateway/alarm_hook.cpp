@@ -45,14 +45,17 @@ std::string post(const alarms::Url& url, const std::string& ca, const std::strin
 AlarmHook::AlarmHook(boost::asio::any_io_executor executor, rt::Clock& clock)
     : clock_(clock), alarm_(clock.make_alarm()), executor_(std::move(executor)) {}
 
-void AlarmHook::apply(const std::optional<alarms::WebhookSettings>& settings) {
-    if (hook_ && settings && hook_->settings().format == settings->format)
-        return hook_->apply(*settings);
+bool AlarmHook::apply(const std::optional<alarms::WebhookSettings>& settings) {
+    if (hook_ && settings && hook_->settings().format == settings->format) {
+        hook_->apply(*settings);
+        return false;
+    }
     hook_.reset();
     alarm_->cancel();
-    if (!settings) return;
+    if (!settings) return false;
     hook_.emplace(*settings);
     if (!worker_) worker_ = std::make_unique<rt::Worker>(executor_);
+    return true;
 }
 
 void AlarmHook::stop() {

@@ -304,7 +304,16 @@ void Gateway::serve(std::shared_ptr<const config::Config> config) {
     doors_.settle();
     watch_certificates();
     watch_expiry();
+    apply_alarms();
     standby_.arranged();
+}
+
+void Gateway::apply_alarms() {
+    alarms_.apply(snapshot_->config->alarms, plant_in(snapshot_));
+    if (!hook_.apply(snapshot_->config->webhook)) return;
+    for (const web::AlarmView& alarm : alarms_.list())
+        if (alarm.status.is_active())
+            hook_.on_change({alarms::Change::Kind::raised, &alarm.settings, alarm.status});
 }
 
 /// Of all lines: what is new at a door is about requests to any.
@@ -369,8 +378,7 @@ void Gateway::record(const web::ReloadVerdict& verdict) {
     if (was_kept) audit_.reload(verdict);
     audit_.apply(snapshot_->config->audit);
     journal_.apply(snapshot_->config->store);
-    hook_.apply(snapshot_->config->webhook);
-    alarms_.apply(snapshot_->config->alarms, plant_in(snapshot_));
+    apply_alarms();
     if (!was_kept) audit_.reload(verdict);
 }
 

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "panelgate/base/network.hpp"
+#include "panelgate/base/who.hpp"
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/web/http/client.hpp"
@@ -52,9 +53,35 @@ void make_listen(config::Line& line) {
     for (config::Station& station : line.stations) station.listens = true;
 }
 
+/// The longest that this line's master may say nothing.
+Duration quiet_of(const config::Line& line) {
+    constexpr Duration kMargin = 100ms;
+    Duration quiet = line.arbiter.broadcast_turnaround;
+    const auto look_at = [&quiet](const arbiter::StationSettings& station) {
+        quiet =
+            std::max({quiet, station.response_timeout, station.station_gap, station.after_write});
+    };
+    look_at(line.arbiter.unlisted);
+    for (const arbiter::StationSettings& station : line.arbiter.stations) look_at(station);
+    return quiet + kMargin;
+}
+
+const config::Line* line_of(const config::Config& config, const std::string& station) {
+    const auto found = std::ranges::find_if(config.lines, [&](const config::Line& line) {
+        return std::ranges::find(line.stations, station, &config::Station::name) !=
+               line.stations.end();
+    });
+    return found == config.lines.end() ? nullptr : &*found;
+}
+
 /// A cheap read, which a panel answers whatever is in it: by an exception, too.
-modbus::Request cheap_read() {
-    return modbus::Request::read({modbus::Table::holding_registers, 0, 1});
+bus::Request own_read(std::uint8_t station, bool poll) {
+    static const WhoRef kWho = own_task("standby");
+    return {.station = station,
+            .request = modbus::Request::read({modbus::Table::holding_registers, 0, 1}),
+            .client = bus::next_client_id(),
+            .who = kWho,
+            .poll = poll};
 }
 
 }  // namespace
@@ -76,15 +103,20 @@ void Standby::apply(const config::Config& config) {
     const bool other_rank = settings_ && config.standby && settings_->rank != config.standby->rank;
     if (!config.standby || other_rank) places_.clear();
     settings_ = config.standby;
+    locks_.clear();
+    peer_role_.clear();
     if (!settings_) return alarm_->cancel();
     std::map<std::string, Place> before = std::exchange(places_, {});
     for (const config::Line& line : config.lines) {
+        if (line.kind == config::Line::Kind::tcp && !line.device.modbus_tcp)
+            locks_[line.name] = {false, clock_.now()};
         if (line.kind != config::Line::Kind::serial || line.listens) continue;
         auto known = before.find(line.name);
         Place place = known != before.end()
                           ? std::move(known->second)
                           : Place{.seat = standby::Seat(settings_->rank), .line = {}};
         place.line = line;
+        place.seat.set_quiet(quiet_of(line));
         for (config::Station& station : place.line.stations) {
             station.points.clear();
             station.polls.clear();
@@ -107,7 +139,11 @@ std::shared_ptr<const config::Config> Standby::arrange(
     auto arranged = std::make_shared<config::Config>(*config);
     for (config::Line& line : arranged->lines)
         if (!is_driven(line.name)) make_listen(line);
-    arranged->relays.clear();
+    std::erase_if(arranged->relays, [&](const points::Relay& relay) {
+        const config::Line* const from = line_of(*config, relay.from.station);
+        const config::Line* const to = line_of(*config, relay.to.station);
+        return from == nullptr || to == nullptr || !is_driven(from->name) || !is_driven(to->name);
+    });
     if (std::ranges::none_of(places_, [&](const auto& one) { return is_driven(one.first); })) {
         arranged->mqtt.reset();
         arranged->webhook.reset();
@@ -142,6 +178,14 @@ void Standby::arranged() {
     }
 }
 
+void Standby::look_at_locks() {
+    for (auto& [name, lock] : locks_) {
+        const RunningLine* const line = hooks_.line(name);
+        const bool up = line != nullptr && line->bus().status().up;
+        if (up != lock.first) lock = {up, clock_.now()};
+    }
+}
+
 /// A line that was arranged anew may still be opening, which says nothing about its device.
 void Standby::look_for_device(const std::string& name, Place& place) {
     const RunningLine* const line = hooks_.line(name);
@@ -156,9 +200,13 @@ void Standby::look() {
     for (auto& [name, place] : places_) {
         look_for_device(name, place);
         if (place.seat.role() == Role::listening) listen_to(name, place);
-        if (place.seat.role() == Role::active) look_for_echo(name, place);
+        if (place.seat.role() == Role::active) {
+            look_for_echo(name, place);
+            look_for_answers(name, place);
+        }
         carry_out(name, place, place.seat.look(clock_.now()));
     }
+    look_at_locks();
     if (clock_.now() >= next_question_) ask_peer();
 }
 
@@ -167,7 +215,8 @@ void Standby::listen_to(const std::string& name, Place& place) {
     const RunningLine* const line = hooks_.line(name);
     if (line == nullptr) return;
     const std::uint64_t received = line->bus().report().device.bytes_received;
-    if (received != place.received) carry_out(name, place, place.seat.on_heard(clock_.now()));
+    if (place.received && received != *place.received)
+        carry_out(name, place, place.seat.on_heard(clock_.now()));
     place.received = received;
 }
 
@@ -196,9 +245,11 @@ void Standby::carry_out(const std::string& name, Place& place, std::optional<Dee
 /// The line is closed and opened anew by the probe's own bus, which has no other client.
 void Standby::begin_probe(const std::string& name, Place& place) {
     RunningLine* const line = hooks_.line(name);
-    if (line == nullptr) return;
+    if (line == nullptr || place.line.stations.empty()) return;
+    place.probed = station_to_probe(name, place);
     line->stop();
     bus::Settings settings = explain::bus_settings(place.line);
+    for (arbiter::StationSettings& station : settings.arbiter.stations) station.retries = 0;
     settings.observe = [this, name](const bus::BusEvent& event) {
         const auto found = places_.find(name);
         if (found == places_.end()) return;
@@ -222,24 +273,30 @@ void Standby::begin_probe(const std::string& name, Place& place) {
     place.probe->start();
 }
 
-/// A panel that was heard, else the next one.
-void Standby::ask_panel(const std::string& name, Place& place) {
+/// First the panel whose reply was heard last, then one after another.
+std::size_t Standby::station_to_probe(const std::string& name, const Place& place) const {
     const auto& stations = place.line.stations;
     const RunningLine* const line = hooks_.line(name);
-    if (stations.empty() || line == nullptr) return end_probe(name, place, false);
+    std::size_t next = (place.probed + 1) % stations.size();
+    std::optional<Duration> shortest;
+    for (std::size_t i = 0; place.tried == 0 && i < stations.size(); ++i) {
+        const auto ago = line->bus().station_status(stations[i].id).last_success;
+        if (!ago || (shortest && *shortest <= *ago)) continue;
+        shortest = ago;
+        next = i;
+    }
+    return next;
+}
+
+void Standby::ask_panel(const std::string& name, Place& place) {
     place.asked = true;
-    const auto heard = std::ranges::find_if(stations, [&](const config::Station& station) {
-        return line->bus().station_status(station.id).state == Health::heard;
-    });
-    const std::uint8_t id =
-        heard != stations.end() ? heard->id : stations[place.next_station++ % stations.size()].id;
     const auto done = std::make_shared<std::function<void(bool)>>(
         [this, name, life = std::weak_ptr(alive_)](bool answered) {
             if (life.expired()) return;
             if (const auto found = places_.find(name); found != places_.end())
                 end_probe(name, found->second, answered);
         });
-    place.probe->transact({.station = id, .request = cheap_read(), .client = bus::next_client_id()},
+    place.probe->transact(own_read(place.line.stations[place.probed].id, false),
                           [done](const bus::Answer& answer) { (*done)(answer.pdu.has_value()); });
 }
 
@@ -250,26 +307,54 @@ void Standby::end_probe(const std::string& name, Place& place, bool answered) {
         if (life.expired()) return;
         const auto found = places_.find(name);
         if (found == places_.end() || !found->second.probe) return;
-        carry_out(name, found->second, found->second.seat.on_probed(clock_.now(), answered));
+        Place& one = found->second;
+        one.tried = answered ? 0 : one.tried + 1;
+        const bool all_tried = one.tried >= one.line.stations.size();
+        carry_out(name, one, one.seat.on_probed(clock_.now(), answered, all_tried));
     });
 }
 
+/// Any station that is not known to be dead, those that answer first. While all are dead, silence
+/// is no harm: the other box has no answer to its probe, either.
 void Standby::keep_alive(const std::string& name, Place& place) {
     RunningLine* const line = hooks_.line(name);
     if (line == nullptr) return;
     const auto& stations = place.line.stations;
-    const auto online = std::ranges::find_if(stations, [&](const config::Station& station) {
+    const auto find = [&](auto fits) {
+        return std::ranges::find_if(stations, [&](const config::Station& station) {
+            return fits(line->bus().station_status(station.id).state);
+        });
+    };
+    auto station = find([](Health health) { return health == Health::online; });
+    if (station == stations.end() && place.probed < stations.size() &&
+        line->bus().station_status(stations[place.probed].id).state != Health::offline)
+        station = stations.begin() + static_cast<std::ptrdiff_t>(place.probed);
+    if (station == stations.end())
+        station = find([](Health health) { return health != Health::offline; });
+    if (station == stations.end()) return;
+    line->bus().transact(own_read(station->id, true), [](const bus::Answer&) {});
+}
+
+/// A master whose frames get lost, or that hears nothing, leaves the line if the other box is
+/// there.
+void Standby::look_for_answers(const std::string& name, Place& place) {
+    constexpr Duration kPatient = 10s;
+    const RunningLine* const line = hooks_.line(name);
+    if (line == nullptr) return;
+    const TimePoint now = clock_.now();
+    const bool any = std::ranges::any_of(place.line.stations, [&](const config::Station& station) {
         return line->bus().station_status(station.id).state == Health::online;
     });
-    if (online == stations.end()) return;
-    line->bus().transact({.station = online->id, .request = cheap_read(), .poll = true},
-                         [](const bus::Answer&) {});
+    if (any) place.answered = now;
+    const bool is_alone = peer_role_ != label(Role::listening) && peer_role_ != "standby";
+    if (is_alone || now < std::max(place.answered, place.seat.since()) + kPatient) return;
+    carry_out(name, place, place.seat.on_unanswered(now));
 }
 
 void Standby::change(const std::string& name, Place& place) {
     const bool probed = place.probe != nullptr;
     place.probe.reset();
-    place.received = 0;
+    place.received.reset();
     if (probed && place.seat.role() == Role::listening)
         if (RunningLine* const line = hooks_.line(name)) line->restart();
     hooks_.tell(name, place.seat);
@@ -297,6 +382,8 @@ void Standby::take_peer(const std::string& text) {
     const json::value body = json::parse(text, wrong);
     const json::object* const whole = wrong ? nullptr : body.if_object();
     peer_role_ = whole == nullptr ? "" : text_in(*whole, "role");
+    if (whole == nullptr)  // a box that says nothing is no master that has to be waited for
+        for (auto& [name, place] : places_) place.seat.on_peer(clock_.now(), false);
     const json::value* const lines = whole == nullptr ? nullptr : whole->if_contains("lines");
     if (lines == nullptr || !lines->is_array()) return;
     for (const json::value& one : lines->as_array()) {
@@ -317,6 +404,12 @@ web::StandbyView Standby::view() const {
         view.lines.push_back({name, std::string(label(seat.role())), std::string(seat.why()),
                               clock_.now() - seat.since(), seat.is_deaf()});
     }
+    for (const auto& [name, lock] : locks_)
+        view.lines.push_back({name, std::string(label(lock.first ? Role::active : Role::listening)),
+                              lock.first
+                                  ? "the device server has taken the connection of this box"
+                                  : "the device server has not taken the connection of this box",
+                              clock_.now() - lock.second, false});
     return view;
 }
 

@@ -64,8 +64,10 @@ Message JsonTopics::farewell(WallTime now) {
 }
 
 std::vector<std::string> JsonTopics::subscriptions() const {
-    if (!settings_.write) return {};
-    return {settings_.topic + "/+/+/set"};
+    std::vector<std::string> topics;
+    if (settings_.write) topics.push_back(settings_.topic + "/+/+/set");
+    if (settings_.shared) topics.push_back(status({}).topic);
+    return topics;
 }
 
 std::vector<std::string> JsonTopics::retained() const {
@@ -119,6 +121,10 @@ std::string JsonTopics::topic_of(std::size_t point) const {
 std::vector<Command> JsonTopics::commands(std::string_view topic, std::string_view payload,
                                           bool retained) const {
     std::string_view rest = topic;
+    // The last word of the other gateway, while this one publishes.
+    if (settings_.shared && topic == status({}).topic)
+        return payload.find("offline") != payload.npos ? std::vector<Command>{Rebirth{}}
+                                                       : std::vector<Command>{};
     if (!settings_.write || !rest.starts_with(settings_.topic + '/')) return {};
     rest.remove_prefix(settings_.topic.size() + 1);
     if (!rest.ends_with(kSet)) return {};

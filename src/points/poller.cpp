@@ -58,8 +58,7 @@ void Poller::State::ask(const StationPtr& station, StationPolls::Due due) {
                   asked = clock.now()](const bus::Answer& answer) {
                      const auto self = weak.lock();
                      const auto alive = of.lock();  // null if the station was removed or replaced
-                     if (self && self->running && alive)
-                         self->on_answer(*alive, read, answer, asked);
+                     if (self && alive) self->on_answer(*alive, read, answer, asked);
                  });
 }
 
@@ -67,6 +66,7 @@ void Poller::State::on_answer(Station& station, std::size_t read, const bus::Ans
                               TimePoint asked) {
     // The time of asking is the safe choice: the value is not older than that.
     const auto wants = station.polls->on_answer(clock.now(), read, answer.pdu, asked);
+    if (!running) return;  // told when the poller was stopped
     if (update && !wants.empty()) update(station.id, wants);
     arm();
 }

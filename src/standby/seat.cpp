@@ -34,7 +34,13 @@ std::optional<Deed> Seat::on_foreign_request(TimePoint now) {
     return listen(now, "another master asks on the line");
 }
 
-std::optional<Deed> Seat::on_probed(TimePoint now, bool answered) {
+std::optional<Deed> Seat::on_unanswered(TimePoint now) {
+    if (role_ != Role::active) return std::nullopt;
+    next_claim_ = now + kLeaves;
+    return listen(now, "no panel answers this box, and the other box is there");
+}
+
+std::optional<Deed> Seat::on_probed(TimePoint now, bool answered, bool all_tried) {
     if (role_ != Role::claiming) return std::nullopt;
     if (answered) {
         enter(now, Role::active, "the line was silent, and a panel answers");
@@ -46,8 +52,11 @@ std::optional<Deed> Seat::on_probed(TimePoint now, bool answered) {
     }
     deaf_ = true;
     next_claim_ = now + retry_;
-    retry_ = std::min(2 * retry_, kLongestRetry);
-    return listen(now, "the line is silent, and no panel answers");
+    if (all_tried) retry_ = std::min(2 * retry_, kLongestRetry);
+    const TimePoint heard = heard_;
+    const auto deed = listen(now, "the line is silent, and no panel answers");
+    heard_ = heard;  // the line is as silent as before
+    return deed;
 }
 
 std::optional<Deed> Seat::look(TimePoint now) {
@@ -60,7 +69,7 @@ std::optional<Deed> Seat::look(TimePoint now) {
         case Role::listening:
             return try_to_claim(now);
         case Role::claiming:
-            return now >= since_ + kProbe ? on_probed(now, false) : std::nullopt;
+            return now >= since_ + kProbe + quiet_ ? on_probed(now, false) : std::nullopt;
         case Role::active:
             break;
     }
@@ -71,8 +80,8 @@ std::optional<Deed> Seat::look(TimePoint now) {
 
 std::optional<Deed> Seat::try_to_claim(TimePoint now) {
     const bool peer_is_master = peer_active_ && now < peer_said_ + kPeerCounts;
-    if (now < heard_ + kPatience + rank_ * kPatienceOfRank || now < next_claim_ || peer_is_master)
-        return std::nullopt;
+    const Duration patience = kPatience + quiet_ - kSilence + rank_ * kPatienceOfRank;
+    if (now < heard_ + patience || now < next_claim_ || peer_is_master) return std::nullopt;
     enter(now, Role::claiming, "the line is silent");
     return Deed::probe;
 }

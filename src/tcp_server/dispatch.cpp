@@ -66,12 +66,13 @@ std::vector<Target> targets_of(std::uint8_t unit, const UnitMap& units) {
     return targets;
 }
 
-/// Refuses with 01, or with 06 if it is only that nothing can be recorded now.
+/// Refuses with 01, or with the code of the rule if it is only that nothing can be recorded now, or
+/// that another box drives the lines.
 Refuse deny(std::vector<Target> unwilling, const std::vector<bus::Refusal>& refusals) {
-    const bool unrecorded = std::ranges::all_of(refusals, [](const bus::Refusal& refusal) {
-        return refusal.rule == bus::Rule::unrecorded;
+    const bool passes = std::ranges::all_of(refusals, [](const bus::Refusal& refusal) {
+        return refusal.rule == bus::Rule::unrecorded || refusal.rule == bus::Rule::standby;
     });
-    if (!unrecorded) return refuse(Fault::denied, std::move(unwilling));
+    if (!passes) return refuse(Fault::denied, std::move(unwilling));
     return Refuse{refusals.front().code, std::move(unwilling)};
 }
 

@@ -9,6 +9,7 @@ import config
 import harness
 from harness import read_registers, write_register
 from shared_bus import SharedBus
+from test_history import Alertmanager
 from test_points import until
 
 STATIONS = ("{id: 1, name: press, points: [{name: level, at: '400005', every: 200ms, writable: true}]}, "
@@ -25,18 +26,18 @@ class Box(harness.Program):
 
 class Standby(unittest.TestCase):
     @contextlib.contextmanager
-    def boxes(self, peer=False):
-        """Bus, box of rank 0, box of rank 1."""
+    def boxes(self, peer=False, stations=STATIONS, more="", timeout="100ms"):
+        """Bus, box of rank 0, box of rank 1. `peer`: rank 1 asks rank 0."""
         with contextlib.ExitStack() as stack:
             folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory()))
             bus = stack.enter_context(SharedBus([folder / "a", folder / "b"], {1, 2}))
             boxes = []
             for rank, device in enumerate(("a", "b")):
                 line = config.line(device=folder / device, baud=115200, retries=0,
-                                   timing="{response_timeout: 100ms}", stations=STATIONS)
+                                   timing=f"{{response_timeout: {timeout}}}", stations=stations)
                 other = f", peer: 'http://127.0.0.1:{boxes[0].http_port()}'" if peer and boxes else ""
                 file = folder / f"{device}.yaml"
-                file.write_text(config.gateway(line, http=config.ADMIN) + f"standby: {{rank: {rank}{other}}}\n")
+                file.write_text(config.gateway(line, http=config.ADMIN) + f"standby: {{rank: {rank}{other}}}\n{more}")
                 boxes.append(stack.enter_context(Box("run", "-c", str(file))))
                 boxes[-1].http_port()
             until(lambda: self.role(boxes[0]) == "active")
@@ -104,9 +105,59 @@ class Standby(unittest.TestCase):
                 until(lambda: self.role(other) == "active")
                 active.process.send_signal(signal.SIGCONT)
                 until(lambda: self.role(active) == "standby")
-                with other.client() as client:
-                    until(lambda: client.ask(1, read_registers(4)) == bytes([3, 2, 0, 4]))
+                until(lambda: self.level(other) == (4, "good"))
                 active, other = other, active
+
+    def stays(self, bus, second, seconds=4):
+        """The first box sends on and on, and the second one listens."""
+        since = bus.frames(0)[-1].at
+        until(lambda: bus.frames(0)[-1].at > since + seconds)
+        self.assertEqual((self.role(second), bus.frames(1)), ("standby", []))
+
+    def test_a_gateway_that_polls_nothing_is_not_silent_either(self):
+        with self.boxes(stations="{id: 1, name: press}, {id: 2, name: oven}") as (bus, _, second):
+            self.stays(bus, second)
+
+    def test_rules_of_access_are_for_clients(self):
+        rules = "access: {default: deny, rules: [{name: scada, allow: [read], from: [10.0.0.1/32]}]}\n"
+        with self.boxes(more=rules, stations="{id: 1, name: press}, {id: 2, name: oven}") as (bus, _, second):
+            self.stays(bus, second)
+
+    def test_a_master_that_waits_for_a_panel_is_not_gone(self):
+        with self.boxes(timeout="3s") as (bus, first, second), first.client() as client:
+            until(lambda: self.level(first) == (4, "good"))
+            bus.panels.remove(2)
+            sent = client.send(2, read_registers(1))
+            self.assertEqual(client.receive()[0], sent)
+            self.assertEqual((self.role(second), bus.frames(1)), ("standby", []))
+
+    def test_the_panel_that_lives_is_found(self):
+        many = ", ".join(f"{{id: {i}}}" for i in range(1, 9))
+        with self.boxes(stations=many + ", {id: 9, name: press}, {id: 10, name: oven}") as (bus, first, second):
+            bus.panels.clear()
+            bus.panels.add(9)
+            with first.client() as client:
+                until(lambda: client.ask(9, read_registers(4))[0] == 3)
+                until(lambda: second.get("/api/v1/stations/press")[1]["state"] == "heard")
+            silent = bus.frames(0)[-1].at
+            first.process.kill()
+            first.process.wait()
+            until(lambda: self.role(second) == "active")
+            self.assertEqual(bus.frames(1)[0].bytes[0], 9)
+            self.assertEqual([one for one in bus.frames(1, silent) if one.bytes[0] not in (9,)][:1], [])
+
+    def test_the_webhook_is_of_the_active_box(self):
+        with Alertmanager([]) as hook:
+            more = (f"alarm_webhook: {{url: {hook.url}, every: 1s}}\n"
+                    "alarms: [{name: low, point: press/level, below: 5}]\n")
+            with self.boxes(more=more) as (_, first, second):
+                self.assertEqual(hook.alerts.get(timeout=harness.PATIENCE)["labels"]["alertname"], "low")
+                first.process.kill()
+                first.process.wait()
+                until(lambda: self.role(second) == "active")
+                while not hook.alerts.empty():
+                    hook.alerts.get()
+                self.assertEqual(hook.alerts.get(timeout=harness.PATIENCE)["labels"]["alertname"], "low")
 
     def test_after_a_cut_the_box_of_rank_one_leaves(self):
         with self.boxes() as (bus, first, second):

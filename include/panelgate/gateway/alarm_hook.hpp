@@ -19,8 +19,8 @@ class AlarmHook {
     AlarmHook(const AlarmHook&) = delete;
     AlarmHook& operator=(const AlarmHook&) = delete;
 
-    /// Another webhook begins anew: what is active is told by the next change.
-    void apply(const std::optional<alarms::WebhookSettings>& settings);
+    /// True if another webhook begins: it has to be told what is active.
+    bool apply(const std::optional<alarms::WebhookSettings>& settings);
     void on_change(const alarms::Change& change);
     void stop();
 

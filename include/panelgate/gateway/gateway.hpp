@@ -92,6 +92,8 @@ class Gateway {
     Lines lines_of(const config::Config& config);
     void serve(std::shared_ptr<const config::Config> config);
     RunningLine* find_running(const std::string& line);
+    /// Another webhook is told what is active.
+    void apply_alarms();
     void tell_role(const std::string& line, const standby::Seat& seat);
     void apply_lines(const config::Config& config, const Lines& lines);
     void rest_wires(const config::Config& config, const Lines& lines);

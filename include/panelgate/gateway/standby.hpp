@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/config/config.hpp"
@@ -56,16 +57,19 @@ class Standby {
   private:
     struct Place {
         standby::Seat seat;
-        config::Line line;           ///< as configured, without its points
-        std::uint64_t received = 0;  ///< bytes at the last look
-        TimePoint opens_by{};        ///< until then a line that is not up may be opening
+        config::Line line;                        ///< as configured, without its points
+        std::optional<std::uint64_t> received{};  ///< bytes at the last look; empty: none yet
+        TimePoint opens_by{};  ///< until then a line that is not up may be opening
         std::unique_ptr<bus::Bus> probe{};
-        bool asked = false;  ///< the probe's read is on its way
-        std::size_t next_station = 0;
+        bool asked = false;                   ///< the probe's read is on its way
+        std::size_t probed = 0;               ///< index of the station that the probe asks
+        std::size_t tried = 0;                ///< probes without an answer, one after another
+        TimePoint answered{};                 ///< the last look at which a panel was online
         EchoState echo = EchoState::unknown;  ///< of the driven line at the last look
     };
 
     void look();
+    void look_at_locks();
     void look_for_device(const std::string& name, Place& place);
     void listen_to(const std::string& name, Place& place);
     void look_for_echo(const std::string& name, Place& place);
@@ -74,6 +78,8 @@ class Standby {
     void ask_panel(const std::string& name, Place& place);
     void end_probe(const std::string& name, Place& place, bool answered);
     void keep_alive(const std::string& name, Place& place);
+    void look_for_answers(const std::string& name, Place& place);
+    std::size_t station_to_probe(const std::string& name, const Place& place) const;
     void change(const std::string& name, Place& place);
     void ask_peer();
     void take_peer(const std::string& text);
@@ -84,7 +90,9 @@ class Standby {
     std::unique_ptr<rt::Alarm> alarm_;
     std::optional<standby::Settings> settings_;
     std::map<std::string, Place> places_;  ///< by line
-    std::string peer_role_;                ///< as the peer says, or why nothing is known
+    /// Lines over TCP, which a device server locks: whether this box has the connection, since when.
+    std::map<std::string, std::pair<bool, TimePoint>> locks_;
+    std::string peer_role_;                ///< as the peer says; "": it says nothing
     TimePoint next_question_{};
     bool asking_ = false;
     std::unique_ptr<rt::Worker> worker_;

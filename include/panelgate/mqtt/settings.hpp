@@ -36,6 +36,7 @@ struct Settings {
     std::string password;             ///< read from its file at load
     bool write = false;               ///< clients that may publish at the broker may write points
     bool home_assistant = false;      ///< `json` only: Home Assistant finds stations and points
+    bool shared = false;              ///< another gateway publishes these topics at other times
     int qos = 1;                      ///< `json` only: 0 or 1; Sparkplug defines its own
     Duration keep_alive = 60s;        ///< whole seconds
     bool tls = false;

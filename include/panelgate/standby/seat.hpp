@@ -42,12 +42,17 @@ class Seat {
     static constexpr Duration kPatienceOfRank = 500ms;
     /// A box that has not run for so long was stopped: another box may be the master by now.
     static constexpr Duration kStopped = 1s;
-    static constexpr Duration kProbe = 1s;  ///< longest wait for the panel's answer
-    static constexpr Duration kRetry = 1s;  ///< first pause behind a probe without an answer
-    static constexpr Duration kLongestRetry = 1min;
+    static constexpr Duration kProbe = 1s;     ///< longest wait for the panel's answer
+    static constexpr Duration kRetry = 500ms;  ///< first pause behind a probe without an answer
+    static constexpr Duration kLongestRetry = 10s;
+    static constexpr Duration kLeaves = 5s;  ///< pause of a box that has left the line to the other
     static constexpr Duration kPeerCounts = 3s;  ///< what the peer said counts for so long
 
     explicit Seat(unsigned rank) : rank_(rank) {}
+
+    /// Sets the longest time that a master is silent on this line, such as while it waits for a
+    /// panel: silence has to be longer before it counts. Never less than kSilence.
+    void set_quiet(Duration quiet) { quiet_ = std::max(quiet, kSilence); }
 
     Role role() const { return role_; }
     TimePoint since() const { return since_; }
@@ -71,7 +76,10 @@ class Seat {
         peer_active_ = active;
         peer_said_ = now;
     }
-    std::optional<Deed> on_probed(TimePoint now, bool answered);
+    /// `all_tried`: no other panel is left to be asked.
+    std::optional<Deed> on_probed(TimePoint now, bool answered, bool all_tried = true);
+    /// No panel answers this master, and the other box is there: it may have the line.
+    std::optional<Deed> on_unanswered(TimePoint now);
     /// Call each 100 ms.
     std::optional<Deed> look(TimePoint now);
 
@@ -81,6 +89,7 @@ class Seat {
     std::optional<Deed> try_to_claim(TimePoint now);
 
     unsigned rank_;
+    Duration quiet_ = kSilence;
     Role role_ = Role::listening;
     std::string_view why_ = "it has just begun";
     TimePoint since_{};

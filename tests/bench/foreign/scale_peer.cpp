@@ -7,7 +7,7 @@
 //   connection; standard
 //                                input has a row HOST PORT LINE FIRST_UNIT UNITS for each
 //                                connection, to 127.0.0.HOST. Prints a row LINE ANSWERS WRONG
-//                                P99_MS for each line.
+//                                LATE_MS for each line.
 #include <sys/epoll.h>
 #include <sys/socket.h>
 #include <unistd.h>

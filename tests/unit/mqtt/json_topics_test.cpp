@@ -154,6 +154,19 @@ TEST_F(MqttJson, WithoutTheSwitchWritesAreIgnored) {
     EXPECT_THAT(publisher.commands("plant/hall/press/level/set", "1", false), IsEmpty());
 }
 
+TEST_F(MqttJson, TheLastWordOfAnotherGatewayIsAnsweredByABirth) {
+    Settings both = settings();
+    both.write = false;
+    both.shared = true;
+    const Publisher publisher(both, small_plant());
+    EXPECT_THAT(publisher.subscriptions(), ElementsAre("plant/hall/status"));
+    const auto said = publisher.commands("plant/hall/status", R"({"state":"offline"})", false);
+    ASSERT_EQ(said.size(), 1U);
+    EXPECT_TRUE(std::holds_alternative<Rebirth>(said.front()));
+    EXPECT_THAT(publisher.commands("plant/hall/status", R"({"state":"online"})", false), IsEmpty());
+    EXPECT_THAT(publisher.commands("plant/hall/press/level/set", "1", false), IsEmpty());
+}
+
 TEST_F(MqttJson, ResultsSayWhichWriteTheyAreOf) {
     connect();
     publisher_.answer({publisher_.topic_of(2), "7", R"({"ok":true})"}, false);

@@ -84,6 +84,37 @@ TEST_F(SeatTest, WithoutAnAnswerItStaysBackAndTriesLessOften) {
     EXPECT_FALSE(seat.is_deaf());
 }
 
+TEST_F(SeatTest, PanelsThatWereNotAskedYetAreAskedSoon) {
+    Seat seat(1);
+    seat.on_line(now, true);
+    ASSERT_EQ(wait(seat, 3s), Deed::probe);
+    for (int i = 0; i < 6; ++i) {
+        EXPECT_EQ(seat.on_probed(now, false, false), Deed::listen);
+        const TimePoint begin = now;
+        ASSERT_EQ(wait(seat, 3s), Deed::probe);
+        EXPECT_LE(now - begin, Seat::kRetry + kLook);
+    }
+}
+
+TEST_F(SeatTest, SilenceCountsWhenItIsLongerThanAMasterMayBeSilent) {
+    Seat seat(1);
+    seat.set_quiet(5s);
+    seat.on_line(now, true);
+    EXPECT_EQ(wait(seat, 5900ms), std::nullopt);
+    EXPECT_EQ(wait(seat, 1s), Deed::probe);
+    EXPECT_EQ(wait(seat, 5s), std::nullopt) << "a panel may think so long";
+    EXPECT_EQ(wait(seat, 2s), Deed::listen);
+}
+
+TEST_F(SeatTest, AMasterThatNobodyAnswersLeavesAndStaysBackForAWhile) {
+    Seat seat(0);
+    EXPECT_EQ(seat.on_unanswered(now), std::nullopt);
+    become_master(seat);
+    EXPECT_EQ(seat.on_unanswered(now), Deed::listen);
+    EXPECT_EQ(wait(seat, Seat::kLeaves - kLook), std::nullopt);
+    EXPECT_EQ(wait(seat, 1s), Deed::probe);
+}
+
 TEST_F(SeatTest, AnActiveMasterIsNeverSilentForLong) {
     Seat seat(0);
     become_master(seat);
