@@ -1,11 +1,14 @@
 // What bench/ethernet.py has on either side of the gateway.
-//   ethernet_peer device N DELAY_US   N servers of Modbus/TCP; prints their ports; a register of a
-//   unit holds
-//                                     (unit + address) and each reply comes DELAY_US behind its
-//                                     request
-//   ethernet_peer load PORT UNIT CONNECTIONS SECONDS   reads of 10 registers without pause, one at
-//   a time in each
-//                                     connection; prints answers a second, and how many were wrong
+//
+//   ethernet_peer device N DELAY_US
+//
+// N servers of Modbus/TCP; prints their ports. A register of a unit holds unit + address, and each
+// reply comes DELAY_US behind its request.
+//
+//   ethernet_peer load PORT UNIT CONNECTIONS SECONDS
+//
+// Reads of 10 registers without pause, one at a time in each connection; prints answers a second,
+// and how many were wrong.
 #include <sys/epoll.h>
 #include <sys/socket.h>
 #include <unistd.h>

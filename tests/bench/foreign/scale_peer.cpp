@@ -1,13 +1,15 @@
 // What bench/scale.py has on either side of the gateway.
-//   scale_peer bus N BAUD        N ports of device servers, each a line of RTU at this rate; prints
-//   the ports. A
-//                                register of a station holds station * 1000 + address; a reply
-//                                begins 5 ms behind its request.
-//   scale_peer load SECONDS      reads of 10 registers without pause, one at a time in each
-//   connection; standard
-//                                input has a row HOST PORT LINE FIRST_UNIT UNITS for each
-//                                connection, to 127.0.0.HOST. Prints a row LINE ANSWERS WRONG
-//                                LATE_MS for each line.
+//
+//   scale_peer bus N BAUD
+//
+// N ports of device servers, each with a line of RTU at this rate; prints the ports. A register of
+// a station holds station * 1000 + address. A reply begins 5 ms behind its request.
+//
+//   scale_peer load SECONDS
+//
+// Reads of 10 registers without pause, one at a time in each connection. Standard input has a row
+// HOST PORT LINE FIRST_UNIT UNITS for each connection, to 127.0.0.HOST. Prints a row LINE ANSWERS
+// WRONG LATE_MS for each line: 99 % of its answers come within LATE_MS.
 #include <sys/epoll.h>
 #include <sys/socket.h>
 #include <unistd.h>
