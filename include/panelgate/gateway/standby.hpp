@@ -90,9 +90,10 @@ class Standby {
     std::unique_ptr<rt::Alarm> alarm_;
     std::optional<standby::Settings> settings_;
     std::map<std::string, Place> places_;  ///< by line
-    /// Lines over TCP, which a device server locks: whether this box has the connection, since when.
+    /// Lines over TCP, which a device server locks: whether this box has the connection, since
+    /// when.
     std::map<std::string, std::pair<bool, TimePoint>> locks_;
-    std::string peer_role_;                ///< as the peer says; "": it says nothing
+    std::string peer_role_;  ///< as the peer says; "": it says nothing
     TimePoint next_question_{};
     bool asking_ = false;
     std::unique_ptr<rt::Worker> worker_;

@@ -17,8 +17,8 @@ namespace {
 using images::Place;
 
 constexpr std::string_view kMapColumns[] = {"table",   "address", "count", "quality_at",
-                                         "station", "point",   "type",  "word_order",
-                                         "scale",   "offset",  "unit",  "writable"};
+                                            "station", "point",   "type",  "word_order",
+                                            "scale",   "offset",  "unit",  "writable"};
 
 json::object describe(const ImageEntry& image) {
     const images::Settings& settings = *image.settings;
