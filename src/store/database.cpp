@@ -110,6 +110,7 @@ void Database::open() {
     check.reset();
     run("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;"
         "PRAGMA journal_size_limit = 4194304");
+    run("PRAGMA cache_size = -" + std::to_string(settings_.cache / 1024));  // negative: in KiB
     run("PRAGMA max_page_count = " +
         std::to_string(static_cast<std::int64_t>(settings_.size) / page_size()));
     prepare_tables();
