@@ -81,8 +81,9 @@ class Stream {
     /// Idempotent. Pending operations fail.
     void close();
 
+    enum class Way : std::uint8_t { read, write };  ///< of a transfer
+
   private:
-    enum class Way : std::uint8_t { read, write };
     template <Way kWay, class Buffers>
     struct Transfer;
 
