@@ -309,7 +309,7 @@ void Standby::end_probe(const std::string& name, Place& place, bool answered) {
         if (found == places_.end() || !found->second.probe) return;
         Place& one = found->second;
         one.tried = answered ? 0 : one.tried + 1;
-        const bool all_tried = one.tried >= one.line.stations.size();
+        const bool all_tried = one.tried % one.line.stations.size() == 0;
         carry_out(name, one, one.seat.on_probed(clock_.now(), answered, all_tried));
     });
 }

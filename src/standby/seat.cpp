@@ -51,7 +51,7 @@ std::optional<Deed> Seat::on_probed(TimePoint now, bool answered, bool all_tried
         return Deed::drive;
     }
     deaf_ = true;
-    next_claim_ = now + retry_;
+    next_claim_ = now + (all_tried ? retry_ : kRetry);
     if (all_tried) retry_ = std::min(2 * retry_, kLongestRetry);
     const TimePoint heard = heard_;
     const auto deed = listen(now, "the line is silent, and no panel answers");

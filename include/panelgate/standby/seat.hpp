@@ -43,8 +43,8 @@ class Seat {
     /// A box that has not run for so long was stopped: another box may be the master by now.
     static constexpr Duration kStopped = 1s;
     static constexpr Duration kProbe = 1s;     ///< longest wait for the panel's answer
-    static constexpr Duration kRetry = 500ms;  ///< first pause behind a probe without an answer
-    static constexpr Duration kLongestRetry = 10s;
+    static constexpr Duration kRetry = 500ms;  ///< pause behind a probe without an answer
+    static constexpr Duration kLongestRetry = 10s;  ///< … when all panels have been asked
     static constexpr Duration kLeaves = 5s;  ///< pause of a box that has left the line to the other
     static constexpr Duration kPeerCounts = 3s;  ///< what the peer said counts for so long
 
@@ -76,7 +76,7 @@ class Seat {
         peer_active_ = active;
         peer_said_ = now;
     }
-    /// `all_tried`: no other panel is left to be asked.
+    /// `all_tried`: each panel has been asked once more, so that the pause may grow.
     std::optional<Deed> on_probed(TimePoint now, bool answered, bool all_tried = true);
     /// No panel answers this master, and the other box is there: it may have the line.
     std::optional<Deed> on_unanswered(TimePoint now);

@@ -84,15 +84,19 @@ TEST_F(SeatTest, WithoutAnAnswerItStaysBackAndTriesLessOften) {
     EXPECT_FALSE(seat.is_deaf());
 }
 
-TEST_F(SeatTest, PanelsThatWereNotAskedYetAreAskedSoon) {
+TEST_F(SeatTest, PanelsThatWereNotAskedYetAreAskedSoonInEachRound) {
     Seat seat(1);
     seat.on_line(now, true);
     ASSERT_EQ(wait(seat, 3s), Deed::probe);
-    for (int i = 0; i < 6; ++i) {
-        EXPECT_EQ(seat.on_probed(now, false, false), Deed::listen);
-        const TimePoint begin = now;
-        ASSERT_EQ(wait(seat, 3s), Deed::probe);
-        EXPECT_LE(now - begin, Seat::kRetry + kLook);
+    for (int round = 0; round < 4; ++round) {
+        for (int i = 0; i < 6; ++i) {
+            EXPECT_EQ(seat.on_probed(now, false, false), Deed::listen);
+            const TimePoint begin = now;
+            ASSERT_EQ(wait(seat, 3s), Deed::probe);
+            EXPECT_LE(now - begin, Seat::kRetry + kLook);
+        }
+        EXPECT_EQ(seat.on_probed(now, false, true), Deed::listen);
+        ASSERT_EQ(wait(seat, 1min), Deed::probe);
     }
 }
 
