@@ -60,20 +60,10 @@ bool is_error(Outcome outcome) {
     return outcome != Outcome::ok && outcome != Outcome::cached && outcome != Outcome::shared;
 }
 
-void put(SlotRing& ring, TimePoint at, const std::optional<double>& value) {
-    if (value) ring.put(at, *value);
-}
-
 }  // namespace
 
 LineHistory::LineHistory(Duration width)
-    : width_(width),
-      load_(width, slots_of(kSpan, width)),
-      requests_(load_),
-      errors_(load_),
-      latency_(load_),
-      wire_(load_),
-      queue_(load_) {}
+    : width_(width), rings_(width, slots_of(kSpan, width), kColumns) {}
 
 RequestCounts& RequestCounts::operator+=(const RequestCounts& more) {
     requests += more.requests;
@@ -130,25 +120,25 @@ void LineHistory::record(TimePoint now, const LineReport& report) {
     const std::optional<TimePoint> before = std::exchange(at_, now);
     if (!before || now <= *before) return;
     const double share = to_seconds(busy) / to_seconds(now - *before);
-    if (report.up) load_.put(*before, std::clamp(share * 100, 0.0, 100.0));
-    requests_.put(*before, static_cast<double>(counts.requests));
-    errors_.put(*before, static_cast<double>(counts.errors));
-    put(latency_, *before, mean(counts.latency, counts.answers));
-    put(wire_, *before, mean(counts.wire, counts.transactions));
-    queue_.put(*before, static_cast<double>(report.queue_depth));
+    if (report.up) put(kLoad, *before, std::clamp(share * 100, 0.0, 100.0));
+    put(kRequests, *before, static_cast<double>(counts.requests));
+    put(kErrors, *before, static_cast<double>(counts.errors));
+    put(kLatency, *before, mean(counts.latency, counts.answers));
+    put(kWire, *before, mean(counts.wire, counts.transactions));
+    put(kQueue, *before, static_cast<double>(report.queue_depth));
 }
 
 std::vector<LineSample> LineHistory::samples(TimePoint now) const {
     std::vector<LineSample> samples;
-    requests_.each(now, [&](TimePoint at, double requests) {
+    rings_.each(kRequests, now, [&](TimePoint at, double requests) {
         LineSample sample;
         sample.at = at;
-        sample.load_percent = load_.at(at);
+        sample.load_percent = rings_.at(kLoad, at);
         sample.requests = static_cast<std::uint64_t>(requests);
-        sample.errors = static_cast<std::uint64_t>(errors_.at(at).value_or(0));
-        sample.latency_ms = latency_.at(at);
-        sample.wire_ms = wire_.at(at);
-        sample.queue_depth = static_cast<std::size_t>(queue_.at(at).value_or(0));
+        sample.errors = static_cast<std::uint64_t>(rings_.at(kErrors, at).value_or(0));
+        sample.latency_ms = rings_.at(kLatency, at);
+        sample.wire_ms = rings_.at(kWire, at);
+        sample.queue_depth = static_cast<std::size_t>(rings_.at(kQueue, at).value_or(0));
         samples.push_back(sample);
     });
     return samples;

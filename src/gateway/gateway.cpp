@@ -244,15 +244,13 @@ void Gateway::show(const std::shared_ptr<Snapshot>& snapshot) {
     northbound_.show(snapshot_);
 }
 
-void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedText shown) {
+void Gateway::apply(std::shared_ptr<const config::Config> config) {
     const auto before = std::exchange(configured_, config);
-    const auto shown_before = std::exchange(shown_, std::move(shown));
     standby_.apply(*config);
     try {
         serve(standby_.arrange(config));
     } catch (...) {
         configured_ = before;
-        shown_ = shown_before;
         standby_.apply(*before);
         throw;
     }
@@ -274,6 +272,11 @@ void Gateway::tell_role(const std::string& line, const standby::Seat& seat) {
     entry.line = line;
     entry.text = role + ": " + why;
     journal_.add(std::move(entry));
+}
+
+/// Renders the configuration for REST.
+std::function<std::string()> Gateway::shown() const {
+    return [config = configured_] { return shown_text(*config); };
 }
 
 /// Serves this arrangement of the configuration.
@@ -298,7 +301,7 @@ void Gateway::serve(std::shared_ptr<const config::Config> config) {
     });
     if (kept_nothing && line_histories_) line_histories_->start();
     relays_->apply(routes_of(*snapshot_));
-    servers_.apply(*snapshot_->config, snapshot_->plant, directory_in(snapshot_), shown_,
+    servers_.apply(*snapshot_->config, snapshot_->plant, directory_in(snapshot_), shown(),
                    longest_answer());
     judge_waiting();
     doors_.settle();
@@ -440,8 +443,7 @@ void Gateway::start() {
     }
     relays_->start();
     if (line_histories_) line_histories_->start();
-    servers_.apply(*snapshot_->config, snapshot_->plant, directory(),
-                   shown_text(*snapshot_->config), longest_answer());
+    servers_.apply(*snapshot_->config, snapshot_->plant, directory(), shown(), longest_answer());
     northbound_.start([this] { alarms_.announce_all(); });
     watch_certificates();
     expired_until_ = rt::wall_now();

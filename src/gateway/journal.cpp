@@ -23,6 +23,7 @@ namespace {
 constexpr Duration kJournalLook = 1s;
 constexpr std::size_t kBlocks = 100;  // that are handed over at a look, so that a look is short
 constexpr std::uint64_t kInMemory = 8 * 1024 * 1024;  // bytes of a store without a file
+constexpr std::size_t kPointsInMemory = 2000;         // whose last hour has room in these bytes
 constexpr std::string_view kFinding = "finding: ";
 constexpr std::string_view kFindingGone = "finding gone: ";
 
@@ -120,7 +121,10 @@ Journal::~Journal() { close(); }
 void Journal::apply(const store::Settings& settings) {
     store::Settings now = settings;
     now.file = store_file(settings);
-    if (now.file.empty()) now.size = std::min(now.size, kInMemory);
+    if (now.file.empty()) {
+        now.size = std::min(now.size, kInMemory);
+        now.points = std::min(now.points, kPointsInMemory);
+    }
     if (store_ && now == settings_) return;
     if (store_) {
         if (!closing_) closing_.emplace(executor_);

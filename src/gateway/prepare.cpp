@@ -127,10 +127,8 @@ std::vector<StartMessage> prepare(config::Config& config) {
     return messages;
 }
 
-web::SharedText shown_text(const config::Config& config) {
-    std::string text = web::json_text(explain::inventory_json(config));
-    text.shrink_to_fit();  // kept as long as the configuration
-    return std::make_shared<const std::string>(std::move(text));
+std::string shown_text(const config::Config& config) {
+    return web::json_text(explain::inventory_json(config));
 }
 
 }  // namespace panelgate::gateway

@@ -138,9 +138,8 @@ struct Reloader::Job {
     bool may_be_weaker = false;                      ///< for a rollback
     std::vector<ServedCertificate> certificates;     ///< in use
     std::shared_ptr<const config::Config> next;      ///< null: there is none
-    web::SharedText shown;
-    std::string text;       ///< of the file
-    std::string read_only;  ///< why the file cannot be written
+    std::string text;                                ///< of the file
+    std::string read_only;                           ///< why the file cannot be written
     web::ReloadVerdict verdict;
     std::atomic<bool> is_late = false;  ///< nobody waits for it any more
 
@@ -232,7 +231,6 @@ void Reloader::Job::compare() {
     for (std::string& moved : explain::moved_units(*running, *next))
         verdict.warnings.push_back(std::move(moved));
     verdict.outcome = verdict.changes.empty() ? ReloadOutcome::unchanged : ReloadOutcome::applied;
-    shown = shown_text(*next);
 }
 
 Reloader::Reloader(boost::asio::any_io_executor executor, rt::Clock& clock, std::string file)
@@ -316,7 +314,7 @@ void Reloader::apply(const std::shared_ptr<Job>& job) {
         job->verdict.why = kStopping;
     } else if (job->next && job->verdict.outcome == ReloadOutcome::applied) {
         try {
-            gateway_->apply(job->next, job->shown);
+            gateway_->apply(job->next);
             before_ = job->running;
             if (job->next->log != job->running->log) rt::set_up_log(job->next->log);
         } catch (const std::runtime_error& error) {  // a listener, a pty

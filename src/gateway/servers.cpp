@@ -235,7 +235,7 @@ void Servers::open_new(const config::Config& config, const Plant& plant, const W
 
 void Servers::apply(const config::Config& config, const Plant& plant,
                     const std::shared_ptr<const web::Directory>& directory,
-                    const web::SharedText& shown, Duration longest) {
+                    std::function<std::string()> shown, Duration longest) {
     Fresh fresh = std::exchange(fresh_, {});
     for (Modbus& one : fresh.listeners) {
         if (one.listener) continue;
@@ -250,7 +250,7 @@ void Servers::apply(const config::Config& config, const Plant& plant,
     if (fresh.http) http_ = std::move(fresh.http);
     if (http_) {
         http_->settings = *config.http;
-        http_->server->apply(*config.http, directory, shown);
+        http_->server->apply(*config.http, directory, std::move(shown));
     }
     apply_masters(config, plant);
     openings_.take_over(fresh.late);

@@ -178,12 +178,7 @@ constexpr double kBad = std::numeric_limits<double>::infinity();
 }  // namespace
 
 StationHistory::StationHistory(const std::vector<Point>& points, Duration width)
-    : points_(&points), width_(width) {
-    rings_.reserve(points.size());
-    for (const Point& point : points)
-        rings_.push_back(
-            std::make_shared<SlotRing>(width, keeps(point) ? slots_of(kSpan, width) : 1));
-}
+    : points_(&points), width_(width), rings_(width, slots_of(kSpan, width), points.size()) {}
 
 void StationHistory::adopt(const StationHistory& before) {
     if (before.width_ != width_) return;
@@ -193,16 +188,17 @@ void StationHistory::adopt(const StationHistory& before) {
     for (std::size_t i = 0; i < points_->size(); ++i) {
         const auto found = places.find((*points_)[i].name);
         if (found != places.end() && (*before.points_)[found->second] == (*points_)[i])
-            rings_[i] = before.rings_[found->second];
+            rings_.copy(i, before.rings_, found->second);
     }
 }
 
 void StationHistory::record(TimePoint now, const Point& point, const PointReading& reading) {
     if (!keeps(point) || reading.quality == Quality::stale) return;
-    SlotRing& ring = *rings_[static_cast<std::size_t>(&point - points_->data())];
-    if (reading.quality == Quality::bad) return ring.put(now, kBad);
+    const std::size_t ring = ring_of(point);
+    if (reading.quality == Quality::bad) return rings_.put(ring, now, kBad);
     const auto value = reading.value ? number_of(*reading.value) : std::nullopt;
-    if (value && std::isfinite(*value)) ring.put(now - reading.age.value_or(Duration{}), *value);
+    if (value && std::isfinite(*value))
+        rings_.put(ring, now - reading.age.value_or(Duration{}), *value);
 }
 
 std::vector<HistorySample> StationHistory::samples(const Point& point, TimePoint now) const {
@@ -213,7 +209,7 @@ std::vector<HistorySample> StationHistory::samples(const Point& point, TimePoint
             return;
         samples.push_back({samples.back().at + width_, std::nullopt});
     };
-    ring_of(point).each(now, [&](TimePoint at, double value) {
+    rings_.each(ring_of(point), now, [&](TimePoint at, double value) {
         end_before(at);
         if (std::isfinite(value)) {
             samples.push_back({at, value});

@@ -4,6 +4,7 @@ import collections
 import contextlib
 import http.client
 import json
+import os
 import pathlib
 import socket
 import struct
@@ -31,15 +32,61 @@ def reads_of(station, frame):
     return struct.pack(f">BB{count}H", frame[1], 2 * count, *(value_of(station, address + i) for i in range(count)))
 
 
-class Panels(RtuBus):
-    """Stations 1, 2 and 3 of a line, with the faults of T1 to T14 by chance. `written`: values, as often as they came."""
+class OtherBox(RtuBus):
+    """Where the second box is at the line of some Panels."""
 
-    def __init__(self, link, chance, share=0.03):
+    def __init__(self, link, panels):
+        self._line = panels
+        super().__init__(link, {})
+        os.set_blocking(self._master, False)
+
+    def say(self, data):
+        with contextlib.suppress(BlockingIOError):  # a box that is stopped does not read
+            super().say(data)
+
+    def _heard(self, frame):
+        self._line.asked(frame, self._line.say_to_first)
+
+
+class Panels(RtuBus):
+    """Stations 1, 2 and 3 of a line, with the faults of T1 to T14 by chance. With `other_link` there are two boxes: each
+    hears what the other one sends, and all replies. `written`: values, as often as they came."""
+
+    def __init__(self, link, other_link, chance, share=0.03):
         self.written = collections.Counter()
         self.chance = chance
         self.share = share
+        self._wire = threading.Lock()
+        self._other = OtherBox(other_link, self) if other_link else None
         super().__init__(link, {station: self._answer for station in (1, 2, 3)})
         self._frames = collections.deque(maxlen=64)
+        os.set_blocking(self._master, False)
+
+    def __exit__(self, *failure):
+        if self._other:
+            self._other.__exit__(*failure)
+        super().__exit__(*failure)
+
+    def say_to_first(self, data):
+        with contextlib.suppress(BlockingIOError):
+            super().say(data)
+
+    def say(self, data):
+        self.say_to_first(data)
+        self.say_to_second(data)
+
+    def say_to_second(self, data):
+        if self._other:
+            self._other.say(data)
+
+    def asked(self, frame, tell):
+        """`tell`: to the box that has not asked."""
+        tell(frame)
+        with self._wire:
+            super()._heard(frame)
+
+    def _heard(self, frame):
+        self.asked(frame, self.say_to_second)
 
     def _answer(self, frame):
         if frame[1] == 6:
@@ -137,17 +184,19 @@ class Reader(Client):
 
 
 class Writer(Client):
-    """Writes 1, 2, 3 ...; `confirmed`: values that the gateway says are written."""
+    """Writes `first`, and each second value from there on; `confirmed`: values that the gateway says are written."""
+    VALUES = 0x8000
 
-    def __init__(self, plant, seed):
+    def __init__(self, plant, first, seed):
         super().__init__(plant, "writer", seed)
-        self.value = 0
+        self.unit = None  # any station of the serial line
+        self.value = first
         self.confirmed = set()
 
     def work(self):
         with self.plant.client() as client:
             for _ in range(100):
-                self.value = self.value % 0xFFFF + 1
+                self.value = (self.value + 2) % (2 * self.VALUES)
                 self.tally["asked"] += 1
                 reply = client.ask(self.chance.randrange(1, 4), write_register(500, self.value))
                 self.tally["answered"] += 1

@@ -90,7 +90,7 @@ class RtuBus:
 
     def inject(self, data):
         """Bytes on the wire that nobody asked for."""
-        os.write(self._master, data)
+        self.say(data)
 
     def frames(self, station=None):
         with self._changed:
@@ -133,14 +133,18 @@ class RtuBus:
         panel = self._panels.get(frame[0])
         reply = panel(frame) if panel else None
         if isinstance(reply, Pieces):
-            reply.send(self._master)
+            reply.send(self.say)
             return
         if reply is not None and not isinstance(reply, Raw):
             reply = harness.rtu(frame[0], reply)
         pieces = [self._echo(frame), reply or b""]
         for piece in [b"".join(pieces)] if self._glued else pieces:
             if piece:
-                os.write(self._master, piece)
+                self.say(piece)
+
+    def say(self, data):
+        """What the box hears."""
+        os.write(self._master, data)
 
 
 class Raw(bytes):
@@ -154,11 +158,11 @@ class Pieces:
         self._pieces = pieces
         self.longest = 0.0  # seconds, of the holes as they came out
 
-    def send(self, descriptor):
+    def send(self, say):
         before = None
         for pause, data in self._pieces:
             time.sleep(pause)
-            os.write(descriptor, data)
+            say(data)
             now = time.monotonic()
             self.longest = max(self.longest, now - (before or now))
             before = now

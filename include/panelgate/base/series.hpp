@@ -30,44 +30,52 @@ struct Histogram {
     double sum = 0;
 };
 
-/// Ring of one number per time slot, fixed in memory. Slots never set or too old are absent. Pure.
-class SlotRing {
+/// Rings of one number per time slot, fixed in memory. Slots never set or too old are absent. Pure.
+/// `ring`: below the number of rings.
+class SlotRings {
   public:
     static constexpr std::size_t kBytes = sizeof(double);  ///< per slot
 
-    /// `width` of a slot and `slots` must be above 0.
-    SlotRing(Duration width, std::size_t slots)
-        : width_(width), values_(slots, std::numeric_limits<double>::quiet_NaN()) {}
+    /// `width` of a slot and `slots` of a ring must be above 0.
+    SlotRings(Duration width, std::size_t slots, std::size_t rings)
+        : width_(width),
+          size_(static_cast<std::int64_t>(slots)),
+          values_(slots * rings, std::numeric_limits<double>::quiet_NaN()),
+          newest_(rings, kNone) {}
 
     /// Sets the value of the slot that contains `at`; the last call wins. `value` is not NaN.
     /// Ignored if older than the oldest slot.
-    void put(TimePoint at, double value);
+    void put(std::size_t ring, TimePoint at, double value);
     /// Calls `told(start of the slot, value)`, oldest first, for the slots that the ring covers at
     /// `now`.
     template <class Told>
-    void each(TimePoint now, Told told) const {
-        if (!newest_) return;
-        const std::int64_t size = ring_size();
-        for (std::int64_t n = std::max(slot_of(now), *newest_) - size + 1; n <= *newest_; ++n) {
-            const double value = values_[index_of(n)];
-            if (!std::isnan(value) && n > *newest_ - size) told(begin_of(n), value);
+    void each(std::size_t ring, TimePoint now, Told told) const {
+        const std::int64_t newest = newest_[ring];
+        if (newest == kNone) return;
+        for (std::int64_t n = std::max(slot_of(now), newest) - size_ + 1; n <= newest; ++n) {
+            const double value = values_[index_of(ring, n)];
+            if (!std::isnan(value) && n > newest - size_) told(TimePoint(n * width_), value);
         }
     }
     /// Returns the value of the slot that contains `at`.
-    std::optional<double> at(TimePoint at) const;
+    std::optional<double> at(std::size_t ring, TimePoint at) const;
+    /// Takes over a ring of `from`, whose slots are of the same width and number.
+    void copy(std::size_t ring, const SlotRings& from, std::size_t from_ring);
 
   private:
-    std::int64_t ring_size() const { return static_cast<std::int64_t>(values_.size()); }
+    static constexpr std::int64_t kNone = std::numeric_limits<std::int64_t>::min();
+
     std::int64_t slot_of(TimePoint at) const { return at.time_since_epoch() / width_; }
-    TimePoint begin_of(std::int64_t slot) const { return TimePoint(slot * width_); }
-    std::size_t index_of(std::int64_t slot) const {
-        const std::int64_t rest = slot % ring_size();
-        return static_cast<std::size_t>(rest < 0 ? rest + ring_size() : rest);
+    std::size_t index_of(std::size_t ring, std::int64_t slot) const {
+        const std::int64_t rest = slot % size_;
+        return ring * static_cast<std::size_t>(size_) +
+               static_cast<std::size_t>(rest < 0 ? rest + size_ : rest);
     }
 
     Duration width_;
-    std::vector<double> values_;
-    std::optional<std::int64_t> newest_;
+    std::int64_t size_;                 ///< slots of a ring
+    std::vector<double> values_;        ///< ring after ring
+    std::vector<std::int64_t> newest_;  ///< slot of each ring
 };
 
 /// Number of slots of this width in `span`.

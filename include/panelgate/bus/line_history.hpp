@@ -87,6 +87,11 @@ class LineHistory {
     Duration width() const { return width_; }
 
   private:
+    enum Column : std::size_t { kLoad, kRequests, kErrors, kLatency, kWire, kQueue };
+
+    void put(Column column, TimePoint at, const std::optional<double>& value) {
+        if (value) rings_.put(column, at, *value);
+    }
     /// The counts of all stations since the last call.
     RequestCounts take(const LineReport& report);
 
@@ -94,7 +99,7 @@ class LineHistory {
     Duration busy_{};
     std::map<std::string, RequestCounts, std::less<>> stations_;
     Duration width_;
-    SlotRing load_, requests_, errors_, latency_, wire_, queue_;
+    SlotRings rings_;
 };
 
 }  // namespace panelgate::bus

@@ -54,9 +54,9 @@ class Gateway {
     void start();
     /// Serves this configuration from now on; unchanged lines, listeners, clients and points are
     /// not disturbed. Throws CannotListen, or std::system_error without a pty for a simulated line;
-    /// then nothing has changed. `shown`: its text for REST. Unchanged stations share their profile
+    /// then nothing has changed. Unchanged stations share their profile
     /// with the running ones (config::share_profiles()).
-    void apply(std::shared_ptr<const config::Config> config, web::SharedText shown);
+    void apply(std::shared_ptr<const config::Config> config);
     /// Records a reload, whatever became of it, and keeps the audit as it now is configured.
     void record(const web::ReloadVerdict& verdict);
     const std::shared_ptr<const config::Config>& config() const { return configured_; }
@@ -90,6 +90,7 @@ class Gateway {
     void on_alarm(const alarms::Change& change);
     void on_finding(const web::Finding& finding, bool is_new);
     Lines lines_of(const config::Config& config);
+    std::function<std::string()> shown() const;
     void serve(std::shared_ptr<const config::Config> config);
     RunningLine* find_running(const std::string& line);
     /// Another webhook is told what is active.
@@ -130,7 +131,6 @@ class Gateway {
     web::EventOutlet events_;  ///< buses publish by it until they are destroyed
     /// As the file says; the snapshot's is arranged to what this box drives now.
     std::shared_ptr<const config::Config> configured_;
-    web::SharedText shown_;  ///< of it, for REST
     Standby standby_{
         loops_.plant,
         clock_,

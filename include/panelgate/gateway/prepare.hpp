@@ -40,6 +40,6 @@ struct StartMessage {
 /// its warnings, planned overloads and lowered limits.
 std::vector<StartMessage> prepare(config::Config& config);
 /// The configuration as shown by REST.
-web::SharedText shown_text(const config::Config& config);
+std::string shown_text(const config::Config& config);
 
 }  // namespace panelgate::gateway

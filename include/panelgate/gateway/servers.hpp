@@ -97,10 +97,11 @@ class Servers {
     /// `plant`.
     void open(const config::Config& config, const Plant& plant, const Web& web);
     /// Call after open() with the same configuration: all serve it, and what it does not have is
-    /// closed. `longest`: longest time to an outstanding answer.
+    /// closed. `shown`: renders the configuration, in any thread. `longest`: longest time
+    /// to an outstanding answer.
     void apply(const config::Config& config, const Plant& plant,
-               const std::shared_ptr<const web::Directory>& directory, const web::SharedText& shown,
-               Duration longest);
+               const std::shared_ptr<const web::Directory>& directory,
+               std::function<std::string()> shown, Duration longest);
 
     /// The files of the `tls` of a listener ("http 127.0.0.1:8443") have changed.
     void renew(const std::string& listener, const tls::Settings& settings);

@@ -118,7 +118,7 @@ struct HistorySample {
 };
 
 /// One hour of history of a station's points: the last good value per time slot. Memory is fixed:
-/// eight bytes per slot and point except texts, 28.8 kB a point with slots of 1 s. Slots are as
+/// eight bytes per slot and point, 28.8 kB a point with slots of 1 s. Slots are as
 /// narrow as kBytes for all points allows: 1 s up to 582 points, 5 s up to 2912. Integers are exact
 /// up to 2^53. Pure.
 class StationHistory {
@@ -133,7 +133,7 @@ class StationHistory {
     }
     /// `points` outlive it.
     StationHistory(const std::vector<Point>& points, Duration width);
-    /// Shares the history of identical points with `before` from now on.
+    /// Takes over what `before` has of identical points.
     void adopt(const StationHistory& before);
 
     /// Records the current reading of a point. Stale readings are ignored.
@@ -146,13 +146,13 @@ class StationHistory {
     Duration width() const { return width_; }
 
   private:
-    const SlotRing& ring_of(const Point& point) const {
-        return *rings_[static_cast<std::size_t>(&point - points_->data())];
+    std::size_t ring_of(const Point& point) const {
+        return static_cast<std::size_t>(&point - points_->data());
     }
 
     const std::vector<Point>* points_;
     Duration width_;
-    std::vector<std::shared_ptr<SlotRing>> rings_;  ///< one per point
+    SlotRings rings_;  ///< one per point
 };
 
 }  // namespace panelgate::points

@@ -42,8 +42,8 @@ class Seat {
     static constexpr Duration kPatienceOfRank = 500ms;
     /// A box that has not run for so long was stopped: another box may be the master by now.
     static constexpr Duration kStopped = 1s;
-    static constexpr Duration kProbe = 1s;     ///< longest wait for the panel's answer
-    static constexpr Duration kRetry = 500ms;  ///< pause behind a probe without an answer
+    static constexpr Duration kProbe = 1s;          ///< longest wait for the panel's answer
+    static constexpr Duration kRetry = 500ms;       ///< pause behind a probe without an answer
     static constexpr Duration kLongestRetry = 10s;  ///< … when all panels have been asked
     static constexpr Duration kLeaves = 5s;  ///< pause of a box that has left the line to the other
     static constexpr Duration kPeerCounts = 3s;  ///< what the peer said counts for so long

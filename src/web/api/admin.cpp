@@ -192,15 +192,17 @@ Handling get_configuration(HttpRequest request, const Api* api) {
     std::shared_ptr<KeptAnswer>& kept = (*api->configuration)[key];
     if (!kept) {
         const auto make = [head = configuration_head(*api, who), whole = all,
-                           text = api->providers.configuration, directory = api->lent,
+                           render = api->providers.configuration, directory = api->lent,
                            caller = request.caller->who()] {
-            const std::string seen =
-                whole ? *text : seen_configuration(*text, *directory, Sight(*directory, caller));
+            std::string seen = render();
+            if (!whole) seen = seen_configuration(seen, *directory, Sight(*directory, caller));
             return head + seen + ",\"rest\":" + json_text(offered()) + "}\n";
         };
         kept = std::make_shared<KeptAnswer>(make, "application/json");
     }
-    co_return KeptAnswer::give(kept, request);
+    HttpResponse response = KeptAnswer::give(kept, request);
+    response.is_long = true;
+    co_return response;
 }
 
 Handling get_openapi(HttpRequest request, const Api*) {

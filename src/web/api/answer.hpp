@@ -73,7 +73,8 @@ HttpResponse table_answer(const HttpRequest& request, Table table);
 /// reused.
 class KeptAnswer {
   public:
-    /// `make` composes the text in the faces' loop, once. `content_type` must have static lifetime.
+    /// `make` composes the text, once: in the faces' loop, or in its worker if all responses of
+    /// this answer are long. `content_type` must have static lifetime.
     KeptAnswer(std::function<std::string()> make, std::string_view content_type)
         : make_(std::move(make)), content_type_(content_type) {}
 
@@ -83,7 +84,7 @@ class KeptAnswer {
   private:
     void give(HttpResponse& response, const std::string& if_none_match, bool takes_gzip);
 
-    std::function<std::string()> make_;  ///< of the faces' loop, as what follows; null: made
+    std::function<std::string()> make_;  ///< of one thread, as what follows; null: made
     SharedText text_;
     SharedText packed_;  ///< null: not requested yet
     std::string tag_;

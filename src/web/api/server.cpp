@@ -47,7 +47,7 @@ std::shared_ptr<const Site> Server::site_of(Settings settings,
 }
 
 void Server::apply(Settings settings, std::shared_ptr<const Directory> directory,
-                   SharedText configuration) {
+                   std::function<std::string()> configuration) {
     providers_.configuration = std::move(configuration);
     crossing_->run([current = current_, lent = crossing_->lend(directory), listener = listener_,
                     site = site_of(std::move(settings), directory)] {

@@ -106,38 +106,42 @@ using Values = std::vector<std::pair<int, double>>;  // at seconds
 
 constexpr TimePoint kStart{100s};
 
-/// Four slots of 10 s; times are relative to kStart.
-SlotRing ring_of(const Values& put) {
-    SlotRing ring(10s, 4);
-    for (const auto& [at, value] : put) ring.put(kStart + at * 1s, value);
-    return ring;
+/// Ring 1 has four slots of 10 s; times are relative to kStart. The rings beside are full.
+SlotRings ring_of(const Values& put) {
+    SlotRings rings(10s, 4, 3);
+    for (const auto& [at, value] : put) rings.put(1, kStart + at * 1s, value);
+    for (const int at : {0, 10, 20, 30, 100}) {
+        rings.put(0, kStart + at * 1s, -1);
+        rings.put(2, kStart + at * 1s, -1);
+    }
+    return rings;
 }
 
 Values told(const Values& put, int now) {
     Values all;
-    ring_of(put).each(kStart + now * 1s, [&](TimePoint at, double value) {
+    ring_of(put).each(1, kStart + now * 1s, [&](TimePoint at, double value) {
         all.emplace_back(static_cast<int>((at - kStart) / 1s), value);
     });
     return all;
 }
 
-TEST(SlotRing, KeepsTheLastValueOfEachSlot) {
+TEST(SlotRings, KeepsTheLastValueOfEachSlot) {
     EXPECT_EQ(told({}, 0), Values());
-    EXPECT_FALSE(ring_of({}).at(kStart));
+    EXPECT_FALSE(ring_of({}).at(1, kStart));
     const Values put{{0, 1}, {9, 2}, {10, 0}};
     EXPECT_EQ(told(put, 10), (Values{{0, 2}, {10, 0}}));
-    EXPECT_EQ(ring_of(put).at(kStart + 5s), 2);
-    EXPECT_EQ(ring_of(put).at(kStart + 19s), 0);
-    EXPECT_FALSE(ring_of(put).at(kStart + 20s));
-    EXPECT_FALSE(ring_of(put).at(kStart - 1s));
+    EXPECT_EQ(ring_of(put).at(1, kStart + 5s), 2);
+    EXPECT_EQ(ring_of(put).at(1, kStart + 19s), 0);
+    EXPECT_FALSE(ring_of(put).at(1, kStart + 20s));
+    EXPECT_FALSE(ring_of(put).at(1, kStart - 1s));
 }
 
-TEST(SlotRing, P10AnUnsetSlotIsAbsentAndNever0) {
+TEST(SlotRings, P10AnUnsetSlotIsAbsentAndNever0) {
     EXPECT_EQ(told({{0, 1}, {30, 4}}, 30), (Values{{0, 1}, {30, 4}}));
-    EXPECT_FALSE(ring_of({{0, 1}, {30, 4}}).at(kStart + 15s));
+    EXPECT_FALSE(ring_of({{0, 1}, {30, 4}}).at(1, kStart + 15s));
 }
 
-TEST(SlotRing, ForgetsTheOldest) {
+TEST(SlotRings, ForgetsTheOldest) {
     Values put{{0, 0}, {10, 1}, {20, 2}, {30, 3}, {40, 4}, {50, 5}};
     EXPECT_EQ(told(put, 50), (Values{{20, 2}, {30, 3}, {40, 4}, {50, 5}}));
     put.emplace_back(15, 9);
@@ -151,17 +155,30 @@ TEST(SlotRing, ForgetsTheOldest) {
     EXPECT_EQ(told({{0, 1}, {20, 3}, {100, 7}}, 100), (Values{{100, 7}}));
 }
 
-TEST(SlotRing, KnowsNothingOfBeforeTheClockBegan) {
-    SlotRing young(10s, 7);
+TEST(SlotRings, KnowsNothingOfBeforeTheClockBegan) {
+    SlotRings young(10s, 7, 1);
     std::vector<double> values;
-    young.put(TimePoint{15s}, 1);
-    young.put(TimePoint{25s}, 2);
-    young.each(TimePoint{25s}, [&](TimePoint, double value) { values.push_back(value); });
+    young.put(0, TimePoint{15s}, 1);
+    young.put(0, TimePoint{25s}, 2);
+    young.each(0, TimePoint{25s}, [&](TimePoint, double value) { values.push_back(value); });
     EXPECT_EQ(values, (std::vector<double>{1, 2}));
 }
 
+TEST(SlotRings, ARingIsTakenOver) {
+    const SlotRings before = ring_of({{0, 1}, {10, 2}});
+    SlotRings rings(10s, 4, 2);
+    rings.copy(1, before, 1);
+    rings.put(1, kStart + 20s, 3);
+    Values all;
+    rings.each(1, kStart + 20s, [&](TimePoint at, double value) {
+        all.emplace_back(static_cast<int>((at - kStart) / 1s), value);
+    });
+    EXPECT_EQ(all, (Values{{0, 1}, {10, 2}, {20, 3}}));
+    EXPECT_FALSE(rings.at(0, kStart));
+}
+
 TEST(SlotWidth, IsTheNarrowestThatStaysBelowTheLimit) {
-    constexpr std::size_t kHour = 3600 * SlotRing::kBytes;
+    constexpr std::size_t kHour = 3600 * SlotRings::kBytes;
     EXPECT_EQ(slot_width(1, 1h, 1s, kHour), 1s);
     EXPECT_EQ(slot_width(2, 1h, 1s, kHour), 2s);
     EXPECT_EQ(slot_width(3, 1h, 1s, kHour), 5s);

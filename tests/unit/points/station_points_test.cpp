@@ -172,7 +172,7 @@ TEST_F(StationHistoryTest, ItsSlotsGrowWithTheNumberOfPointsAndBoundTheirMemory)
     EXPECT_EQ(StationHistory::width_for(2912), 5s);
     for (const std::size_t count : {1u, 1000u, 50'000u, 300'000u})
         EXPECT_LE(count * slots_of(StationHistory::kSpan, StationHistory::width_for(count)) *
-                      SlotRing::kBytes,
+                      SlotRings::kBytes,
                   StationHistory::kBytes)
             << count;
 }

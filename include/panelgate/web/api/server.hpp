@@ -75,7 +75,9 @@ struct Providers {
     AlarmSource* alarms = nullptr;         ///< null: there are no alarms; outlives the server
     ReloadSource* reload = nullptr;        ///< null: reload is not available; outlives the server
     TextSource* text = nullptr;            ///< null: there is no text; outlives the server
-    SharedText configuration;  ///< the active one, a JSON object without secrets; null: not shown
+    /// Renders the active configuration, a JSON object without secrets, in any thread; null: not
+    /// shown.
+    std::function<std::string()> configuration;
     /// Told of what clients change or are refused, for an audit; may be empty.
     std::function<void(const Deed&)> record{};
     /// Runs `read` in the store's thread, with nullptr if nothing can be read, then `done` in the
@@ -107,7 +109,7 @@ class Server {
     /// Serves these from the next request on, see HttpListener::apply(). Running requests keep the
     /// settings and the directory that they started with.
     void apply(Settings settings, std::shared_ptr<const Directory> directory,
-               SharedText configuration);
+               std::function<std::string()> configuration);
     /// The port that it listens on; 0 before start().
     std::uint16_t port() const { return port_; }
     /// Closes the listener and idle connections; running requests are answered, then their

@@ -185,7 +185,7 @@ using Configuration = HttpRig;
 
 TEST_F(Configuration, IsShownWithThePathsAndTheRoleOfWhoAsks) {
     EXPECT_EQ(get("/api/v1/configuration").status(), 404u) << "a program without";
-    configuration = std::make_shared<const std::string>(R"({"lines":[]})");
+    configuration = [] { return std::string(R"({"lines":[]})"); };
     settings.anonymous = Role::viewer;
     settings.tokens = {{"ops", Role::operator_, hash_of("let-me")}};
     start();

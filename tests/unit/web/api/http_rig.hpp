@@ -288,7 +288,7 @@ class HttpRig : public ::testing::Test {
     std::vector<points::RelayStatus> relays;
     EventHub events;
     DiscoverySource* discovery = nullptr;
-    SharedText configuration;
+    std::function<std::string()> configuration;
     std::string metrics = "up 1\n";  ///< the text of /metrics
     bool ready = true;
     std::string missing;
