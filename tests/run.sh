@@ -58,7 +58,7 @@ build() {
 run_tests() { ctest --preset "$1" -j "$jobs" "${@:2}"; }
 # The soak judges values and sums, which hold however late a compiler beside it makes them.
 begin_soak() {
-    /usr/bin/python3 -B tests/soak/soak.py "$([ $mode = nightly ] && echo 7200 || echo 180)" >"$logs/soak-output.log" 2>&1 &
+    /usr/bin/python3 -B tests/soak/soak.py "$([ $mode = nightly ] && echo 14400 || echo 180)" >"$logs/soak-output.log" 2>&1 &
     soak=$!
 }
 end_soak() {
