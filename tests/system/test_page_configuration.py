@@ -96,7 +96,7 @@ class Editing(Browser):
         self.wait(lambda: self.all(".success"))
         self.wait(lambda: self.program.get("/api/v1/stations/floor1-5/points/speed")[1].get("quality") == "good")
         self.assertIn("id: 5", self.file.read_text())
-        self.assertEqual(len(self.all("[data-version]")) > 1, True)
+        self.wait(lambda: len(self.all("[data-version]")) > 1)
 
     def test_what_was_read_becomes_a_point(self):
         self.open("request/press")
@@ -129,7 +129,7 @@ class Editing(Browser):
         self.saved()
         self.wait(lambda: self.all(".success") and "hall 8" in self.file.read_text())
         self.wait(lambda: len(self.all("[data-version]")) > 1)
-        self.all("[data-version] button")[1].click()
+        self.script("document.querySelectorAll('[data-version] button')[1].click()")  # in one step: the list is drawn anew
         self.wait(lambda: self.all("dialog .difference"))
         self.assertIn("hall 1", self.text("dialog .come"))
         self.find("#roll-back").click()
