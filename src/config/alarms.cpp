@@ -61,18 +61,19 @@ struct PlacedCondition {
     bool is_given = false;
 };
 
-std::vector<PlacedCondition> conditions_of(const Settings& alarm) {
+/// A value that could not be read is given, too: its own fault is enough.
+std::vector<PlacedCondition> conditions_of(Reader& in, const Settings& alarm) {
     std::vector<PlacedCondition> given{
-        {"above", "point", alarm.above.has_value()},   {"below", "point", alarm.below.has_value()},
-        {"equals", "point", alarm.equals.has_value()}, {"stale", "point", alarm.stale},
-        {"offline", "station", alarm.offline},         {"down", "line", alarm.down},
-        {"finding", "", !alarm.finding.empty()}};
+        {"above", "point", in.has("above")},   {"below", "point", in.has("below")},
+        {"equals", "point", in.has("equals")}, {"stale", "point", alarm.stale},
+        {"offline", "station", alarm.offline}, {"down", "line", alarm.down},
+        {"finding", "", in.has("finding")}};
     std::erase_if(given, [](const PlacedCondition& one) { return !one.is_given; });
     return given;
 }
 
 void check_condition(Reader& in, const Settings& alarm) {
-    const std::vector<PlacedCondition> given = conditions_of(alarm);
+    const std::vector<PlacedCondition> given = conditions_of(in, alarm);
     if (given.size() != 1)
         return in.problem("name",
                           "an alarm has one condition: above, below, equals or stale of a point, "
@@ -162,6 +163,12 @@ void check_webhook(Reader& in, alarms::WebhookSettings& hook) {
 const Keys<Settings>& alarm_keys() {
     static constexpr Words<std::string_view, 4> kSeverities{
         {{"low", "low"}, {"medium", "medium"}, {"high", "high"}, {"urgent", "urgent"}}};
+    static const auto kFindings = [] {
+        Words<std::string_view, alarms::kFindings.size()> words;
+        std::ranges::transform(alarms::kFindings, words.begin(),
+                               [](std::string_view one) { return std::pair(one, one); });
+        return words;
+    }();
     static const auto kKeys =
         Keys<Settings>()
             .text("name", &Settings::name, name_form(), "Name of the alarm; unique.")
@@ -183,8 +190,8 @@ const Keys<Settings>& alarm_keys() {
             .example("press")
             .text("line", &Settings::line, {}, "Line that may be down.")
             .example("floor1")
-            .text("finding", &Settings::finding, {"^[a-z][a-z0-9-]*$"},
-                  "Cause of a finding of the line doctor, or any.")
+            .word("finding", &Settings::finding, kFindings,
+                  "Cause of a finding of a line or of the gateway, or any.")
             .example("any")
             .boolean("stale", &Settings::stale, "The point's value is too old or unreadable.")
             .boolean("offline", &Settings::offline,

@@ -52,6 +52,7 @@ std::optional<images::Entry> read_entry(Reader& in, const Node& node) {
 }
 
 bool read_entries(Reader& in, images::Settings& image) {
+    if (!in.require("points")) return false;
     const Node* const list = in.sequence("points", kPointsExample);
     if (list == nullptr) return false;
     for (const Node& node : list->items)

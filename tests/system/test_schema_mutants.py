@@ -60,18 +60,24 @@ ONLY_CHECK = {
         "lines/name", "lines/stations", "lines/stations/name", "lines/stations/template",
         "modbus_tcp/lines", "serial_masters/lines", "http/listen",
         "modbus_tcp/diagnostics_unit", "access/roles/name", "access/rules/stations",
-        "access/rules/listeners", "access/rules/tokens", "http/anonymous", "http/tokens/role"},
+        "access/rules/listeners", "access/rules/tokens", "http/anonymous", "http/tokens/role",
+        "alarms/line", "alarms/point", "alarms/station", "images/points", "images/unit"},
     "what is in files": {
         "http/tokens/file", "mqtt/ca", "mqtt/certificate", "mqtt/key", "mqtt/password_file",
-        "profiles_dir"},
+        "profiles_dir", "lines/stations/points_file"},
     "settings that do not go together": {
         "lines/offline/probe_max", "lines/queue/per_client", "lines/rs485/mode",
         "lines/serial/data_bits", "lines/serial/parity", "lines/serial/stop_bits",
         "lines/stations/points/bit", "lines/stations/points/labels", "lines/stations/points/max",
         "lines/stations/points/min", "lines/stations/timing/adaptive_ceiling",
-        "serial_masters/framing", "access/rules/allow", "access/rules/deny"},
+        "serial_masters/framing", "access/rules/allow", "access/rules/deny",
+        "alarms/above", "alarms/back", "alarms/down", "alarms/finding", "alarms/offline", "alarms/stale",
+        "lines/in_flight", "lines/tls", "lines/stations/points/report/at_least",
+        "lines/stations/points/report/at_most"},
+    "numbers that are above 0": {"lines/stations/points/report/deadband"},
     "1e-3 is a name, and a number for YAML, which 0.5 is, too": {
-        "lines/stations/points/name", "serial_masters/name", "http/hosts", "access/rules/name"},
+        "lines/stations/points/name", "serial_masters/name", "http/hosts", "access/rules/name",
+        "alarms/name", "images/name"},
 }
 ABSENT = object()
 VARIABLE = "${NOT_SET:-1}"  # nobody knows what the environment will bring

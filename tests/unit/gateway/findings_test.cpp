@@ -7,11 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "panelgate/alarms/settings.hpp"
+#include "panelgate/doctor/finding.hpp"
 #include "panelgate/rt/log.hpp"
 
 namespace panelgate::gateway::findings_test {
 namespace {
 
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -24,7 +27,10 @@ class FindingsTest : public ::testing::Test {
         wall += std::chrono::duration_cast<WallTime::duration>(later);
         findings.judge(now, wall, state);
         std::vector<std::string> causes;
-        for (const web::Finding& one : findings.list()) causes.push_back(one.cause);
+        for (const web::Finding& one : findings.list()) {
+            EXPECT_THAT(alarms::kFindings, Contains(one.cause)) << "an alarm may name the cause";
+            causes.push_back(one.cause);
+        }
         return causes;
     }
     bus::MinuteUse& use(double load, std::uint64_t no_turn = 0) {
@@ -43,6 +49,12 @@ class FindingsTest : public ::testing::Test {
     WallTime wall{std::chrono::seconds(1'800'000'000)};
     rt::LogTap log;
 };
+
+TEST(FindingsOfAlarms, AnAlarmMayNameEachCauseOfALine) {
+    constexpr auto kLast = static_cast<std::uint8_t>(doctor::Cause::misses_requests);
+    for (std::uint8_t i = 0; i <= kLast; ++i)
+        EXPECT_THAT(alarms::kFindings, Contains(doctor::code(static_cast<doctor::Cause>(i))));
+}
 
 TEST_F(FindingsTest, AFullLineIsOverloadedAndItsClientsAreNamed) {
     bus::MinuteUse& minute = use(95.5);
