@@ -63,7 +63,9 @@ class Panels(RtuBus):
         os.set_blocking(self._master, False)
 
     def __exit__(self, *failure):
-        if self._other:
+        if self._other:  # each of the two writes to both boxes
+            self._other.stop()
+            self.stop()
             self._other.__exit__(*failure)
         super().__exit__(*failure)
 

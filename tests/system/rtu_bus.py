@@ -71,9 +71,15 @@ class RtuBus:
     def __enter__(self):
         return self
 
-    def __exit__(self, *_):
-        os.close(self._end)
+    def stop(self):
+        """Nothing is answered any more."""
+        if self._end is not None:
+            os.close(self._end)
+            self._end = None
         self._thread.join(harness.PATIENCE)
+
+    def __exit__(self, *_):
+        self.stop()
         if os.readlink(self._link) == os.ttyname(self._slave):  # not another bus' by now
             os.unlink(self._link)
         for descriptor in (self._wake, self._master, self._slave):
