@@ -9,7 +9,7 @@ from tables import page, table
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 CAUSES = ROOT / "include/panelgate/doctor/finding.hpp"
-CODES = ROOT / "src/doctor/finding.cpp"
+CODES = ROOT / "include/panelgate/doctor/settings.hpp"
 WORDS = ROOT / "src/web/page/finding_words.js"
 OWN = ROOT / "src/gateway/findings.cpp"
 # cause: what it is, sign, remedy

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "panelgate/doctor/settings.hpp"
 #include "tables.hpp"
 
 namespace panelgate::config {
@@ -164,9 +165,11 @@ const Keys<Settings>& alarm_keys() {
     static constexpr Words<std::string_view, 4> kSeverities{
         {{"low", "low"}, {"medium", "medium"}, {"high", "high"}, {"urgent", "urgent"}}};
     static const auto kFindings = [] {
-        Words<std::string_view, alarms::kFindings.size()> words;
-        std::ranges::transform(alarms::kFindings, words.begin(),
-                               [](std::string_view one) { return std::pair(one, one); });
+        Words<std::string_view, 1 + doctor::kCauses.size() + alarms::kGatewayCauses.size()> words{
+            {{"any", "any"}}};
+        const auto twice = [](std::string_view one) { return std::pair(one, one); };
+        const auto rest = std::ranges::transform(doctor::kCauses, words.begin() + 1, twice).out;
+        std::ranges::transform(alarms::kGatewayCauses, rest, twice);
         return words;
     }();
     static const auto kKeys =

@@ -5,48 +5,21 @@
 #include <cstddef>
 #include <cstdio>
 
+#include "panelgate/doctor/settings.hpp"
 #include "rules.hpp"
 
 namespace panelgate::doctor {
 
 namespace {
 
-/// In the order of Cause.
-constexpr std::array<std::string_view, 25> kCodes{
-    "echo",
-    "telnet",
-    "no-answer-at-all",
-    "wrong-baud",
-    "wrong-parity",
-    "other-master",
-    "collision",
-    "overrun",
-    "noise",
-    "tcp-framing",
-    "trailing-bytes",
-    "wrong-crc-order",
-    "ascii-lower-case",
-    "ascii-delimiters",
-    "wrong-exception",
-    "wrong-reply",
-    "answers-broadcasts",
-    "damaged-replies",
-    "duplicate-address",
-    "timeout-too-short",
-    "gap-too-short",
-    "unasked-frames",
-    "station-silent",
-    "repeats-requests",
-    "misses-requests",
-};
 constexpr std::size_t place(Cause cause) { return static_cast<std::size_t>(cause); }
-static_assert(place(Cause::misses_requests) + 1 == kCodes.size());
-static_assert(kCodes[place(Cause::wrong_crc_order)] == "wrong-crc-order");
-static_assert(kCodes[place(Cause::duplicate_address)] == "duplicate-address");
+static_assert(place(Cause::misses_requests) + 1 == kCauses.size());
+static_assert(kCauses[place(Cause::wrong_crc_order)] == "wrong-crc-order");
+static_assert(kCauses[place(Cause::duplicate_address)] == "duplicate-address");
 
 }  // namespace
 
-std::string_view code(Cause cause) { return kCodes[place(cause)]; }
+std::string_view code(Cause cause) { return kCauses[place(cause)]; }
 
 std::string share_text(std::uint64_t part, std::uint64_t whole, const char* what) {
     const double percent =

@@ -381,7 +381,6 @@ void Gateway::record(const web::ReloadVerdict& verdict) {
     if (was_kept) audit_.reload(verdict);
     audit_.apply(snapshot_->config->audit);
     journal_.apply(snapshot_->config->store);
-    apply_alarms();
     if (!was_kept) audit_.reload(verdict);
 }
 

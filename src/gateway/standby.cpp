@@ -186,7 +186,7 @@ void Standby::look_at_locks() {
     }
 }
 
-/// A line that was arranged anew may still be opening, which says nothing about its device.
+/// A line that was arranged anew may still be opening: its device is not judged meanwhile.
 void Standby::look_for_device(const std::string& name, Place& place) {
     const RunningLine* const line = hooks_.line(name);
     if (line == nullptr || place.seat.role() == Role::claiming) return;
@@ -210,7 +210,7 @@ void Standby::look() {
     if (clock_.now() >= next_question_) ask_peer();
 }
 
-/// Any byte shows that somebody has the line, also one that is no frame.
+/// Any byte shows that another box has the line, even a byte of no frame.
 void Standby::listen_to(const std::string& name, Place& place) {
     const RunningLine* const line = hooks_.line(name);
     if (line == nullptr) return;
@@ -273,7 +273,7 @@ void Standby::begin_probe(const std::string& name, Place& place) {
     place.probe->start();
 }
 
-/// First the panel whose reply was heard last, then one after another.
+/// First the panel whose reply was heard last, then the panels in their order.
 std::size_t Standby::station_to_probe(const std::string& name, const Place& place) const {
     const auto& stations = place.line.stations;
     const RunningLine* const line = hooks_.line(name);

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """soak.py [SECONDS [SEED [alone | two]]]: a gateway with everything on under random faults of lines, panels, devices,
-clients, broker, certificates and configuration; with `two`, of a second box at its line, too; else half the time so. At the end each request has had one answer, sums agree, each confirmed write
-was on the wire once and is in the audit, and memory and descriptors are flat. The seed is printed first.
+clients, broker, certificates and configuration; with `two`, of a second box at its line, too. Without either word each
+kind has half the time. At the end each request has had one answer, sums agree, each confirmed write was on the wire once
+and is in the audit, and memory and descriptors are flat. The seed is printed first.
 
 PANELGATE=build/release/panelgate python3 -B tests/soak/soak.py 180
 """
@@ -183,7 +184,7 @@ def judge_sums(box, clients, two):
     lines = {"line": "eth"} if two else {}
     metrics = box.program.get("/metrics")[1]
     for what, kind, function in (("reads", plant.Reader, "4"), ("writes", plant.Writer, "6")):
-        asked = sum(one.tally["answered"] for one in clients 
+        asked = sum(one.tally["answered"] for one in clients
                     if isinstance(one, kind) and one.plant is box and (not two or one.unit == 11))
         counted = plant.sum_of(metrics, "panelgate_requests_total", function=function, **lines)
         print(f"{what}: {asked} answered, {counted:.0f} counted by the gateway")

@@ -417,7 +417,7 @@ class Pages(unittest.TestCase):
         named = re.findall(r"\d+: '#([\w-]+)'", text)
         self.assertEqual(len(named), 3)
         self.assertEqual(set(named) - anchors, set())
-        causes = re.findall(r'(?m)^    "([\w-]+)",$', (ROOT / "src/doctor/finding.cpp").read_text())
+        causes = re.findall(r'(?m)^    "([\w-]+)",$', (ROOT / "include/panelgate/doctor/settings.hpp").read_text())
         causes += re.findall(r'\.cause = "([\w-]+)"', (ROOT / "src/gateway/findings.cpp").read_text())
         entries = re.findall(r"(?m)^### (.+)$", (DOCS / "reference/findings.md").read_text())
         self.assertEqual(sorted(causes), sorted(entries))

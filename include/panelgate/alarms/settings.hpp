@@ -11,39 +11,10 @@
 
 namespace panelgate::alarms {
 
-/// What an alarm may name as its finding: any, a cause of the line doctor, or one of the gateway.
-inline constexpr std::array<std::string_view, 32> kFindings{"any",
-                                                            "echo",
-                                                            "telnet",
-                                                            "no-answer-at-all",
-                                                            "wrong-baud",
-                                                            "wrong-parity",
-                                                            "other-master",
-                                                            "collision",
-                                                            "overrun",
-                                                            "noise",
-                                                            "tcp-framing",
-                                                            "trailing-bytes",
-                                                            "wrong-crc-order",
-                                                            "ascii-lower-case",
-                                                            "ascii-delimiters",
-                                                            "wrong-exception",
-                                                            "wrong-reply",
-                                                            "answers-broadcasts",
-                                                            "damaged-replies",
-                                                            "duplicate-address",
-                                                            "timeout-too-short",
-                                                            "gap-too-short",
-                                                            "unasked-frames",
-                                                            "station-silent",
-                                                            "repeats-requests",
-                                                            "misses-requests",
-                                                            "broker-away",
-                                                            "audit-fails",
-                                                            "store-fails",
-                                                            "reload-refused",
-                                                            "certificate-expires",
-                                                            "overload"};
+/// Causes of findings of the gateway, not of a line: an alarm may name each.
+inline constexpr std::array<std::string_view, 6> kGatewayCauses{
+    "broker-away",    "audit-fails",         "store-fails",
+    "reload-refused", "certificate-expires", "overload"};
 
 struct Settings {
     static constexpr std::size_t kMost = 1000;  ///< alarms of a gateway

@@ -19,6 +19,7 @@
 #include "panelgate/bus/rights.hpp"
 #include "panelgate/bus/trace.hpp"
 #include "panelgate/doctor/finding.hpp"
+#include "panelgate/doctor/settings.hpp"
 #include "panelgate/line/line.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/tap/heard.hpp"

@@ -13,6 +13,7 @@
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/words.hpp"
 #include "panelgate/doctor/finding.hpp"
+#include "panelgate/doctor/settings.hpp"
 #include "panelgate/line/counters.hpp"
 
 namespace panelgate::doctor {

@@ -11,16 +11,6 @@
 
 namespace panelgate::doctor {
 
-struct Settings {
-    Duration window = 60s;  ///< length of the window
-    Duration step = 5s;     ///< the window moves on by this
-    /// Minimum time between looks; a look compares the counters of all stations.
-    Duration rest = 500ms;
-    /// The window is extended while it has fewer attempts than this.
-    std::uint64_t attempts = 20;
-    std::size_t marks = 64;  ///< remembered samples at most
-};
-
 /// The probable fault; causes of the whole line come first.
 enum class Cause : std::uint8_t {
     echo,                ///< the adapter's echo differs from the configuration

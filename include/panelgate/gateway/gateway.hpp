@@ -54,8 +54,8 @@ class Gateway {
     void start();
     /// Serves this configuration from now on; unchanged lines, listeners, clients and points are
     /// not disturbed. Throws CannotListen, or std::system_error without a pty for a simulated line;
-    /// then nothing has changed. Unchanged stations share their profile
-    /// with the running ones (config::share_profiles()).
+    /// then nothing has changed. Unchanged stations share their profile with the running stations
+    /// (config::share_profiles()).
     void apply(std::shared_ptr<const config::Config> config);
     /// Records a reload, whatever became of it, and keeps the audit as it now is configured.
     void record(const web::ReloadVerdict& verdict);

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "panelgate/alarms/settings.hpp"
-#include "panelgate/doctor/finding.hpp"
 #include "panelgate/rt/log.hpp"
 
 namespace panelgate::gateway::findings_test {
@@ -28,7 +27,8 @@ class FindingsTest : public ::testing::Test {
         findings.judge(now, wall, state);
         std::vector<std::string> causes;
         for (const web::Finding& one : findings.list()) {
-            EXPECT_THAT(alarms::kFindings, Contains(one.cause)) << "an alarm may name the cause";
+            EXPECT_THAT(alarms::kGatewayCauses, Contains(one.cause))
+                << "an alarm may name the cause";
             causes.push_back(one.cause);
         }
         return causes;
@@ -49,12 +49,6 @@ class FindingsTest : public ::testing::Test {
     WallTime wall{std::chrono::seconds(1'800'000'000)};
     rt::LogTap log;
 };
-
-TEST(FindingsOfAlarms, AnAlarmMayNameEachCauseOfALine) {
-    constexpr auto kLast = static_cast<std::uint8_t>(doctor::Cause::misses_requests);
-    for (std::uint8_t i = 0; i <= kLast; ++i)
-        EXPECT_THAT(alarms::kFindings, Contains(doctor::code(static_cast<doctor::Cause>(i))));
-}
 
 TEST_F(FindingsTest, AFullLineIsOverloadedAndItsClientsAreNamed) {
     bus::MinuteUse& minute = use(95.5);
